@@ -202,18 +202,20 @@ def evaluations(corners: int) -> list[Way]:
 def rows(rounds: int) -> list[dict]:
     """Rows of the table."""
     found = []
-    for ways in (block(), box(4), box(8), cradle(), evaluations(4), evaluations(8)):
+    for power_flow in (block(), box(4), box(8), cradle(), evaluations(4), evaluations(8)):
         errors, first = {}, {}
-        for way in ways:
+        for way in power_flow:
             began = time.process_time()
             errors[way.method] = float(way.error(way.run()))
             first[way.method] = 1e3 * (time.process_time() - began)
             for _ in range(way.warm):
                 way.run()
-        tasks = {way.method: Competitor(repeated(way.run, way.calls), way.calls, is_short=way.calls > 1) for way in ways}
-        contest = Contest(ways[0].scene, tasks, (), 0.0)
+        tasks = {
+            way.method: Competitor(repeated(way.run, way.calls), way.calls, is_short=way.calls > 1) for way in power_flow
+        }
+        contest = Contest(power_flow[0].scene, tasks, (), 0.0)
         measured = measure(contest, rounds)
-        for way in ways:
+        for way in power_flow:
             seconds = measured.median(way.method)
             per_step = 1e6 * seconds / way.steps if way.steps else None
             row = {"scene": way.scene, "method": way.method, "first_ms": first[way.method], "ms": 1e3 * seconds}

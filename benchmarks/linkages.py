@@ -31,7 +31,7 @@ from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head  # noqa: E402
 from gauss.io import linkages  # noqa: E402
 from gauss.linkages import ReducedLinkage, cycle_kernel, scene_state  # noqa: E402
-from gauss.linkages.closing import near  # noqa: E402
+from gauss.linkages.crank_ranges import near  # noqa: E402
 from gauss.view import plot_linkage  # noqa: E402
 
 ANGLES = 3600

@@ -9,9 +9,10 @@ from gauss.analysis.crosscheck import crosscheck
 from gauss.backends import available
 from gauss.backends.backend import BACKENDS
 from gauss.bench.machine import header
-from gauss.codegen import file_trust, object_cache, trace
+from gauss.codegen import cache_size, file_trust, object_cache, trace
 from gauss.codegen.cpython_layout import is_known
 from gauss.codegen.machine import width
+from gauss.codegen.optimiser import OPTIMISER
 from gauss.io import load
 from gauss.simulation import simulate
 from gauss.versions import DISTRIBUTION, version_of
@@ -29,6 +30,7 @@ EXTRAS = {
     "mjcf": ("mujoco",),
     "peers": ("scikit-sundae", "mujoco"),
 }
+CACHED = {"object code": "", "by content": "made", "sources": "sources"}  # kinds of cached files, begins of their names
 TOLERANCE = 1e-10  # relative difference of accelerations to Pinocchio's
 
 
@@ -60,6 +62,25 @@ def examine() -> list[Finding]:
     return [*_environment(), *(_tried(name, check) for name, check in checks.items()), *_extras()]
 
 
+def examine_cache(empty: bool = False) -> list[Finding]:
+    """Look at the cache of machine code alone.
+
+    Parameters
+    ----------
+    empty : bool
+        Remove its files first.
+    """
+    place = object_cache.folder()
+    findings = []
+    if empty and place is not None:
+        findings.append(Finding("emptied", f"{cache_size.empty(place)} files removed"))
+    sizes = object_cache.file_sizes()
+    for kind, prefix in CACHED.items():
+        found = [size for name, size in sizes.items() if name.rpartition("-")[0] == prefix]
+        findings.append(Finding(kind, f"{len(found)} files, {sum(found) / 1e6:.1f} MB"))
+    return [_tried("cache", _cache), *findings]
+
+
 def _tried(name: str, check: Callable[[], Finding]) -> Finding:
     try:
         return check()
@@ -79,7 +100,8 @@ def _machine_code() -> Finding:
     right = (kernel([3.0, 5.0]) == [10.0, 16.0]).all()
     if not right:
         return Finding("machine code", "compiled code gives wrong numbers", "pip install --upgrade llvmlite", False)
-    return Finding("machine code", f"compiles and is right, {1e3 * (time.perf_counter() - began):.0f} ms")
+    made = f"compiles and is right, {1e3 * (time.perf_counter() - began):.0f} ms; {OPTIMISER.status()}"
+    return Finding("machine code", made, "send this output to the maintainers" if OPTIMISER.failures else "")
 
 
 def _calls() -> Finding:
@@ -93,7 +115,7 @@ def _cache() -> Finding:
     if place is None:
         return Finding("cache", "machine code is not kept: GAUSS_CACHE is empty", "unset GAUSS_CACHE to keep it")
     kept = object_cache.file_sizes()
-    text = f"{place}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB"
+    text = f"{place}: {len(kept)} files, {sum(kept.values()) / 1e6:.1f} MB of {cache_size.largest_size() / 1e6:g}"
     nearest = next(folder for folder in (place, *place.parents) if folder.exists())
     if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")

@@ -40,3 +40,27 @@ def current_name(module: str, renamed: dict[str, str], name: str) -> str:
         raise AttributeError(f"module {module!r} has no attribute {name!r}")
     warn(f"{module}.{name} is called {module}.{renamed[name]} now.", DeprecationWarning, stacklevel=3)
     return renamed[name]
+
+
+class FormerAttribute:
+    """Former name of an attribute: its value, with a DeprecationWarning.
+
+    Parameters
+    ----------
+    current : str
+        Name of the attribute today.
+    """
+
+    def __init__(self, current: str):
+        self.current = current
+
+    def __set_name__(self, owner: type, name: str):
+        """Keep the former name."""
+        self.former = f"{owner.__name__}.{name}"
+
+    def __get__(self, instance, owner: type):
+        """Value of the attribute by its name of today."""
+        if instance is None:
+            return self
+        warn(f"{self.former} is called {owner.__name__}.{self.current} now.", DeprecationWarning, stacklevel=2)
+        return getattr(instance, self.current)

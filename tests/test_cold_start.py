@@ -2,34 +2,82 @@
 
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
 
 import pytest
 
+import gauss
+from gauss.integrators.methods import LIBRARY_ORIGINS, ORIGINS
+from gauss.lazy import LazyTable
 from gauss.simulation import progress
+from gauss.simulation.integrators import NONSMOOTH_ORIGINS
 
-HEAVY = ("scipy", "pinocchio", "qpsolvers", "osqp", "matplotlib", "tqdm", "typer", "rich", "gauss.linkages", "gauss.rotors")
+ROOT = Path(gauss.__file__).parent
+STUBBED = [".".join(path.parent.relative_to(ROOT.parent).parts) for path in sorted(ROOT.rglob("__init__.pyi"))]
+
+OPTIONAL = (
+    *("scipy", "pinocchio", "qpsolvers", "osqp", "matplotlib", "pandas", "xarray", "mujoco", "tqdm", "typer", "rich"),
+    *("numpy.ma", "importlib.metadata", "xml.etree", "gauss.linkages", "gauss.rotors", "gauss.servo"),
+)
+HEAVY = (*OPTIONAL, "numpy", "llvmlite", "gauss.scene.scene", "gauss.dynamics.plan", "gauss.simulation.simulate")
+UNUSED = (  # drivers, integrators and elements of scenes that a four-bar does not use
+    *("gauss.simulation.moreau.moreau_jean", "gauss.simulation.phases.phase", "gauss.simulation.library_run"),
+    *("gauss.integrators.symplectic", "gauss.integrators.radau", "gauss.scene.gears", "gauss.scene.rolling"),
+)
+SIMULATE = "import gauss; gauss.simulate(gauss.load('four_bar'), 0.01, progress=False)"
+HELP = "import sys, runpy; sys.argv = ['gauss', '--help']\ntry: runpy.run_module('gauss')\nexcept SystemExit: pass"
 
 
-def _imported(code: str) -> set[str]:
-    """Heavy modules that a fresh process imports."""
-    script = f"{code}\nimport sys\nprint(*(name for name in {HEAVY!r} if name in sys.modules))"
+def _imported(code: str, names: tuple[str, ...]) -> set[str]:
+    """Which of these modules a fresh process imports."""
+    script = f"{code}\nimport sys\nprint('modules:', *(name for name in {names!r} if name in sys.modules))"
     where = {"cwd": Path(__file__).parent.parent, "capture_output": True, "text": True, "check": True}
-    return set(subprocess.run([sys.executable, "-c", script], **where).stdout.split())
+    return set(subprocess.run([sys.executable, "-c", script], **where).stdout.rpartition("modules:")[2].split())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "code, expected",
+    "code, names, expected",
     [
-        ("import gauss", set()),
-        ("import gauss; gauss.simulate(gauss.load('four_bar'), 0.01, progress=False)", set()),
-        ("import gauss; gauss.load('robot:ur5')", {"pinocchio"}),
-        ("import gauss; gauss.Linkage", {"gauss.linkages"}),
+        ("import gauss", HEAVY, set()),
+        ("from gauss import GaussError", HEAVY, set()),
+        (HELP, HEAVY, {"typer", "rich"}),
+        (SIMULATE, OPTIONAL + UNUSED, set()),
+        ("import gauss; gauss.load('robot:ur5')", ("pinocchio", "scipy"), {"pinocchio"}),
+        ("import gauss; gauss.Linkage", ("gauss.linkages", "gauss.rotors"), {"gauss.linkages"}),
     ],
 )
-def test_only_what_is_used_is_imported(code, expected):
-    assert _imported(code) == expected
+def test_only_what_is_used_is_imported(code, names, expected):
+    assert _imported(code, names) == expected
+
+
+@pytest.mark.parametrize("origin", [*ORIGINS, *LIBRARY_ORIGINS, *NONSMOOTH_ORIGINS])
+def test_the_table_of_methods_names_each_of_them(origin):
+    module, several = origin
+    names = (ORIGINS | LIBRARY_ORIGINS | NONSMOOTH_ORIGINS)[origin]
+    assert tuple(method.name for method in getattr(import_module(module), several)) == names
+
+
+@pytest.mark.parametrize("package", STUBBED)
+def test_public_names_take_precedence_over_modules_of_the_same_name(package):
+    """Also where the module was imported before the name was asked for."""
+    found = import_module(package)
+    for module in iter_modules(found.__path__, f"{package}."):
+        if module.name.rpartition(".")[2] in found.__all__:
+            import_module(module.name)
+    modules = {name for name in found.__all__ if isinstance(getattr(found, name), ModuleType)}
+    assert modules == ({"profiles"} if package == "gauss.scene" else set())
+    assert set(found.__all__) <= set(dir(found))
+
+
+def test_a_lazy_table_finds_a_value_when_it_is_asked_for():
+    asked = []
+    table = LazyTable({"one": 1, "two": 2}, lambda source: asked.append(source) or -source)
+    assert (list(table), len(table), "two" in table, asked) == (["one", "two"], 2, True, [])
+    assert (table["two"], table.get("three"), asked) == (-2, None, [2])
 
 
 def test_an_unknown_name_is_an_error():

@@ -5,6 +5,7 @@ The cyclomatic complexity of a function is 1 + the number of its decisions (McCa
 
 import ast
 import inspect
+import re
 import warnings
 from collections import Counter
 from functools import cache
@@ -16,10 +17,52 @@ import pytest
 from numpydoc.docscrape import NumpyDocString
 
 import gauss
+from gauss.codegen import gc_pause
 
 ROOT = Path(gauss.__file__).parent
 TESTS = Path(__file__).parent
 PACKAGES = sorted(path.parent.name for path in ROOT.glob("*/__init__.py"))
+# Retired words of names, and what the field says.
+RETIRED_WORDS = {
+    **dict.fromkeys(("fade", "fades", "faded", "fading"), "near rank-deficient, near-singular"),
+    **dict.fromkeys(("settle", "settles", "settled", "settling"), "project; solve the contact problem; active set found"),
+    **dict.fromkeys(("grip", "grips"), "set-valued element"),
+    **dict.fromkeys(("holder", "holders"), "mode selector"),
+    **dict.fromkeys(("flank", "flanks"), "backlash side"),
+    **dict.fromkeys(("lacking", "lacks", "unbalanced"), "residual"),
+    **dict.fromkeys(("linkwise", "looped", "meetings"), "call graph, shared joints"),
+    **dict.fromkeys(("paying", "patient", "patience"), "tiered compilation, compile_threshold"),
+    **dict.fromkeys(("crowd", "streamed"), "batch, adaptive batch with lane refill"),
+    **dict.fromkeys(("judge", "audible", "insistence"), "step-size controller, verdict, status"),
+    "careful": "refined",
+    "expanded": "Taylor step",
+    "outlook": "advise, recommendation",
+    "passage": "joint kinematics; singularity avoidance",
+    "plays": "backlashes",
+    "remembers": "method state",
+    "rubs": "tangential directions",
+    "skewed": "non-ideal",
+    "swept": "tree recursion",
+    "told": "contact mode",
+}
+# Retired names as a whole: their words have other uses.
+RETIRED_NAMES = {
+    **dict.fromkeys(("Bare", "pushes", "ways"), "ideal counterpart, joint factors, direction of power flow"),
+    **dict.fromkeys(("Block", "Cells", "Form", "Place"), "operand, call recorder, specialisation, slot"),
+    **dict.fromkeys(("Corrected", "Guarded", "Otherwise", "Repeat"), "refined, checked switch, first accepted, fixed point"),
+    **dict.fromkeys(("Pull", "Tie", "tie"), "Baumgarte feedback, coupling constraint"),
+    **dict.fromkeys(("QUIET", "TRUST", "MET", "OPEN", "DEAD", "LIVE", "NOTHING", "HUGE"), "the quantity that is bounded"),
+    **dict.fromkeys(("Staying", "pressed", "touched"), "unilateral, active set"),
+    "Part": "subsystem",
+    "changing": "nonsmooth elements",
+    "closing": "loop constraints, loop joints",
+    "closure_gap": "constraint residual",
+    "holding": "mode selection",
+}
+PLAIN_ENGLISH = {"told", "plays", "lacks", "expanded", "swept"}  # in texts
+PAGES = ("README.md", "CONTRIBUTING.md", "models/README.md", "benchmarks/README.md")
+FORMER_TEXTS = {"outlook", "--patience"}  # former public names, and a former option
+FORMER = "FormerAttribute"  # gives a former name, with a DeprecationWarning
 DECISIONS = (ast.If, ast.IfExp, ast.For, ast.While, ast.Assert, ast.ExceptHandler, ast.comprehension, ast.match_case)
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 COMPLEXITY_LIMIT = 12
@@ -29,7 +72,8 @@ COMPLEXITY_LIMIT = 12
 def trees() -> dict[str, ast.Module]:
     """Syntax trees of all files of gauss, by their paths."""
     files = sorted(ROOT.rglob("*.py"))
-    return {str(path.relative_to(ROOT)): ast.parse(path.read_text(encoding="utf-8")) for path in files}
+    with gc_pause():  # the collector would look again and again at all nodes
+        return {str(path.relative_to(ROOT)): ast.parse(path.read_text(encoding="utf-8")) for path in files}
 
 
 def nodes(kind):
@@ -67,6 +111,25 @@ def assigned(tree: ast.Module) -> list[str]:
     return [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
 
 
+def defined(tree: ast.Module) -> set[str]:
+    """Names that a file defines: classes, functions, parameters, attributes, constants and fields."""
+    found = {node.name for node in ast.walk(tree) if isinstance(node, DEFINITIONS)}
+    found |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
+    found |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
+    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    bodies = [tree.body, *(node.body for node in classes)]
+    lines = [
+        line for body in bodies for line in body if not (isinstance(line, ast.Assign) and FORMER in ast.dump(line.value))
+    ]
+    return found | set(assigned(ast.Module(lines, [])))
+
+
+def retired(names: set[str]) -> list[str]:
+    """Those names that are retired or contain a retired word."""
+    words = {name: {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)} for name in names}
+    return sorted(name for name in names if name in RETIRED_NAMES or words[name] & RETIRED_WORDS.keys())
+
+
 def test_the_count_of_decisions():
     source = "def f(x):\n  if x and (x or 1):\n    return [a for a in x if a]\n  def g(): return 1 if x else 2\n  return 1"
     outer = ast.parse(source).body[0]
@@ -87,6 +150,28 @@ def test_a_bound_has_one_definition(name):
 def test_no_function_makes_many_decisions():
     found = [(complexity(node), f"{path}:{node.lineno} {node.name}") for path, node in nodes(ast.FunctionDef)]
     assert [function for function in found if function[0] > COMPLEXITY_LIMIT] == []
+
+
+def test_retired_words_are_found():
+    source = (
+        "class Told:\n  def gripped(self, rest_flank): self.holder = closing = 1\n  grips = FormerAttribute('set_valued')"
+    )
+    assert retired(defined(ast.parse(source))) == ["Told", "holder", "rest_flank"]
+    assert set(RETIRED_NAMES).isdisjoint(RETIRED_WORDS)
+
+
+def test_retired_words_are_gone():
+    modules = {part.removesuffix(".py") for path in trees() for part in Path(path).parts}
+    assert retired(modules) == []
+    assert {path: names for path, tree in trees().items() if (names := retired(defined(tree)))} == {}
+
+
+def test_texts_have_no_retired_words():
+    found = {path: (ROOT.parent / path).read_text(encoding="utf-8") for path in PAGES}
+    strings = [(path, node) for path, node in nodes(ast.Constant) if isinstance(node.value, str)]
+    found |= {f"{path}:{node.lineno}": node.value for path, node in strings if node.value not in FORMER_TEXTS}
+    words = {place: set(re.findall(r"\w+", text.lower())) & RETIRED_WORDS.keys() for place, text in found.items()}
+    assert {place: said for place, those in words.items() if (said := those - PLAIN_ENGLISH)} == {}
 
 
 def page(thing) -> NumpyDocString:

@@ -1,23 +1,5 @@
 """Analysis of systems and motions: reactions, forces of constraints and drives, inverse dynamics, energy, mobility."""
 
-from gauss.analysis.contact_forces import contact_forces, friction_forces
-from gauss.analysis.inverse_dynamics import InverseDynamics, inverse_dynamics
-from gauss.analysis.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions, unique_reactions
-from gauss.simulation.energy import Energy, energy
-from gauss.simulation.energy_balance import warn_of_balance
+from gauss.lazy import attach
 
-__all__ = [
-    "Energy",
-    "InverseDynamics",
-    "Reaction",
-    "constraint_forces",
-    "contact_forces",
-    "drive_forces",
-    "energy",
-    "friction_forces",
-    "grip_forces",
-    "inverse_dynamics",
-    "reactions",
-    "warn_of_balance",
-    "unique_reactions",
-]
+__all__, __getattr__, __dir__ = attach(__name__, __file__)

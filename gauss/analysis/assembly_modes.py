@@ -1,16 +1,18 @@
 """Assembly modes: all solutions q of the constraints g(q) = 0 with given values of some coordinates, from random starts."""
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
+from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.consistent_states import NEWTON_STEPS, RESIDUAL_TOLERANCE
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.projection import (
     fixed_columns,
-    holding,
+    held_factor,
     position_residual_of,
     project_positions,
     relative,
@@ -77,7 +79,7 @@ def assembly_modes(system: System, keep, state: State | None = None, seed: int =
 
 def _refuse_freedoms(system: System, pose: State, held):
     motion = kinematics(system, pose)
-    factor = holding(system, assemble_motion(motion, Applied(motion, ())), held)
+    factor = cast(Factor, held_factor(system, assemble_motion(motion, Applied(motion, ())), held))  # no body is massless
     in_tree = sum(columns.stop - columns.start for columns in factor.tree.columns)
     remaining = in_tree - (factor.closure.rank if factor.closure.size else 0)
     if remaining:

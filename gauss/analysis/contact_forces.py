@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from gauss.analysis.reaction_accuracy import refuse_doubtful
+from gauss.analysis.sample_solution import refuse_doubtful
 from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
@@ -60,8 +60,8 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
         return np.array([normal[mine] for normal, _ in _parts(trajectory)]).reshape(-1, len(mine))
     found, ambiguous = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
     for sample, motion in zip(found, trajectory.motions, strict=True):
-        instant, holder = gaps(motion), mode_selector(motion.system)
-        held = holder.choose(motion.state, holder.touching(motion.state), backend)
+        instant, selector = gaps(motion), mode_selector(motion.system)
+        held = selector.choose(motion.state, selector.touching(motion.state), backend)
         which = np.array(held.gaps, dtype=int)
         if not np.isin(which, mine).any():
             continue

@@ -16,6 +16,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import SimulationError, judged_later, require
 from gauss.shapes import Shaped
@@ -82,7 +83,7 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
         return derivatives(held.system, state, load)
     laws = Laws(system)
     DERIVATIVES.plan(Question(system, laws))
-    solve, slope = system.dynamics.on_demand((_kernels, laws.key), lambda: _kernels(system, laws.traced))
+    solve, slope = cached_on_disk(system, (_kernels, laws.key), lambda: _kernels(system, laws.traced))
     given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
     directions = np.eye(3 * system.n_v)
     with judged_later():

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gauss.analysis.load_sharing import shared
-from gauss.analysis.reaction_accuracy import refuse_doubtful
+from gauss.analysis.sample_solution import refuse_doubtful, solution_at
 from gauss.backends import Backend
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.loads import Applied
@@ -17,7 +17,6 @@ from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import step_at
-from gauss.simulation.sample_solution import solution_at
 from gauss.system import System
 
 
@@ -156,24 +155,26 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | ty
     places = system.joint(joint).v
     given = [bound for bound in system.loads if isinstance(bound.load, Drive) and bound.load.joint == joint]
     motions = _rates_of(system, joint, system.scene.relations, Prescribed)
-    limited = _rates_of(system, joint, system.scene.grips, LimitedDrive)
+    limited = _rates_of(system, joint, system.scene.set_valued, LimitedDrive)
     if not given and not motions and not limited:
         raise StateError(f"nothing drives joint {joint!r}; add a drive with scene.drive({joint!r}, …).")
     efforts = np.array([Applied(motion, given).P[places] for motion in trajectory.motions])
     for name, rate in motions.items():
         efforts[:, rate] += constraint_forces(trajectory, name, backend)[:, 0]
     for name, rate in limited.items():
-        efforts[:, rate] += grip_forces(trajectory, name, backend)
+        efforts[:, rate] += set_valued_forces(trajectory, name, backend)
     return efforts[:, 0] if efforts.shape[1] == 1 else efforts
 
 
-def _rates_of(system: System, joint: str, elements: Mapping[str, Any], kind: type) -> dict[str, int]:
+def _rates_of(
+    system: System, joint: str, elements: Mapping[str, Any], kind: type[Prescribed | LimitedDrive]
+) -> dict[str, int]:
     """Elements of a kind that act on a joint, by name, with the index of their rate among those of the joint."""
     acting = {name: system.coordinate(element.joint) for name, element in elements.items() if isinstance(element, kind)}
     return {name: rate or 0 for name, (placed, rate) in acting.items() if placed.name == joint}
 
 
-def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k"]:
+def set_valued_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k"]:
     """Torque [N m] or force [N] of a joint friction, limited drive, clutch, freewheel or lossy gear, at every sample.
 
     It acts along the coordinate of its joint; for links between two joints, of the driven one.
@@ -200,15 +201,15 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type
         If a sample has no solution with a certificate that covers these forces.
     """
     scene = trajectory.system.scene
-    elements = scene.grips | scene.losses
+    elements = scene.set_valued | scene.losses
     if name not in elements:
         raise StateError(f"nothing of the name {name!r} holds up to a limit or loses power. {did_you_mean(name, elements)}")
     if trajectory.step is not None:
-        which = list(scene.grips).index(name) - len(scene.grips)
+        which = list(scene.set_valued).index(name) - len(scene.set_valued)
         return np.array([step_at(trajectory, i).force[which] for i in range(len(trajectory))])
-    holder = mode_selector(trajectory.system)
+    selector = mode_selector(trajectory.system)
     states = (trajectory.state(i) for i in range(len(trajectory)))
-    return np.array([holder.choose(state, holder.touching(state), backend).forces[name] for state in states])
+    return np.array([selector.choose(state, selector.touching(state), backend).forces[name] for state in states])
 
 
 def unique_reactions(

@@ -126,7 +126,7 @@ def _separation(system: System, state: State, factor: Factor) -> float | None:
     closure = factor.closure
     if not closure.size or not closure.rank:
         return None
-    if not (system.slips.placed or system.grips.placed or system.losses) and mobility(system, state).is_singular:
+    if not (system.slips.placed or system.set_valued.placed or system.losses) and mobility(system, state).is_singular:
         return 0.0
     unbound = closure.unbound(factor.compulsion)
     sigma = np.linalg.svd(closure.W @ closure.rest / np.where(unbound > 0, unbound, 1.0), compute_uv=False)
@@ -141,7 +141,7 @@ def _spread(values: np.ndarray) -> float:
 def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
     """Eigenvalues of δz̈ = K δz + D δż along the motions z that the constraints allow, by finite differences."""
     prescribed = any(isinstance(relation, Prescribed) for relation in system.scene.relations.values())
-    if prescribed or system.scene.changing:
+    if prescribed or system.scene.nonsmooth:
         return None
     basis, scale = allowed(factor).rates, system.scale
     back = np.linalg.pinv(basis)
@@ -165,7 +165,7 @@ def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
 def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
     if system.slips.placed:
         return TIME_STEPPING.name, "contacts have friction; give a step="
-    if system.scene.changing:
+    if system.scene.nonsmooth:
         return "dop853", "it locates the events of unilateral constraints, limited forces, losses and backlash"
     if rates is None:
         return "dop853", "order 8, step chosen by tolerances (the scene cannot rest in its start, to look for stiffness)"
@@ -178,7 +178,7 @@ def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
 
 def _timed(system: System, state: State) -> float | None:
     """Shortest time [s] of the evaluations within :data:`TIMING`."""
-    if system.slips.placed or system.grips.placed or system.losses:
+    if system.slips.placed or system.set_valued.placed or system.losses:
         return None
     system.accelerations(state)  # compiled on first use
     best, until = np.inf, time.perf_counter() + TIMING

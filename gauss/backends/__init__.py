@@ -9,10 +9,6 @@
 * the path: ``solve`` → ``registry`` (backend) → ``answering`` (its answer) → ``certificate`` (the solution).
 """
 
-from gauss.backends.backend import BACKENDS, Backend
-from gauss.backends.certificate import certify
-from gauss.backends.registry import available, choose, make, ready
-from gauss.backends.solution import Answer
-from gauss.backends.solve import solve
+from gauss.lazy import attach
 
-__all__ = ["BACKENDS", "Answer", "Backend", "available", "certify", "choose", "make", "ready", "solve"]
+__all__, __getattr__, __dir__ = attach(__name__, __file__)

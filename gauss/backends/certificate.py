@@ -123,7 +123,7 @@ def _dual(factor: KKTFactor, own: tuple[np.ndarray, np.ndarray], returned: Answe
     return DualCertificate(factor.compulsion, returned.multipliers, mu, own, factor.active, tuple(p[2:] for p in parts))
 
 
-def judge(answer: Answer, certificate: Certificate, tolerance: float, row_tolerance: float) -> SolveStatus:
+def status_of(answer: Answer, certificate: Certificate, tolerance: float, row_tolerance: float) -> SolveStatus:
     """Status by the certificate, whatever the backend claims."""
     if np.isnan(certificate.error):
         claims = "the backend claims success, but its numbers are not finite"
@@ -144,7 +144,7 @@ def judge(answer: Answer, certificate: Certificate, tolerance: float, row_tolera
 
 def conclude(compulsion: Compulsion, answer: Answer, certificate: Certificate, backend: str, tolerance: float) -> Solution:
     """Solution of an answer and its certificate: its accelerations, and its multipliers less their error."""
-    status = judge(answer, certificate, tolerance, max(tolerance, CONTRADICTION * np.sqrt(compulsion.violation)))
+    status = status_of(answer, certificate, tolerance, max(tolerance, CONTRADICTION * np.sqrt(compulsion.violation)))
     fields = (answer.a, answer.qdd, certificate.dual.multipliers, certificate.dual.inequality_multipliers)
     return Solution(*fields, status, certificate, backend, answer.iterations, compulsion)
 

@@ -9,6 +9,7 @@ from gauss.bench.markdown import head, number, share, table
 from gauss.bench.measure import OURS, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
+from gauss.bench.structured import COULOMB
 from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_right, mean_time
 from gauss.bench.verdicts import is_false, stated, truth
 
@@ -22,7 +23,8 @@ that gives none is off by 1. Errors are medians over all problems.
 
 Times are calls from Python on a ready problem, set-up included: shifted geometric means over all problems, a problem
 that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least, for the machine may be
-shared. Bounds are given as rows. How solvers are set is said in [the comparison](qp.md)."""
+shared. Library: the share of a call that the library reports as its own set-up and solve. Bounds are given as rows. How
+solvers are set is said in [the comparison](qp.md)."""
 
 WARM = """Warm starts begin at the solution of the step before, where qpsolvers hands it on, which is x alone; set-up is made
 anew, so that what they spare is iterations. Medians over the steps that have one."""
@@ -30,6 +32,19 @@ anew, so that what they spare is iterations. Medians over the steps that have on
 OWN_TIMES = """Times of gauss's own methods include making their matrices in Python, and that of auto the certificate;
 a method that was not asked all problems, as those for equality rows alone, has no line."""
 NONE_OF_OURS = "Methods of gauss itself take the problem of an instant of a mechanism, not any programme: none is here."
+BY_CLASS = {
+    "cones": """Asked are the solvers here that take second-order cones. Residuals count what is outside of a cone, of the
+answer and of its multipliers. ECOS has a linear objective, so that it gets the epigraph of the quadratic one, which is made
+before the clock runs.""",
+    "coulomb": """The answer is judged by the law itself: the primal residual is friction beyond its limit, the dual one an
+approaching velocity, the gap the sum of |u_n r_n| and of what sliding friction falls short of the most that it can
+dissipate; multipliers are the velocities. newton is gauss's own solver of time stepping, in machine code, with a tolerance
+of its own; the others are short references in Python, whose times are those of Python. MuJoCo's solvers take models, not
+such problems, and soften contacts.""",
+    "mpc": """HPIPM gets stages, and bounds as such; those that are infinite are 1e6, for residuals round where they are
+larger. CasADi analyses the structure of the problem anew in every call, which its library does not count: that is
+HPIPM's solve alone. Fatrop's interface in CasADi fails on these problems.""",
+}
 
 
 def class_page(kind: str, rows, header: list[str], chart: str) -> str:
@@ -39,9 +54,13 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     solvable = any(truth(row) == SOLVABLE for row in rows)
     lines = head(f"QP solvers on problems of class {kind}", [*header, f"all packages: [{CLASS_LOCK}]({CLASS_LOCK})"])
     lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
+    lines += [BY_CLASS[kind], ""] if kind in BY_CLASS else []
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
     lines += _board(mine, solvable) + _sentences(mine, *fronts(rows)[1:])
-    lines += [OWN_TIMES if set(OURS) & set(mine) else NONE_OF_OURS, ""]
+    if set(OURS) & set(mine):
+        lines += [OWN_TIMES, ""]
+    elif kind != COULOMB:
+        lines += [NONE_OF_OURS, ""]
     return "\n".join(lines + _by_problem(problems, mine)) + "\n"
 
 
@@ -54,13 +73,14 @@ def _board(mine: dict[str, list[dict]], solvable: bool) -> list[str]:
     warm = any(np.isfinite(row.get("warm", np.nan)) for found in mine.values() for row in found)
     titles = ["", "solver", "right", "false verdicts", "claimed, beyond"]
     titles += ["kept", "error", "error of multipliers"] if solvable else ["no verdict"]
-    titles += ["crashed, timed out", "time"] + (["warm / cold start"] if warm else [])
+    titles += ["crashed, timed out", "time", "library"] + (["warm / cold start"] if warm else [])
     least = min(map(mean_time, mine.values()), default=np.nan)
     body = []
     for rank, (name, found) in enumerate(mine.items(), start=1):
         texts = [rank, name, f"{sum(map(is_right, found))}/{len(found)}", sum(map(is_false, found))]
         texts += [sum(map(is_broken, found)), *(_accuracy(found) if solvable else [sum(not stated(row) for row in found)])]
         texts += [sum(row["outcome"] in ("crashed", "timed out") for row in found), _factor(mean_time(found) / least)]
+        texts += [_in_library(found)]
         body.append(texts + ([_warm(found)] if warm else []))
     return ["## Leaderboard", "", *table(titles, body), *(["", WARM] if warm else []), ""]
 
@@ -70,6 +90,13 @@ def _accuracy(found: list[dict]) -> list[str]:
     kept = share(sum(map(is_kept, found)) / len(found)) if found[0]["level"] != OWN else ""
     errors = [dual_error(row) if in_time(row) else np.nan for row in found]
     return [kept, number(middle(list(map(error_of, found)))), number(middle(errors))]
+
+
+def _in_library(found: list[dict]) -> str:
+    """Median share of the times of right answers that the library itself reports: of set-up and solve, or of solve alone."""
+    times = [(row["seconds"], row["library"], row.get("solve", np.nan)) for row in found if is_right(row)]
+    shares = [(whole if np.isfinite(whole) else solve) / call for call, whole, solve in times]
+    return f"{np.median(shares):.0%}" if np.isfinite(shares).any() else "–"
 
 
 def _factor(value: float) -> str:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.bench.choice import chosen
 from gauss.bench.instances import GROUPS, Instance, group_of, of_selection
+from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.qp import NAME, compare
 from gauss.bench.suite import CLASSES, recipes
@@ -31,7 +31,7 @@ def compare_class(
     folder : Path
         Where the table is, or shall be.
     kind : str
-        The class: "equality", "inequality" or "inconsistent" of the selection, or a class of the suite without cones.
+        The class: "equality", "inequality" or "inconsistent" of the selection, or a class of the suite.
     problems : sequence of str, optional
         Only these of its problems.
     quick : bool

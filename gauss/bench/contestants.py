@@ -12,8 +12,9 @@ import qpsolvers
 
 from gauss.backends import qpsolvers_
 from gauss.backends.programme import Outcome, Programme, Programmed
-from gauss.bench import casadi_, clocks
+from gauss.bench import casadi_, clocks, conic, coulomb
 from gauss.bench.levels import settings
+from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, ProgrammeStructure, StructuredProgramme
 from gauss.errors import BackendError
 
 WARM = ("cvxopt", "osqp", "proxqp", "qpalm", "scs")  # to which qpsolvers hands a first x; it ignores that for all others
@@ -43,9 +44,17 @@ class Ready:
     around: AbstractContextManager = nullcontext()
 
 
-def contestants() -> list[str]:
-    """Names of the QP solvers that can be compared here."""
-    return [*qpsolvers_.installed(), *(casadi_.SOLVERS if find_spec("casadi") else ())]
+def contestants(kind: str = ROWS) -> list[str]:
+    """Names of the solvers that can be compared here on programmes with a structure of one kind; of rows alone at first."""
+    if kind in (CONES, COULOMB):
+        return {CONES: conic, COULOMB: coulomb}[kind].installed()
+    through_casadi = [*casadi_.SOLVERS, *(casadi_.STAGEWISE if kind == STAGES else ())]
+    return [*qpsolvers_.installed(), *(through_casadi if find_spec("casadi") else ())]
+
+
+def everyone() -> list[str]:
+    """Names of all solvers that can be compared here on some programme."""
+    return list(dict.fromkeys(name for kind in (ROWS, CONES, COULOMB, STAGES) for name in contestants(kind)))
 
 
 def ready(solver: str, programme: Programme, level: str) -> Ready:
@@ -59,7 +68,9 @@ def ready(solver: str, programme: Programme, level: str) -> Ready:
     if ":" in solver:
         return _own(solver, programme)
     chosen = settings(solver, level)
-    if solver in casadi_.SOLVERS:
+    if isinstance(programme, StructuredProgramme) and (kind := programme.structure.kind) in (CONES, COULOMB):
+        return Ready(*{CONES: conic, COULOMB: coulomb}[kind].ready(solver, programme, chosen))
+    if solver in (*casadi_.SOLVERS, *casadi_.STAGEWISE):
         return Ready(*casadi_.ready(solver, programme, chosen))
     problem = qpsolvers_.converted(programme, solver)
     return Ready(
@@ -77,6 +88,11 @@ def started(solver: str, programme: Programme, level: str, start: np.ndarray) ->
     problem, chosen = qpsolvers_.converted(programme, solver), settings(solver, level)
     cold = ready(solver, programme, level)
     return replace(cold, call=lambda: qpsolvers.solve_problem(problem, solver, initvals=start, **chosen))
+
+
+def suits(solver: str, structure: ProgrammeStructure) -> bool:
+    """Whether a solver takes programmes with such a structure; one's own get all."""
+    return ":" in solver or solver in contestants(structure.kind)
 
 
 def takes(solver: str, programme: Programme) -> bool:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +12,8 @@ from gauss.backends.programme import FORMS, Programme
 from gauss.bench.known import KnownSolution, known
 from gauss.bench.problems import INCONSISTENT, SOLVABLE, MechanismProblem, make_problem
 from gauss.bench.reference import ReferenceSolution, reference
-from gauss.errors import BackendError, FileError
+from gauss.bench.structured import ROWS, ProgrammeStructure, StructuredProgramme
+from gauss.errors import BackendError
 
 EQUALITY, INEQUALITY = "equality", "inequality"
 GROUPS = (EQUALITY, INEQUALITY, INCONSISTENT)  # classes of the selection
@@ -51,6 +51,8 @@ class Instance:
         Its solution, if it is known.
     start : ndarray, shape (n,), optional
         Where a warm start begins: the solution of the problem before it in a sequence.
+    structure : ProgrammeStructure
+        Cones, friction or stages of the programme; none when not given.
     """
 
     name: str
@@ -62,13 +64,17 @@ class Instance:
     matrices: Matrices | None = None
     known: KnownSolution | None = None
     start: np.ndarray | None = None
+    structure: ProgrammeStructure = ProgrammeStructure()
 
     def programme(self, form: str) -> Programme:
         """Programme in a form, without entries that are zero."""
         if self.matrices is None:
+            assert self.compulsion is not None  # an instance has one of both
             return FORMS[form](self.compulsion).without_zeros()
-        m = self.matrices
-        return Programme(FILE, m.P, m.q, m.A, m.b, m.G, m.h, _unread).without_zeros()
+        parts = (FILE, *self.matrices, _unread)
+        if self.structure.kind == ROWS:
+            return Programme(*parts).without_zeros()
+        return StructuredProgramme(*parts, structure=self.structure).without_zeros()
 
     def forms(self, asked: Iterable[str]) -> tuple[str, ...]:
         """Forms in which a solver gets it: those that are asked for, or that of its file."""
@@ -76,7 +82,7 @@ class Instance:
 
     def error(self, answer, x) -> float:
         """Largest relative error of an answer, or of an x where there is no compulsion; nan where nothing is known."""
-        if self.expected is not None:
+        if self.expected is not None and self.compulsion is not None:
             return self.expected.error(self.compulsion, answer)
         return np.nan if self.known is None else self.known.error(x)
 
@@ -98,77 +104,6 @@ def of_arrays(name: str, group: str, P, q, A, b, G, h, x=None, **fields) -> Inst
     G, h = (sparse.csc_matrix((0, n)), np.zeros(0)) if G is None else (sparse.csc_matrix(G), np.asarray(h, dtype=float))
     matrices = Matrices(sparse.csc_matrix(P), np.asarray(q, dtype=float), A, b, G, h)
     return Instance(name, group, matrices=matrices, known=None if x is None else known(matrices, x), **fields)
-
-
-def of_folder(folder: Path) -> Iterator[Instance]:
-    """Instances of the files of problems in a folder; their class is its name.
-
-    Files end in .npz, as ``qpsolvers.Problem.save`` writes them, or in .mat with P, q, A, l, u of l ≤ A x ≤ u, as the
-    Maros–Mészáros problems are distributed for OSQP.
-
-    Raises
-    ------
-    FileError
-        If there is none, or one cannot be read.
-    """
-    paths = sorted(path for path in Path(folder).glob("*") if path.suffix in READERS)
-    if not paths:
-        raise FileError(f"{folder}: no {' or '.join(READERS)} files of problems.")
-    for path in paths:
-        try:
-            parts = READERS[path.suffix](path)
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise FileError(f"{path}: {error}") from None
-        yield of_arrays(path.stem, Path(folder).name or "folder", *parts)
-
-
-def _read_npz(path: Path):
-    """P, q, A, b, G, h of a file of qpsolvers."""
-    import qpsolvers
-
-    P, q, G, h, A, b, lb, ub = qpsolvers.Problem.load(str(path)).unpack()
-    rows = [] if G is None else [(sparse.csr_matrix(G), h)]
-    nothing = np.full(q.size, np.inf)
-    lb, ub = (-nothing if lb is None else lb), (nothing if ub is None else ub)
-    rows += _one_sided(sparse.eye_array(q.size, format="csr"), np.asarray(lb), np.asarray(ub))
-    return P, q, A, b, *_stacked(rows)
-
-
-def _read_mat(path: Path):
-    """P, q, A, b, G, h of a file of Matlab with l ≤ A x ≤ u."""
-    from scipy import io
-
-    data = io.loadmat(path)
-    missing = [name for name in ("P", "q", "A", "l", "u") if name not in data]
-    if missing:
-        raise ValueError(f"no {', '.join(missing)}; expected P, q, A, l, u of ½ xᵀPx + qᵀx → min subject to l ≤ Ax ≤ u.")
-    if np.size(data.get("cones", ())):
-        raise ValueError("it has cones; expected a quadratic programme.")
-    rows = sparse.csr_matrix(data["A"], dtype=float)  # Matlab's files hold whole numbers as integers, unsigned ones, too
-    q, lower, upper = (np.ravel(data[name]).astype(float) for name in ("q", "l", "u"))
-    if rows.shape != (lower.size, q.size) or upper.size != lower.size or data["P"].shape != (q.size, q.size):
-        raise ValueError("P, q, A, l, u have shapes that do not belong together.")
-    held = lower == upper
-    sides = _one_sided(rows[~held], lower[~held], upper[~held])
-    return sparse.csc_matrix(data["P"], dtype=float), q, rows[held], upper[held], *_stacked(sides)
-
-
-READERS = {".npz": _read_npz, ".mat": _read_mat}
-UNBOUNDED = 1e20  # bounds of this size are none: the convention of the files of Matlab, and of SIF before them
-
-
-def _one_sided(rows, lower: np.ndarray, upper: np.ndarray) -> list:
-    """Rows of G x ≤ h and their h, for lower ≤ rows x ≤ upper."""
-    above, below = upper < UNBOUNDED, lower > -UNBOUNDED
-    return [(rows[above], upper[above]), (-rows[below], -lower[below])]
-
-
-def _stacked(rows: list):
-    """G and h; None where there is no row."""
-    rows = [(matrix, right) for matrix, right in rows if np.size(right)]
-    if not rows:
-        return None, None
-    return sparse.vstack([matrix for matrix, _ in rows]), np.concatenate([right for _, right in rows])
 
 
 def of_scene(scene, name: str, duration: float = 1.0, count: int = 5) -> Iterator[Instance]:

@@ -17,6 +17,7 @@ FIRST_ORDER, ACTIVE_SET, INTERIOR_POINT = 100_000, 10_000, 1_000
 TIME_LIMITS = {
     "clarabel": "time_limit",
     "daqp": "time_limit",
+    "gurobi": "TimeLimit",
     "highs": "time_limit",
     "osqp": "time_limit",
     "qpalm": "time_limit",
@@ -32,14 +33,17 @@ ITERATION_LIMITS = {
     "piqp": ("max_iter", INTERIOR_POINT),
     "proxqp": ("max_iter", ACTIVE_SET),
     "qpalm": ("max_iter", ACTIVE_SET),
+    "hpipm": ("iter_max", INTERIOR_POINT),
+    "jaxopt_osqp": ("maxiter", FIRST_ORDER),
+    "kvxopt": ("maxiters", INTERIOR_POINT),
     "qpax": ("max_iter", INTERIOR_POINT),
     "qpoases": ("nWSR", ACTIVE_SET),
     "qrqp": ("max_iter", ACTIVE_SET),
     "scs": ("max_iters", FIRST_ORDER),
 }
-# Beyond what qpbenchmark sets. CVXOPT and ECOS look at the duality gap by tolerances of their own, which must follow like
-# those of the others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
-GAPS = {"cvxopt": ("abstol", "reltol"), "ecos": ("abstol", "reltol")}
+# Beyond what qpbenchmark sets. CVXOPT, KVXOPT and ECOS look at the duality gap by tolerances of their own, which follow
+# like those of others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
+GAPS = dict.fromkeys(("cvxopt", "ecos", "kvxopt"), ("abstol", "reltol"))
 CLOCKS = {"piqp": {"compute_timings": True}, "proxqp": {"compute_timings": True}}
 BEYOND = {
     "clarabel": ("time_limit",),
@@ -47,12 +51,20 @@ BEYOND = {
     **GAPS,
     **{solver: tuple(clock) for solver, clock in CLOCKS.items()},
 }
-CASADI = {"qrqp": ("constr_viol_tol", "dual_inf_tol")}  # no duality gap; qpOASES has no tolerance of residuals at all
+# Neither looks at the duality gap; qpOASES has no tolerance of residuals at all. Those of HPIPM are of stationarity, of the
+# dynamics, of bounds and of complementarity.
+CASADI = {
+    "hpipm": ("res_g_max", "res_b_max", "res_d_max", "res_m_max"),
+    "qrqp": ("constr_viol_tol", "dual_inf_tol"),
+}
+ITERATIVE = ("gauss_seidel", "admm", "staggered")  # solvers of Coulomb's law with a tolerance, see gauss.bench.coulomb
 
 
 def settings(solver: str, level: str) -> dict:
     """Every setting of a QP solver at a level that is not its default."""
     tolerance = LEVELS[level]
+    if solver in ITERATIVE:
+        return {"tolerance": tolerance, "iterations": FIRST_ORDER, "seconds": LIMIT}
     chosen = tolerances(solver, tolerance, 0.0) | dict.fromkeys(CASADI.get(solver, ()), tolerance)
     if solver == "ecos":
         chosen["reltol"] = tolerance

@@ -1,8 +1,9 @@
-"""The header that every result carries: when, on what machine, with which versions."""
+"""The header that every result carries: when, on what machine, with which versions; all versions as pip reads them."""
 
 import os
 import platform
 from datetime import date
+from pathlib import Path
 
 import numpy as np
 
@@ -38,3 +39,13 @@ def _processor() -> str:
             return next(line.split(":", 1)[1].strip() for line in info if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or "unknown processor"
+
+
+def write_lock(path: Path) -> Path:
+    """Write name and version of every installed distribution, as pip reads them."""
+    from importlib.metadata import distributions  # takes long to import
+
+    found = {d.metadata["Name"].lower(): f"{d.metadata['Name']}=={d.version}" for d in distributions() if d.metadata["Name"]}
+    lines = [line for name, line in sorted(found.items()) if not name.startswith("gauss")]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path

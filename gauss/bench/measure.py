@@ -14,6 +14,7 @@ from gauss.bench.clocks import COMPILING, UNKNOWN, median_times, summary, timed
 from gauss.bench.contestants import ready, started, takes
 from gauss.bench.instances import Instance, of_arrays
 from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, ProgrammeStructure, StructuredProgramme
 from gauss.errors import BackendError
 
 AUTO = "auto"  # gauss's own choice, with its rescue
@@ -22,7 +23,7 @@ WRONG = 1e-3  # relative error above which an answer is wrong for any purpose
 TERM_ROUNDING_RELATIVE = (
     10.0 * np.finfo(float).eps
 )  # of the terms that a residual sums up: by so much it may be off for no fault of a solver
-FIGURES = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
+FIGURES: tuple[str, ...] = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
 FIGURES += ("warm", "error", "dual_error", "primal", "dual", "gap", "excess", "certificate")
 
 
@@ -39,7 +40,7 @@ def measure(instance: Instance, backend: str, form: str, level: str) -> dict:
         raise BackendError("no rows: nothing to ask for")
     if not takes(backend, programme):
         raise BackendError(f"takes dense matrices only; {programme.c.size} unknowns are too many for these")
-    _loaded(backend, level)
+    _loaded(backend, level, instance.structure.kind)
     outcome, times = _called(backend, programme, level)
     row = _nothing() | times | _judged(instance, programme, outcome, LEVELS[level])
     row["warm"] = _warm(instance, backend, programme, level)
@@ -88,10 +89,31 @@ def _returned(call):
         return error
 
 
+# Programmes of next to no size by the kind of their structure: rows, cones, Coulomb's law, stages.
+TINY = {
+    ROWS: of_arrays("", "", np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], np.eye(2)[:1], [1.0]),
+    STAGES: of_arrays(
+        "",
+        "",
+        np.eye(2),
+        np.ones(2),
+        [[-1.0, 1.0]],
+        [1.0],
+        np.eye(2),
+        [1.0] * 2,
+        structure=ProgrammeStructure(stages=(1, 1, 1)),
+    ),
+    CONES: of_arrays("", "", np.eye(3), np.ones(3), None, None, -np.eye(3), np.zeros(3), structure=ProgrammeStructure((3,))),
+    COULOMB: of_arrays(
+        "", "", np.eye(3), np.ones(3), None, None, -np.eye(3), np.zeros(3), structure=ProgrammeStructure((3,), (1.0,))
+    ),
+}
+
+
 @lru_cache
-def _loaded(backend: str, level: str):
+def _loaded(backend: str, level: str, kind: str):
     """Call a solver once for next to nothing, so that loading its library is no part of its first solve."""
-    tiny = of_arrays("", "", np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], np.eye(2)[:1], [1.0])
+    tiny = TINY[kind]
     prepared = ready(backend, tiny.programme(""), level)
     with prepared.around:
         _returned(prepared.call)
@@ -106,6 +128,8 @@ def _judged(instance: Instance, programme: Programme, outcome: Outcome, toleranc
         return row | {"outcome": "not finite"}
     y = np.zeros(programme.d.size) if outcome.y is None or not np.size(outcome.y) else outcome.y
     z = np.zeros(programme.k.size) if outcome.z is None or not np.size(outcome.z) else outcome.z
+    if isinstance(programme, StructuredProgramme):
+        y, z = programme.multipliers(outcome.x, y, z)
     residuals = programme.residuals(outcome.x, y, z)
     row |= dict(zip(("primal", "dual", "gap"), residuals, strict=True))
     row["excess"] = max(
@@ -132,6 +156,7 @@ def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:
 def _certified(instance: Instance, answer: Answer) -> dict:
     """Error of an answer, and what the certificate says of it."""
     compulsion = instance.compulsion
+    assert compulsion is not None  # certificates are of compulsions
     certificate = certify(compulsion, answer)
     status = conclude(compulsion, answer, certificate, "", TOLERANCE).status
     return {

@@ -1,11 +1,12 @@
-"""A measurement: the table that it fills, the versions that it depends on, and the page that the table gives."""
+"""A measurement: what is chosen, the table that it fills, the versions that it depends on, and the page of the table."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from gauss.bench.machine import header
 from gauss.bench.table import ResultTable, header_of, read_table
+from gauss.errors import BackendError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -36,3 +37,18 @@ class Measurement:
         page = folder / f"{self.name}.md"
         page.write_text(markdown(read_table(table), header_of(table)), encoding="utf-8")
         return page
+
+
+def chosen(names: Iterable[str] | None, existing: Iterable[str], what: str) -> tuple[str, ...]:
+    """Return the names, or all if none is given.
+
+    Raises
+    ------
+    BackendError
+        If one does not exist.
+    """
+    existing = tuple(existing)
+    for name in names or ():
+        if name not in existing:
+            raise BackendError(f"no {what} {name!r}. {did_you_mean(name, existing)}")
+    return tuple(names) if names else existing

@@ -16,11 +16,10 @@ from gauss.analysis import energy
 from gauss.backends import available, make
 from gauss.backends.backend import BACKENDS
 from gauss.bench.atlas.methods import Believing
-from gauss.bench.choice import chosen
 from gauss.bench.contestants import backend as contestant
 from gauss.bench.levels import LEVELS, OWN
 from gauss.bench.markdown import head, table
-from gauss.bench.measurement import Measurement
+from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Workers
 from gauss.dynamics import compile_scene
@@ -172,7 +171,8 @@ def _line(row) -> list[str]:
 
 def _summary(rows) -> list[str]:
     """Lines that say which backends serve a purpose in all scenes that are measured."""
-    limits, methods = [*(limit for limit, _ in PURPOSES), np.inf], {}
+    limits = [*(limit for limit, _ in PURPOSES), np.inf]
+    methods: dict[str, float] = {}
     for row in rows:
         limit = next((limit for limit in limits if row["reached"] >= DURATION and row["error"] <= limit), np.inf)
         name = f"{row['backend']} {row['level']}"

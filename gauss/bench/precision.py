@@ -3,6 +3,7 @@
 The error of a motion is how far the centres of mass are from where a reference has them at the end, the largest of all [m].
 """
 
+import textwrap
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,19 +14,18 @@ import numpy as np
 
 from gauss.analysis import energy
 from gauss.backends import available
-from gauss.bench.choice import chosen
 from gauss.bench.extrapolation import extrapolated
+from gauss.bench.measurement import chosen
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import position_residual
 from gauss.errors import GaussError, SimulationError, did_you_mean
-from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep
+from gauss.integrators import FixedStep
 from gauss.scene import Scene
-from gauss.simulation import Trajectory, simulate
+from gauss.simulation import INTEGRATORS, Trajectory, simulate
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.system import System
 
 USUAL = ("dop853", "taylor", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
-CHARTED = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 TOLERANCES = tuple(10.0**-k for k in range(3, 15))
 DIVISIONS = tuple(2**k for k in range(5, 21, 2))  # of the duration, into fixed steps
 LOST = 10.0  # m: a motion that is off by more has nothing to do with the reference
@@ -33,6 +33,7 @@ TWO = ("dopri5", "dop853")  # a reference, and what tells how good it is
 FINEST = 1e-14
 STEPS = 2**14  # of the finest run from which time stepping is extrapolated
 AUTO = "auto"  # gauss's own choice among the backends
+SENTENCE = 120  # letters of a reason, at most
 REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the least time counts
 
 
@@ -85,7 +86,7 @@ class ReferencePositions:
 
 def settings(method: str, duration: float) -> tuple[float, ...]:
     """Tolerances, or fixed steps [s], from coarse to fine."""
-    return tuple(duration / n for n in DIVISIONS) if isinstance(CHARTED[method], FixedStep) else TOLERANCES
+    return tuple(duration / n for n in DIVISIONS) if isinstance(INTEGRATORS[method], FixedStep) else TOLERANCES
 
 
 def centres(trajectory: Trajectory) -> np.ndarray:
@@ -97,7 +98,7 @@ def usual(system: System) -> tuple[str, ...]:
     """Integrators that are charted when none is chosen: those that take the contacts of a scene, and some that do not."""
     if _slides(system):
         return (TIME_STEPPING.name,)
-    return (*USUAL, TIME_STEPPING.name) if system.scene.changing else USUAL
+    return (*USUAL, TIME_STEPPING.name) if system.scene.nonsmooth else USUAL
 
 
 def reference(system: System, duration: float, steps: int | None = None) -> ReferencePositions:
@@ -135,10 +136,10 @@ def attempts(
     duration: float,
     against: ReferencePositions | None = None,
     methods: Sequence[str] | None = None,
-    patience: float = 2.0,
+    time_limit: float = 2.0,
     backends: Sequence[str] | None = None,
 ) -> Iterator[Attempt]:
-    """Motions by all methods with settings from coarse to fine, until a run takes longer than ``patience`` [s].
+    """Motions by all methods with settings from coarse to fine, until a run takes longer than ``time_limit`` [s].
 
     Parameters
     ----------
@@ -150,7 +151,7 @@ def attempts(
         The reference; :func:`reference` when not given.
     methods : sequence of str, optional
         Integrators; the :func:`usual` ones when not given, with backends the first of them.
-    patience : float
+    time_limit : float
         Longest run [s].
     backends : sequence of str, optional
         How accelerations are solved, each by itself; "auto" when not given.
@@ -169,16 +170,16 @@ def attempts(
     methods = methods or usual(system)[: 1 if backends else None]
     for method, backend in product(methods, backends or (None,)):
         for setting in settings(method, duration):
-            found = attempt(system, duration, method, setting, against, patience, backend)
+            found = attempt(system, duration, method, setting, against, time_limit, backend)
             yield found
-            if found.seconds > patience:
+            if found.seconds > time_limit:
                 break
 
 
 def _require_charted(methods: Iterable[str]):
     for method in methods:
-        if method not in CHARTED:
-            raise SimulationError(f"no integrator {method!r} to chart. {did_you_mean(method, CHARTED)}")
+        if method not in INTEGRATORS:
+            raise SimulationError(f"no integrator {method!r} to chart. {did_you_mean(method, INTEGRATORS)}")
 
 
 def attempt(
@@ -187,11 +188,11 @@ def attempt(
     method: str,
     setting: float,
     against: ReferencePositions,
-    patience: float,
+    time_limit: float,
     backend: str | None = None,
 ) -> Attempt:
     """One motion; its second run is timed, the first makes the machine code. A backend that is given is named."""
-    fixed = isinstance(CHARTED[method], FixedStep)
+    fixed = isinstance(INTEGRATORS[method], FixedStep)
     tolerances = {"step": setting} if fixed else {"rtol": setting, "atol": setting}
     run: dict[str, Any] = {"integrator": method, "backend": backend or AUTO, "times": [0.0, duration], "progress": False}
     run |= tolerances
@@ -204,7 +205,7 @@ def attempt(
             began = time.perf_counter()
             trajectory = simulate(system, duration, **run)
             best = min(best, time.perf_counter() - began)
-            if best > patience / 10:
+            if best > time_limit / 10:
                 break
     except SimulationError as error:
         return Attempt("gauss", name, setting, reason=_short(str(error).removeprefix(f"integrator {method!r} ")))
@@ -232,4 +233,4 @@ def front(found: Iterable[Attempt]) -> list[Attempt]:
 
 def _short(text: str) -> str:
     """First sentence of a message."""
-    return text.split("; ")[0].split(". ")[0][:90]
+    return textwrap.shorten(text.split("; ")[0].split(". ")[0], SENTENCE, placeholder=" …")

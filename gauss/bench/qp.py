@@ -8,14 +8,13 @@ from tqdm import tqdm
 
 from gauss.backends import BACKENDS
 from gauss.bench import compiled
-from gauss.bench.choice import chosen
 from gauss.bench.clocks import COMPILING
-from gauss.bench.contestants import contestants, imported
+from gauss.bench.contestants import everyone, imported, suits
 from gauss.bench.instances import GROUPS, Instance, of_selection
 from gauss.bench.levels import LEVELS, OWN
-from gauss.bench.lock import write_lock
-from gauss.bench.machine import header, libraries
+from gauss.bench.machine import header, libraries, write_lock
 from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure
+from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers
@@ -38,6 +37,11 @@ QUICK = (
 CELL_TIME, COMPILATION_TIME = 20.0, 100.0  # [s] that a cell may take, and what a solver compiles before it
 PACKAGES = ("numpy", "scipy", "qpsolvers", "casadi", *sorted(("clarabel", "cvxopt", "daqp", "ecos", "highspy", "osqp")))
 PACKAGES += ("piqp", "proxsuite", "qpalm", "qpax", "jax", "jaxlib", "quadprog", "scs")
+
+
+def quick_backends() -> list[str]:
+    """Backends of a quick comparison: those that do not compile for every problem."""
+    return [name for name in (AUTO, *BACKENDS, *everyone()) if name not in COMPILING]
 
 
 def compare(
@@ -87,7 +91,7 @@ def compare(
     solvers = tuple(solvers)
     for solver in solvers:
         imported(solver)
-    names = (*chosen(backends, (AUTO, *BACKENDS, *contestants()), "backend"), *solvers)
+    names = (*chosen(backends, (AUTO, *BACKENDS, *everyone()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
     levels = chosen(levels, LEVELS, "level")
     table = ResultTable(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
@@ -121,6 +125,8 @@ def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, 
     for backend in backends:
         ours = backend in OURS
         if ours and (instance.compulsion is None or (backend != AUTO and instance.compulsion.h.size)):
+            continue
+        if not ours and not suits(backend, instance.structure):
             continue
         asked = (OWN,) if ours else levels
         found += [(backend, form, level) for form in forms_of(backend, instance, forms) for level in asked]

@@ -6,6 +6,7 @@ an active-set method, and confirmed: multipliers that push, rows that are kept.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -113,16 +114,17 @@ def _refined(compulsion: Compulsion, active: np.ndarray) -> ReferenceSolution:
 
 def _widened(compulsion: Compulsion, exact) -> Compulsion:
     """The same compulsion in wide numbers."""
-    fields = {name: exact(getattr(compulsion, name)) for name in ("Phi", "impressed", "P", "D", "G", "h")}
-    blocks = {
+    fields: dict[str, Any] = {name: exact(getattr(compulsion, name)) for name in ("Phi", "impressed", "P", "D", "G", "h")}
+    fields |= {
         name: tuple(tuple(exact(block) for block in row) for row in getattr(compulsion, name))
         for name in ("A_blocks", "B_blocks")
     }
-    return replace(compulsion, **fields, **blocks)
+    return replace(compulsion, **fields)
 
 
 def _rounded(a, qdd, multipliers, mu) -> Answer:
-    return Answer(*(np.array(part, dtype=float) for part in (a, qdd, multipliers, mu)))
+    a, qdd, multipliers, mu = (np.array(part, dtype=float) for part in (a, qdd, multipliers, mu))
+    return Answer(a, qdd, multipliers, mu)
 
 
 def _confirm(compulsion: Compulsion, answer: Answer, active: np.ndarray):

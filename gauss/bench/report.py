@@ -120,8 +120,8 @@ def _totals(rows) -> list[str]:
     return lines
 
 
-TOTALS = ("backend", "level", "kept", "claimed, beyond", "right", "median error", "median error of multipliers")
-TOTALS += (f"claimed, error above {WRONG:g}", "no answer", "crashed, timed out", "mean time")
+TOTALS: tuple[str, ...] = ("backend", "level", "kept", "claimed, beyond", "right", "median error")
+TOTALS += ("median error of multipliers", f"claimed, error above {WRONG:g}", "no answer", "crashed, timed out", "mean time")
 
 
 def _total(line: dict) -> list:
@@ -252,7 +252,7 @@ def _against(rows) -> list[str]:
     ]
 
 
-AGAINST = ("problem", "gauss", "error", "fastest call", "its time", "its error", "times as fast")
+AGAINST: tuple[str, ...] = ("problem", "gauss", "error", "fastest call", "its time", "its error", "times as fast")
 AGAINST += ("fastest library", "its time", "times as fast")
 
 

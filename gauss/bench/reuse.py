@@ -49,7 +49,8 @@ def along(compulsions: list[Compulsion], accelerations: list, backend: str, leve
     method = {"osqp": OSQP, "clarabel": Clarabel, "piqp": PIQP}[backend]
     kept, modes = {KEPT_MODE: method(**chosen, **cold, **kept_only), WARM: method(**chosen)}, MODES[backend]
     programmes = [FORMS["F2s"](compulsion) for compulsion in compulsions]
-    figures, answers = {mode: [] for mode in modes}, {mode: [] for mode in modes}
+    figures: dict[str, list] = {mode: [] for mode in modes}
+    answers: dict[str, list] = {mode: [] for mode in modes}
     for whole in programmes:
         lean, prepared = whole.without_zeros(), ready(backend, whole, level)
         with prepared.around:
@@ -123,6 +124,7 @@ def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> R
 
 def along_motion(problem: MechanismProblem, steps: int = STEPS) -> list[Compulsion]:
     """Compulsions at equally spaced times of the motion that starts in the state of a problem."""
+    assert problem.system is not None  # programmes alone do not move
     times = STEP * np.arange(steps)
     motion = simulate(problem.system, times[-1], state=problem.state, times=times, progress=False)
     return [assemble(problem.system, motion.state(i), problem.load) for i in range(len(motion))]

@@ -1,20 +1,21 @@
-"""Classes of the suite as the comparison takes them: cone-free programmes, verdicts, and where warm starts begin."""
+"""Classes of the suite as the comparison takes them: programmes, verdicts, and where warm starts begin."""
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy import sparse
 
 from gauss.bench.instances import Instance, Matrices, of_arrays
 from gauss.bench.known import KnownSolution, known
 from gauss.bench.problems import SOLVABLE
+from gauss.bench.structured import ProgrammeStructure
 from gauss.bench.suite import CLASSES, SuiteInstance, made, recipes
 from gauss.bench.suite.instance import SOLVED
 from gauss.bench.suite.optimality import plain_multipliers
-from gauss.bench.suite.refine import holding
+from gauss.bench.suite.refine import held_rows
 
-CONIC = ("cones", "coulomb")  # classes that a solver of quadratic programmes does not take
-SUITE = tuple(kind for kind in CLASSES if kind not in (*CONIC, "equality"))  # equality rows alone are in the selection
+SUITE = tuple(kind for kind in CLASSES if kind != "equality")  # equality rows alone are in the selection
 
 
 def of_suite(kind: str, names: list[str]) -> Iterator[Instance]:
@@ -25,22 +26,30 @@ def of_suite(kind: str, names: list[str]) -> Iterator[Instance]:
         start = None
         if found.sequence and (place := order.index(name)):
             (before,) = made([kind], [order[place - 1]])
-            start = before.reference.x.rounded() if before.sequence == found.sequence else None
+            start = before.proof.x.rounded() if before.sequence == found.sequence else None
         yield of_suite_instance(found, start)
 
 
 def of_suite_instance(found: SuiteInstance, start: np.ndarray | None = None) -> Instance:
-    """Instance of the comparison; bounds become rows, which all solvers take alike."""
-    rows, right = found.plain_rows()
-    instance = of_arrays(found.name, found.kind, found.P, found.q, found.A, found.b, rows, right, note=found.story)
+    """Instance of the comparison; bounds become rows, which all solvers take alike, and rows of cones come last."""
+    plain, right = found.plain_rows()
+    rows = sparse.vstack([plain, sparse.csr_array(found.G)[found.orthant :]], format="csc")
+    right = np.concatenate([right, found.h[found.orthant :]])
+    structure = ProgrammeStructure(found.cones, tuple(found.friction), found.stages)
+    fields = {"note": found.story, "structure": structure}
+    instance = of_arrays(found.name, found.kind, found.P, found.q, found.A, found.b, rows, right, **fields)
     verdict = SOLVABLE if found.verdict == SOLVED else found.verdict
-    right_one = _known(found, instance.matrices) if verdict == SOLVABLE else None
+    is_known = verdict == SOLVABLE and found.reference is not None and found.reference.x.hi.size == found.n
+    right_one = None if is_known or instance.matrices is None else _known(found, instance.matrices)
     return replace(instance, known=right_one, verdict=verdict, start=start)
 
 
 def _known(found: SuiteInstance, matrices: Matrices) -> KnownSolution:
-    r = found.reference
+    r = found.proof
     x, y, z, z_box = (part.rounded() for part in (r.x, r.y, r.z, r.z_box))
-    multipliers = np.concatenate([y, plain_multipliers(found, z, z_box)])
-    held = np.concatenate([np.arange(y.size), y.size + holding(found, r.x)[0]])
+    plain = plain_multipliers(found, z, z_box)
+    multipliers = np.concatenate([y, plain, z[found.orthant :]])
+    touched = [np.arange(block.start, block.stop) for block in found.blocks if block.start in r.active]
+    cones = np.concatenate([np.zeros(0, dtype=int), *touched]) - found.orthant + plain.size
+    held = np.concatenate([np.arange(y.size), y.size + held_rows(found, r.x)[0], y.size + cones])
     return known(matrices, x, found.units, multipliers, held, r.unique)

@@ -7,6 +7,7 @@ part of either.
 """
 
 from collections.abc import Iterable
+from operator import itemgetter
 
 import numpy as np
 
@@ -177,7 +178,7 @@ def against_compiled(rows) -> list[dict]:
                 for r in rows
                 if r["problem"] == row["problem"] and r["level"] in LEVELS and r["error"] <= goal and np.isfinite(r[clock])
             ]
-            line[clock + " peer"] = min(peers, key=lambda r, clock=clock: r[clock]) if peers else None
+            line[clock + " peer"] = min(peers, key=itemgetter(clock)) if peers else None
         lines.append(line)
     return lines
 

@@ -1,5 +1,6 @@
 """Commands ``gauss bench``, ``gauss chart`` and ``gauss problems``: parse arguments, call three functions."""
 
+import os
 import sys
 from itertools import chain
 from pathlib import Path
@@ -9,6 +10,7 @@ import typer
 
 import gauss
 from gauss.cli.common import Root, SceneName, load
+from gauss.codegen.tiers import OPTIMISED, VARIABLE
 from gauss.errors import FileError
 
 bench = typer.Typer(help="Compare backends, and see where methods fail.", no_args_is_help=True, rich_markup_mode="markdown")
@@ -18,6 +20,12 @@ problems = typer.Typer(
 
 Folder = Annotated[Path, typer.Option(help="Folder of the tables, the report and the charts.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what the tables in the folder already have.")]
+
+
+@bench.callback()
+def _in_steady_state():
+    # the help of the group stays that of its Typer
+    os.environ.setdefault(VARIABLE, OPTIMISED)
 
 
 @bench.command()
@@ -49,10 +57,16 @@ def qp(
     ] = None,
     problems: Annotated[
         list[Path] | None,
-        typer.Option(help="The .npz (qpsolvers) and .mat files (P, q, A, l, u) in this folder instead; may be repeated."),
+        typer.Option(
+            help="The files in this folder instead: .npz, .mat (P, q, A, l, u), .mps, .hdf5 (FCLIB); may be repeated."
+        ),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Eight problems, or eight of each class, scaled, at one level: two minutes.")
+        bool,
+        typer.Option(
+            "--quick",
+            help="Eight problems, or eight of each class, scaled, at one level, none on JAX: two minutes.",
+        ),
     ] = False,
     motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
     fresh: Fresh = False,
@@ -75,12 +89,17 @@ def qp(
 
 def _selection(backend, form, level, solver, quick: bool) -> dict:
     """Backends, forms, levels and solvers of the user, with the usual ones where there are none."""
-    from gauss.bench.qp import FORMS
+    from gauss.bench.qp import FORMS, quick_backends
 
     if solver:
         _import_from_here()
     forms, levels = (["F2s"], ["high"]) if quick else (FORMS, None)
-    return {"backends": backend, "forms": form or forms, "levels": level or levels, "solvers": solver or []}
+    return {
+        "backends": backend or (quick_backends() if quick else None),
+        "forms": form or forms,
+        "levels": level or levels,
+        "solvers": solver or [],
+    }
 
 
 def _import_from_here():
@@ -103,7 +122,8 @@ def _compare_classes(output: Path, kinds: list[str], **how):
 
 def _instances(scenes: list[str] | None, folders: list[Path] | None):
     """Instances of scenes and folders; None where the selection is asked for."""
-    from gauss.bench.instances import of_folder, of_scene
+    from gauss.bench.folders import of_folder
+    from gauss.bench.instances import of_scene
 
     if not (scenes or folders):
         return None
@@ -192,7 +212,9 @@ def chart(
         list[str] | None,
         typer.Option(help="A curve with this backend for the first of the integrators, or each given; may be repeated."),
     ] = None,
-    patience: Annotated[float, typer.Option(help="Settings get finer until a run takes so long [s].")] = 0.5,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", "--patience", help="Settings get finer until a run takes so long [s].")
+    ] = 0.5,
     output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),
     root: Root = "fixed",
 ):
@@ -210,7 +232,7 @@ def chart(
     against = reference(system, duration)
     typer.echo(f"reference: {against.source}")
     done = []
-    for one in attempts(system, duration, against, integrator, patience, backend):
+    for one in attempts(system, duration, against, integrator, time_limit, backend):
         done.append(one)
         if not one.reason:
             typer.echo(f"  {one.method:20} {one.setting:8.2g}  error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms")

@@ -17,7 +17,7 @@ SceneName = Annotated[
     ),
 ]
 Root = Annotated[str, typer.Option(help="How the base of a robot stands: fixed or free.")]
-READS = {
+READS: dict[str, dict[str, object]] = {
     "limits": {"limits": "start"},
     "stops": {"limits": "stops"},
     "resistance": {"resistance": True},
@@ -100,12 +100,17 @@ def as_far_as_it_came(make):
         return make(), False
     except KeyboardInterrupt as error:
         found = getattr(error, "trajectory", None)
-        there = found is not None and len(found.t) > 0
-        kept = f"at t = {found.t[-1]:.6g} s; what was simulated until then is kept" if there else "before the first sample"
-        typer.secho(f"interrupted {kept}.", fg="yellow", err=True)
-        if not there:
+        if found is None or not len(found.t):
+            typer.secho("interrupted before the first sample.", fg="yellow", err=True)
             raise typer.Exit(INTERRUPTED) from None
+        kept = f"at t = {found.t[-1]:.6g} s; what was simulated until then is kept"
+        typer.secho(f"interrupted {kept}.", fg="yellow", err=True)
         return found, True
+
+
+def equally_spaced(duration: float, samples: int):
+    """Times of samples [s]."""
+    return import_module("numpy").linspace(0.0, duration, samples)
 
 
 def view():

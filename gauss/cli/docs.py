@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-import gauss
 from gauss.errors import FileError, extra
 
 MODULES = (
@@ -37,8 +36,9 @@ def docs(output: Annotated[Path, typer.Option(help="Folder for the pages.")] = P
     """Write the reference of all public names as web pages, from their docstrings; needs pdoc."""
     with extra("docs"):
         pdoc = import_module("pdoc")
-    for name in gauss.LATER:  # pdoc looks at what is there already
-        setattr(gauss, name, getattr(gauss, name))
+    for module in map(import_module, MODULES):
+        for name in getattr(module, "__all__", ()):  # pdoc looks at what is there already
+            setattr(module, name, getattr(module, name))
     pdoc.render.configure(docformat="numpy")
     try:
         pdoc.pdoc(*MODULES, output_directory=output)

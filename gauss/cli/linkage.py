@@ -7,7 +7,6 @@ import typer
 
 import gauss
 from gauss.cli.common import view
-from gauss.io import write_csv
 
 
 def linkage(
@@ -45,7 +44,7 @@ def linkage(
         wheel = mechanism.flywheel(fluctuation)
         typer.echo(f"  flywheel       {wheel.inertia:.6g} kg m² for δ = {fluctuation:g}; ΔE = {wheel.excess_energy:.6g} J")
     if csv is not None:
-        typer.echo(f"table written to {write_csv(table(cycle), csv)}")
+        typer.echo(f"table written to {gauss.io.write_csv(table(cycle), csv)}")
     for path, draw in ((plot, "plot_linkage"), (animation, "animate_linkage")):
         if path is not None:
             getattr(view(), draw)(cycle, path)

@@ -4,12 +4,10 @@ import warnings
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 import gauss
-from gauss.cli.common import INTERRUPTED, as_far_as_it_came, view
-from gauss.io import write_csv
+from gauss.cli.common import INTERRUPTED, as_far_as_it_came, equally_spaced, view
 
 
 def rotors(
@@ -41,13 +39,13 @@ def rotors(
     if network is not None:
         view().draw_network(given, network)
         typer.echo(f"drawing written to {network}")
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter("always", package.BeltSlipWarning)
-        times = np.linspace(0.0, duration, samples)
+        times = equally_spaced(duration, samples)
         motion, interrupted = as_far_as_it_came(
             lambda: package.simulate(given, duration, times=times, rtol=rtol, atol=atol, method=method)
         )
-    for warning in told:
+    for warning in issued:
         typer.secho(f"warning: {warning.message}", fg="yellow", err=True)
     typer.echo(package.report(motion))
     if steady and not interrupted:
@@ -58,6 +56,6 @@ def rotors(
         view().plot_rotors(motion, plot)
         typer.echo(f"figure written to {plot}")
     if csv is not None:
-        typer.echo(f"samples written to {write_csv(package.table(motion), csv)}")
+        typer.echo(f"samples written to {gauss.io.write_csv(package.table(motion), csv)}")
     if interrupted:
         raise typer.Exit(INTERRUPTED)

@@ -6,11 +6,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 import gauss
-from gauss.analysis import warn_of_balance
 from gauss.cli.common import (
     INTERRUPTED,
     Atol,
@@ -20,13 +18,13 @@ from gauss.cli.common import (
     SceneName,
     as_far_as_it_came,
     conclude,
+    equally_spaced,
     load,
     started,
     tolerances,
     view,
 )
 from gauss.errors import BalanceWarning, FileError, SimulationError, did_you_mean
-from gauss.io.load import writer
 from gauss.simulation import INTEGRATORS
 
 SMOOTH = 501  # samples of a motion that is drawn: steps may be long
@@ -67,11 +65,13 @@ def run(
         raise FileError(f"--figure: no figure {figure!r}. {did_you_mean(figure, FIGURES)}")
     found, allowed = load(scene, root, read), tolerances(atol)
     if output is not None:
-        writer(output, "trajectory" if isinstance(found, gauss.Scene) else "tracking")  # refused before time is spent
+        import_module("gauss.io.load").writer(
+            output, "trajectory" if isinstance(found, gauss.Scene) else "tracking"
+        )  # refused before time is spent
     if plot is not None:
         import_module("gauss.view.style").check_format(plot)
     samples = SMOOTH if samples is None and plot is not None else samples
-    times = None if samples is None else np.linspace(0.0, duration, samples)
+    times = None if samples is None else equally_spaced(duration, samples)
     if not isinstance(found, gauss.Scene):
         settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed, "times": times}
         _refuse_for_servos(scene, backend, stabilisation, verify, figure)
@@ -179,7 +179,7 @@ def _report(trajectory):
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
-    warn_of_balance(trajectory)
+    gauss.analysis.warn_of_balance(trajectory)
 
 
 def _write(motion, output: Path | None, plot: Path | None, drawn: str):

@@ -7,7 +7,6 @@ import typer
 
 import gauss
 from gauss.cli.common import Backend, Read, Root, SceneName, Seed, conclude, load
-from gauss.io import linkages, networks, servos
 
 
 def check(
@@ -37,8 +36,8 @@ def explain(scene: SceneName, root: Root = "fixed", read: Read = None):
 
 def models():
     """List the scenes, servos, linkages and rotor networks that come with gauss."""
-    found = gauss.catalog() | servos()
-    for command, of_command in (("linkage", linkages()), ("rotors", networks())):
+    found = gauss.catalog() | gauss.io.servos()
+    for command, of_command in (("linkage", gauss.io.linkages()), ("rotors", gauss.io.networks())):
         found |= {f"{command} {name}": text for name, text in of_command.items()}
     width = max(len(name) for name in found)
     for name, description in found.items():

@@ -9,7 +9,6 @@ import typer
 import gauss
 from gauss.cli.common import Root, load, started
 from gauss.errors import FileError
-from gauss.io.load import LABELLED
 
 Shown = Annotated[
     str,
@@ -40,7 +39,7 @@ def show(
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
     """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
-    if Path(scene).suffix.lower() in LABELLED:
+    if Path(scene).suffix.lower() in import_module("gauss.io.load").LABELLED:
         thing = gauss.load_motion(scene)
         made_from = thing.system.scene
         visuals = import_module("gauss.io.visuals").visuals_of(made_from) if made_from.source else ()  # imports Pinocchio

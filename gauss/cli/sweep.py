@@ -1,11 +1,11 @@
 """Command ``gauss sweep``."""
 
 import time
+from collections import Counter
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 import gauss
@@ -47,11 +47,12 @@ def sweep(
         raise FileError(f"{scene}: servos are not simulated in sweeps; sweep the scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol)}
-    values = import_module("gauss.simulation.sweeps").ranges(vary)  # it takes long to import
+    sweeps = import_module("gauss.simulation.sweeps")  # it takes long to import
+    values = sweeps.ranges(vary)
     chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
     interrupted = False
     try:
-        dataset = gauss.sweep(found, values, duration, **settings, **chosen)
+        dataset = sweeps.sweep(found, values, duration, **settings, **chosen)
     except KeyboardInterrupt as error:
         dataset, interrupted = getattr(error, "dataset", None), True
         goes_on = f"; the same command goes on from {output}" if output is not None else ""
@@ -81,8 +82,8 @@ def _report(dataset, took: float):
     done = int((status == 1).sum())
     typer.echo(f"{dataset.attrs['title']}: {status.size} members over {dataset.attrs['varied']}")
     typer.echo(f"  {'done':12} {done} of {status.size}, in {took:.3g} s")
-    reasons, counts = np.unique(dataset.reason.values.ravel()[status == 2], return_counts=True)
-    for reason, count in list(zip(reasons, counts, strict=True))[:SHOWN]:
+    reasons = Counter(map(str, dataset.reason.values.ravel()[status == 2]))
+    for reason, count in sorted(reasons.items())[:SHOWN]:
         typer.echo(f"  {'failed':12} {count}: {reason}")
     if len(reasons) > SHOWN:
         typer.echo(f"  {'failed':12} … and {len(reasons) - SHOWN} other reasons")

@@ -88,6 +88,11 @@ def method_definition(name: str, address: int, doc: str) -> tuple[bytes, bytes, 
     return struct.pack("@PPiP", _address(texts[0]), address, FASTCALL | KEYWORDS, _address(texts[1])), *texts
 
 
+def redefine(definition: bytes, address: int):
+    """Let a definition name another function: CPython reads its address at each call."""
+    ctypes.c_void_p.from_address(_address(definition) + struct.calcsize("@P")).value = address
+
+
 def new_builtin(owner):
     """Built-in function by the definition of its owner, to which it holds a reference."""
     new = ctypes.pythonapi.PyCFunction_NewEx

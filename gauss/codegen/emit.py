@@ -2,63 +2,52 @@
 
 A function becomes, for each vector width, ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
 structures of arrays; it calls other functions with its own width. A long function is outlined into pieces
-(:mod:`gauss.codegen.outlined_pieces`); a function that is still too long to compile is interpreted from an operation table
-(:mod:`gauss.codegen.tape`).
+(:mod:`gauss.codegen.outlined_pieces`), so that the time to compile it is proportional to its length.
 """
 
 from llvmlite import ir
 
 from gauss.codegen.function import Function
-from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strip_mined_loop
+from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides, strip_mined_loop
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.native_function import NativeFunction
-from gauss.codegen.operation_table import OperationTable, tabulate
 from gauss.codegen.outlined_pieces import LONGEST_UNCUT, write_pieces
 from gauss.codegen.schedule import Schedule, schedule
-from gauss.codegen.straight_line import calling, straight_line
-from gauss.codegen.tape import run_table
-
-MOST_OPTIMISED_OPERATIONS = 40_000  # operations of optimised code, compiled in about two seconds
-MOST_OPERATIONS = 100_000  # operations of code without optimisation, in about the same time
+from gauss.codegen.straight_line import calling, result_rooms, straight_line
 
 
 class Writer:
-    """Writer of one module of functions and of the loops that call them.
+    """Writer of one module of functions and of the loops that call them."""
 
-    Parameters
-    ----------
-    longest : int
-        Operations of a function above which it is interpreted from an operation table.
-    """
-
-    def __init__(self, most_operations: int = MOST_OPTIMISED_OPERATIONS):
-        self.most_operations = most_operations
+    def __init__(self):
         self.module = ir.Module(name="gauss")
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
-        self._tables: dict[Function, tuple[str, OperationTable]] = {}
 
-    def body(self, function: Function | NativeFunction, width: int = 1) -> ir.Function:
+    def body(self, function: Function | NativeFunction, width: int = 1, strided: bool = False) -> ir.Function:
         """Code of a function for one vector width, emitted at the first request.
 
-        A :class:`gauss.codegen.NativeFunction` emits its own.
+        A :class:`gauss.codegen.NativeFunction` emits its own. Other code takes its inputs and outputs one after the other,
+        whatever stride it is given, unless it is ``strided``.
 
         Raises
         ------
         TypeError
             If an output depends on a symbol that is no input.
         """
-        key = (function, width)
+        key = (function, width, strided)
         if key not in self._bodies:
-            code = function.write(self, width) if isinstance(function, NativeFunction) else self._write(function, width)
-            self._bodies[key] = code
+            if isinstance(function, NativeFunction):
+                self._bodies[key] = function.write(self, width)
+            else:
+                self._bodies[key] = self._write(function, width, strided)
         return self._bodies[key]
 
-    def over_states(self, function: Function, widths):
+    def over_states(self, function: Function | NativeFunction, widths):
         """Write ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, input j of state i being
         ``in[j * in_stride + i]``: vectors of the widest width as long as they fit, then single states.
         """  # noqa: D205
-        bodies = {width: self.body(function, width) for width in sorted({1, *widths}, reverse=True)}
+        bodies = {width: self.body(function, width, strided=True) for width in sorted({1, *widths}, reverse=True)}
         run = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [INTEGER, *BODY.args]), name="run")
         count, source, in_stride, target, out_stride = run.args
         b = ir.IRBuilder(run.append_basic_block("entry"))
@@ -68,7 +57,7 @@ class Writer:
             start = strip_mined_loop(b, start, count, width, call)
         b.ret_void()
 
-    def export(self, function: Function, name: str):
+    def export(self, function: Function | NativeFunction, name: str):
         """Write ``name(double* in, double* out)``, one state."""
         entry = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER, POINTER]), name=name)
         b, one = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1)
@@ -81,34 +70,22 @@ class Writer:
             self._schedules[function] = schedule(function)
         return self._schedules[function]
 
-    def _write(self, function: Function, width: int) -> ir.Function:
+    def _write(self, function: Function, width: int, strided: bool) -> ir.Function:
         nodes, inputs = function.nodes, set(function.inputs)
         foreign = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
         if foreign:
             raise TypeError(
                 f"the outputs of {function.name!r} depend on {', '.join(foreign[:5])}, which is none of its inputs."
             )
-        if self._is_long(nodes):
-            return self._write_table(function, width)
         callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
         name = f"{function.name}_{len(self._bodies)}_{width}"
         scheduled = self._scheduled(function)
         if len(nodes) > LONGEST_UNCUT:
-            return write_pieces(self.module, name, scheduled, callees, width)
+            return write_pieces(self.module, name, scheduled, callees, width, strided)
         body, lanes = begin_function(self.module, name, width)
-        source, in_stride, target, out_stride = body.args
+        source, in_stride, target, out_stride = strides(body, width, strided)
         fetch, keep = input_reader(lanes, source, in_stride), output_writer(lanes, target, out_stride)
-        straight_line(lanes, scheduled, fetch, keep, calling(lanes, callees))
+        rooms = result_rooms(lanes, scheduled.nodes)
+        straight_line(lanes, scheduled, fetch, keep, calling(lanes, callees), results=rooms)
         lanes.b.ret_void()
         return body
-
-    def _is_long(self, nodes) -> bool:
-        """Whether a function has too many operations to be compiled."""
-        return len(nodes) > self.most_operations
-
-    def _write_table(self, function: Function, width: int) -> ir.Function:
-        if function not in self._tables:
-            self._tables[function] = f"{function.name}_{len(self._tables)}", tabulate(function)
-        name, table = self._tables[function]
-        callees = [self.body(callee, width) for callee in table.callees]
-        return run_table(self.module, name, table, len(function.inputs), callees, width)

@@ -22,6 +22,7 @@ from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.lanes import DOUBLE, INTEGER
+from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 
 FLAG, OBJECT = ir.IntType(32), ir.IntType(8).as_pointer()
@@ -32,11 +33,11 @@ class _CtypesCall:
     """Machine code called through ctypes."""
 
     def __init__(self, code: machine.MachineCode, outputs: int):
-        self.code, self.outputs, self._run = code, outputs, SIGNATURE(code.address("run"))
+        self.outputs, self._run = outputs, code.entry("run", SIGNATURE)
 
     def __call__(self, given: np.ndarray) -> np.ndarray:
         found = np.empty(self.outputs)
-        self._run(1, given.ctypes.data, 1, found.ctypes.data, 1)
+        self._run.call(1, given.ctypes.data, 1, found.ctypes.data, 1)
         return found
 
 
@@ -49,19 +50,50 @@ class _FastcallOwner(NamedTuple):
 
     fallback: PythonWrapper  # its function holds the machine code
     definition: tuple[bytes, ...]
-    pinned: cpython_layout.PinnedObjects
+    entry: "_PythonEntry"
 
     def __reduce__(self):
         return self.fallback.__reduce__()
 
 
-def fastcall(function: Function, interface: Interface, over_limit: Callable, name: str, doc: str):
+class EntryCode(NamedTuple):
+    """Machine code of a function and of its entry from Python.
+
+    Attributes
+    ----------
+    code : MachineCode
+        The code.
+    outputs : int
+        Number of results and limited quantities.
+    """
+
+    code: machine.MachineCode
+    outputs: int
+
+
+def entry_code(function: Function | NativeFunction, interface: Interface) -> EntryCode:
+    """Machine code of a function for :func:`fastcall`.
+
+    Parameters
+    ----------
+    function : Function or NativeFunction
+        Its inputs are the vectors and the number, concatenated; its outputs are the results and the limited quantities.
+    interface : Interface
+        Arguments and limits.
+    """
+    writer = Writer()
+    writer.over_states(function, ())
+    _EntryWriter(writer, function, interface).write()
+    return EntryCode(machine.load(str(writer.module)), len(function.outputs))
+
+
+def fastcall(entry: EntryCode, interface: Interface, over_limit: Callable, name: str, doc: str):
     """Built-in function ``name(*vectors, out=None, number=0.0)`` of compiled code.
 
     Parameters
     ----------
-    function : Function
-        Its inputs are the vectors and the number, concatenated; its outputs are the results and the limited quantities.
+    entry : EntryCode
+        Machine code.
     interface : Interface
         Arguments and limits.
     over_limit : callable
@@ -74,20 +106,33 @@ def fastcall(function: Function, interface: Interface, over_limit: Callable, nam
     callable
         Returns ``out``, or a new array (n_out,). It raises :class:`gauss.errors.StateError` if an argument does not fit.
     """
-    writer = Writer()
-    writer.over_states(function, ())
-    _EntryWriter(writer, function, interface).write()
-    code = machine.load(str(writer.module))
-    fallback = PythonWrapper(
-        _CtypesCall(code, len(function.outputs)), interface, len(function.outputs), over_limit, name, doc
-    )
+    code, outputs = entry
+    fallback = PythonWrapper(_CtypesCall(code, outputs), interface, outputs, over_limit, name, doc)
     if not cpython_layout.is_known():
         return fallback
-    pinned = cpython_layout.PinnedObjects(fallback, over_limit)
-    fill = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64))(code.address("fill"))
-    fill(pinned.addresses())
-    definition = cpython_layout.method_definition(name, code.address("entry"), f"{name}{interface.signature()}\n--\n\n{doc}")
-    return cpython_layout.new_builtin(_FastcallOwner(fallback, definition, pinned))
+    called = _PythonEntry(cpython_layout.PinnedObjects(fallback, over_limit))
+    address = called.filled(code.first_address)
+    definition = cpython_layout.method_definition(name, address, f"{name}{interface.signature()}\n--\n\n{doc}")
+    called.definition = definition[0]
+    found = cpython_layout.new_builtin(_FastcallOwner(fallback, definition, called))
+    code.add_user(called)
+    return found
+
+
+class _PythonEntry:
+    """Function that Python calls: its address in a built-in function's definition, and the objects that it refers to."""
+
+    def __init__(self, pinned: cpython_layout.PinnedObjects):
+        self.pinned, self.definition = pinned, b""
+
+    def filled(self, address_of: Callable[[str], int]) -> int:
+        """Address of the function in machine code, whose table of addresses is filled."""
+        ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64))(address_of("fill"))(self.pinned.addresses())
+        return address_of("entry")
+
+    def connect(self, engine):
+        """Let Python call the function of other machine code from now on."""
+        cpython_layout.redefine(self.definition, self.filled(engine.get_function_address))
 
 
 class _EntryWriter:
@@ -96,7 +141,7 @@ class _EntryWriter:
     Addresses of Python's objects and functions lie in a table that each process fills.
     """
 
-    def __init__(self, writer: Writer, function: Function, interface: Interface):
+    def __init__(self, writer: Writer, function: Function | NativeFunction, interface: Interface):
         self.interface, self.sizes, module = interface, interface.sizes, writer.module
         self.n_out = len(function.outputs) - len(interface.limits)
         self.body = writer.body(function)

@@ -18,6 +18,7 @@ from gauss.errors import CacheWarning
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 OTHERS_ANY = stat.S_IRWXG | stat.S_IRWXO
 KEY_FILE = "key"
+PARTIAL = "partial-"  # begin of the names of incomplete files
 KEY_BYTES = 32  # length of a key, that of the digest
 HAS_OWNERS = hasattr(os, "getuid")
 OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
@@ -97,7 +98,7 @@ def obtain_key(folder: Path) -> bytes | None:
 
 def write_temporary(folder: Path, data: bytes) -> str:
     """Path of a new private file, to be renamed once it is complete."""
-    handle, temporary = tempfile.mkstemp(dir=folder)
+    handle, temporary = tempfile.mkstemp(dir=folder, prefix=PARTIAL)
     with os.fdopen(handle, "wb") as file:
         file.write(data)
     return temporary

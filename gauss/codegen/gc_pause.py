@@ -12,7 +12,11 @@ _before: list[tuple[int, ...]] = []  # threshold at each entry; the first one is
 
 @contextmanager
 def gc_pause():
-    """Raise the threshold of the garbage collector within this context, in all threads."""
+    """Raise the threshold of the garbage collector within this context, in all threads.
+
+    At the end only what was allocated within is collected: else the next allocation would begin a collection, maybe a full
+    one, which scans all that was imported and takes as long as a short motion.
+    """
     with _lock:
         _before.append(gc.get_threshold())
         first, *others = _before[0]
@@ -22,5 +26,7 @@ def gc_pause():
     finally:
         with _lock:
             if len(_before) == 1:
+                if gc.isenabled() and _before[0][0]:
+                    gc.collect(0)
                 gc.set_threshold(*_before[0])
             _before.pop()

@@ -5,7 +5,7 @@ import ctypes
 import numpy as np
 
 from gauss.codegen import machine
-from gauss.codegen.emit import MOST_OPERATIONS, MOST_OPTIMISED_OPERATIONS, Writer
+from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function, write
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
@@ -20,8 +20,6 @@ class Kernel:
         Traced function, or one that emits its own code.
     batch : bool
         Whether many states will be given at once: SIMD code is then compiled as well.
-    optimise : int
-        0 for very long code: the time of optimising compilation grows with the square of its length.
 
     Attributes
     ----------
@@ -29,13 +27,23 @@ class Kernel:
         Number of operations of each kind.
     """
 
-    def __init__(self, function: Function, batch: bool = True, optimise: int = 1):
+    def __init__(self, function: Function, batch: bool = True):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
-        writer = Writer(MOST_OPTIMISED_OPERATIONS if optimise else MOST_OPERATIONS)
+        writer = Writer()
         writer.over_states(function, (machine.width(),) if batch else ())
-        self.code = machine.load(str(writer.module), optimise)
-        self._function = SIGNATURE(self.code.address("run"))
+        self.code = machine.load(str(writer.module))
+        self._bind()
+
+    def _bind(self):
+        self._run = self.code.entry("run", SIGNATURE)
+
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in vars(self).items() if name != "_run"}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
 
     def __call__(self, inputs, out=None) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).
@@ -61,7 +69,7 @@ class Kernel:
         if out is not None:
             _check_target(out, (self.n_out, *given.shape[1:]), given)
         columns = given.shape[1] if given.ndim == 2 else 1
-        self._function(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
+        self._run.call(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
         return result
 
 
@@ -80,6 +88,6 @@ def _check_target(out, shape: tuple, given: np.ndarray):
         raise ValueError("out: shares memory with the inputs, which are still read while outputs are written.")
 
 
-def trace(function, *sizes: int, batch: bool = True, optimise: int = 1) -> Kernel:
+def trace(function, *sizes: int, batch: bool = True) -> Kernel:
     """Kernel of a Python function of vectors; see :func:`gauss.codegen.write`."""
-    return Kernel(write(function, *sizes), batch, optimise)
+    return Kernel(write(function, *sizes), batch)

@@ -1,45 +1,21 @@
-"""LLVM IR → machine code of this CPU, in this process; object code is cached on disk."""
+"""LLVM IR → machine code of this CPU, in this process; object code is cached on disk.
 
-from dataclasses import dataclass
-from functools import cache
-from itertools import islice
+Long modules are compiled quickly first, and optimised in the background (:mod:`gauss.codegen.tiers`). Until then the cache
+holds the quick object code with its module, so that the next process begins with both.
+"""
 
-import llvmlite
-import llvmlite.binding as llvm
+import os
+import zlib
 
-from gauss.codegen import object_cache
+from gauss.codegen import object_cache, tiers
+from gauss.codegen.object_code import about, linked, optimised_objects, packed, quick_objects, unpacked, width
+from gauss.codegen.optimiser import OPTIMISER
+from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, MachineCode
 
-OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
-PASSES = "passes where control flows"  # straight-line code of a hash-consed graph gains nothing by passes over the IR
+__all__ = ["MachineCode", "load", "load_cached", "width"]
 
-
-@dataclass(frozen=True)
-class MachineCode:
-    """Machine code in memory; its lifetime is that of this object."""
-
-    engine: llvm.ExecutionEngine
-
-    def address(self, name: str) -> int:
-        """Address of a function."""
-        return self.engine.get_function_address(name)
-
-
-@cache
-def target(level: int) -> llvm.TargetMachine:
-    """Code generator of the host CPU for an optimisation level."""
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    features = llvm.get_host_cpu_features().flatten()
-    return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=level, reloc="pic", codemodel="jitdefault"
-    )
-
-
-@cache
-def width() -> int:
-    """Doubles in one vector register of this CPU: 8, 4 or 2."""
-    features = llvm.get_host_cpu_features()
-    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+SHORT = 50_000  # characters of a module that is optimised at once, in less than 30 ms
+COMPRESSION = 1  # level of zlib: 4 ms for a megabyte
 
 
 def load(ir_text: str, optimise: int = 1) -> MachineCode:
@@ -51,40 +27,44 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
         The module.
     optimise : int
         0: quick compilation, code half as fast; 1: optimised where control flows; 2: optimised as a whole, calls inlined.
+        Above 0, in which tier depends on :func:`gauss.codegen.tiers.wanted`.
     """
-    machine = target(OPTIMISED if optimise else 0)
-    llvm_version = ".".join(map(str, llvm.llvm_version_info))
-    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} {PASSES} O{optimise}"
-    about += f" {llvm.get_host_cpu_features().flatten()}"
-    key = object_cache.key(about, ir_text)
-    binary = object_cache.read(key)
-    if binary is None:
-        binary = _compile(ir_text, machine, optimise)
-        object_cache.write(key, binary)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
-    engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
-    engine.finalize_object()
-    return MachineCode(engine)
+    key = object_cache.key(about(optimise), ir_text)
+    code = load_cached(key)
+    if code is not None:
+        return code
+    OPTIMISER.rest()
+    tier = tiers.wanted()
+    if not optimise or tier == OPTIMISED or (tier == AUTO and len(ir_text) < SHORT):
+        return _optimised(key, ir_text, optimise)
+    quick, source = quick_objects(ir_text), zlib.compress(ir_text.encode(), COMPRESSION)
+    object_cache.write(key + object_cache.QUICK_SUFFIX, packed([*quick, source, str(optimise).encode()]))
+    return _quick(key, quick, source, optimise)
 
 
-def target_machine() -> llvm.TargetMachine:
-    """Target machine for an execution engine, which takes ownership."""
-    target(OPTIMISED)
-    return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
-    )
+def load_cached(key: str) -> MachineCode | None:
+    """Machine code of a module by its :attr:`MachineCode.key`, without its text; None if the cache does not have it."""
+    tier = tiers.wanted()
+    content = object_cache.read(key) if tier != QUICK else None
+    if content is not None:
+        return MachineCode(key, linked(unpacked(content)), OPTIMISED)
+    content = object_cache.read(key + object_cache.QUICK_SUFFIX)
+    if content is None:
+        return None
+    *quick, source, optimise = unpacked(content)
+    if tier == OPTIMISED:
+        return _optimised(key, zlib.decompress(source).decode(), int(optimise))
+    return _quick(key, quick, source, int(optimise))
 
 
-def _compile(ir_text: str, machine: llvm.TargetMachine, optimise: int) -> bytes:
-    module = llvm.parse_assembly(ir_text)
-    module.verify()
-    if optimise:
-        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
-        if optimise > 1:
-            builder.getModulePassManager().run(module, builder)
-            return machine.emit_object(module)
-        passes = builder.getFunctionPassManager()
-        for function in module.functions:
-            if len(list(islice(function.blocks, 2))) > 1:
-                passes.run(function, builder)
-    return machine.emit_object(module)
+def _optimised(key: str, ir_text: str, optimise: int) -> MachineCode:
+    objects = list(optimised_objects(ir_text, optimise)) if optimise else quick_objects(ir_text)
+    object_cache.write(key, packed(objects))
+    return MachineCode(key, linked(objects), OPTIMISED)
+
+
+def _quick(key: str, quick: list[bytes], source: bytes, optimise: int) -> MachineCode:
+    code = MachineCode(key, linked(quick), QUICK, (source, optimise))
+    if os.environ.get(tiers.VARIABLE) != QUICK:
+        OPTIMISER.add(code)
+    return code

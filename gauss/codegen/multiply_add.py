@@ -1,6 +1,6 @@
 """Fused multiply–adds: a product is contracted with the sum that is its only user; both are rounded once.
 
-Contraction is decided on the graph, once for every vector width and for the operation table. A compiler would decide by the
+Contraction is decided on the graph, once for every vector width. A compiler would decide by the
 surrounding code, and round scalar and SIMD code differently.
 """
 

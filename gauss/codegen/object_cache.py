@@ -3,19 +3,22 @@
 A cached file is code that will run as this user. So it is read only if nobody else may write to it or to its folder
 (:mod:`gauss.codegen.file_trust`), and only with a valid seal: HMAC-SHA-256 (RFC 2104) of name and content under a key in the
 same folder that only this user can read. A file of another origin, such as an archive, or a process that may write to the
-folder but not read the key, has no valid seal. Root and processes of this user are trusted. Environment variable:
-``GAUSS_CACHE`` names another folder; empty, nothing is cached.
+folder but not read the key, has no valid seal. Root and processes of this user are trusted. Environment variables:
+``GAUSS_CACHE`` names another folder; empty, nothing is cached. ``GAUSS_CACHE_SIZE`` is its largest size in MB
+(:mod:`gauss.codegen.cache_size`).
 """
 
 import hashlib
 import hmac
 import os
+from contextlib import suppress
 from pathlib import Path
 
-from gauss.codegen import file_trust
+from gauss.codegen import cache_size, file_trust
 
 MAGIC = b"gauss kernel 2\n"
 SEAL_BYTES = 32  # bytes of a SHA-256
+QUICK_SUFFIX = ".quick"  # of the name under which quick code is cached, with its module, until it is optimised
 
 
 def folder() -> Path | None:
@@ -42,7 +45,11 @@ def read(name: str) -> bytes | None:
         return None
     head = len(MAGIC) + SEAL_BYTES
     content = data[head:]
-    return content if hmac.compare_digest(data[:head], MAGIC + _seal(secret, name, content)) else None
+    if not hmac.compare_digest(data[:head], MAGIC + _seal(secret, name, content)):
+        return None
+    with suppress(OSError):
+        os.utime(place / name)  # the time of last use
+    return content
 
 
 def write(name: str, content: bytes):
@@ -57,16 +64,23 @@ def write(name: str, content: bytes):
             return
         temporary = file_trust.write_temporary(place, MAGIC + _seal(secret, name, content) + content)
         os.replace(temporary, place / name)  # atomic under concurrent writes
+        cache_size.note_written(place, len(content))
     except OSError:
         return
 
 
-def file_sizes() -> list[int]:
-    """Sizes of the cached files [bytes]."""
+def remove(name: str):
+    """Forget a content."""
     place = folder()
-    if place is None or not place.is_dir():
-        return []
-    return [entry.stat().st_size for entry in os.scandir(place) if entry.is_file() and entry.name != file_trust.KEY_FILE]
+    if place is not None:
+        with suppress(OSError):
+            os.unlink(place / name)
+
+
+def file_sizes() -> dict[str, int]:
+    """Sizes of the cached files by name [bytes]."""
+    place = folder()
+    return {} if place is None else {name: state.st_size for name, state in cache_size.files(place)}
 
 
 def _seal(secret: bytes, name: str, content: bytes) -> bytes:

@@ -25,7 +25,7 @@ def outlined(outputs, symbols, name: str) -> tuple[Function, list[Expression]]:
     """
     inner = Graph()
     copies = {symbol.index: inner.symbol(f"x[{k}]") for k, symbol in enumerate(symbols)}
-    changing = [node for node in reachable(outputs) if _changes(node, copies)]
+    dependent = [node for node in reachable(outputs) if _changes(node, copies)]
     given: list[Expression] = []
 
     def copied(node: Expression) -> Expression:
@@ -36,18 +36,18 @@ def outlined(outputs, symbols, name: str) -> tuple[Function, list[Expression]]:
             given.append(node)
         return copies[node.index]
 
-    for node in changing:
+    for node in dependent:
         copies[node.index] = inner.copy(node, [copied(operand) for operand in node.operands])
     results = [copied(output) if isinstance(output, Expression) else output for output in outputs]
     inputs = [copies[symbol.index] for symbol in symbols] + [copies[node.index] for node in given]
     return Function(name, inputs, results), given
 
 
-def _changes(node: Expression, changing: dict) -> bool:
+def _changes(node: Expression, dependent: dict) -> bool:
     """Whether a node depends on a changing one; operands precede their users."""
-    if node.index in changing or not any(operand.index in changing for operand in node.operands):
+    if node.index in dependent or not any(operand.index in dependent for operand in node.operands):
         return False
-    changing[node.index] = None
+    dependent[node.index] = None
     return True
 
 

@@ -1,19 +1,5 @@
 """What a system is asked at one instant: accelerations, consistent states, mobility, assembly modes, derivatives."""
 
-from gauss.dynamics.compile_scene import compile_scene
-from gauss.dynamics.contact.paradox import Paradox, paradoxes
-from gauss.dynamics.mobility import Mobility, Redundancy, mobility
-from gauss.dynamics.rules import Plan
-from gauss.dynamics.stabilisation import STABILISATIONS, Baumgarte
+from gauss.lazy import attach
 
-__all__ = [
-    "Baumgarte",
-    "Mobility",
-    "Paradox",
-    "Plan",
-    "Redundancy",
-    "STABILISATIONS",
-    "compile_scene",
-    "mobility",
-    "paradoxes",
-]
+__all__, __getattr__, __dir__ = attach(__name__, __file__)

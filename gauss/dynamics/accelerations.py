@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
-from gauss.codegen import Interface, PythonWrapper, fastcall, write
+from gauss.codegen import EntryCode, Function, Interface, NativeFunction, PythonWrapper, entry_code, fastcall, write
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
@@ -23,7 +23,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
-from gauss.dynamics.store import cached
+from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_refinement import refined, refined_once
 from gauss.dynamics.traced_system import FINITE, Program
 from gauss.system import State, System
@@ -115,15 +115,20 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
                 lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC
             )
         if plan.dynamics == "tree recursion":
-            return fastcall(corrected_recursion(system, laws.traced), interface, last, NAME, DOC)
+            entry = written(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
+            return fastcall(entry, interface, last, NAME, DOC)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
 
         def to_roundoff():
-            limits, function = (TOLERANCE, RESIDUAL_TOLERANCE, FINITE), write(partial(refined, program), *sizes, name=NAME)
-            return fastcall(function, replace(interface, limits=limits), last, NAME, DOC)
+            strict = replace(interface, limits=(TOLERANCE, RESIDUAL_TOLERANCE, FINITE))
+            entry = written(refined, strict, lambda: write(partial(refined, program), *sizes, name=NAME))
+            return fastcall(entry, strict, last, NAME, DOC)
 
-        function = write(partial(refined_once, program), *sizes, name=NAME)
-        return fastcall(function, interface, TieredFunction(last, to_roundoff), NAME, DOC)
+        entry = written(refined_once, interface, lambda: write(partial(refined_once, program), *sizes, name=NAME))
+        return fastcall(entry, interface, TieredFunction(last, to_roundoff), NAME, DOC)
+
+    def written(what: Callable, interface: Interface, trace: Callable[[], Function | NativeFunction]) -> EntryCode:
+        return cached_on_disk(system, (entry_code, what, laws.key), lambda: entry_code(trace(), interface))
 
     if plan.dynamics == "unilateral":
         return _unilateral(system, Laws(smooth_system(system), laws.trace))

@@ -55,7 +55,7 @@ class CallGraph:
         left_out: dict[int, list[int]] = {index: [] for index in range(len(subsystem.joints))}
         for index, axis in subsystem.redundant:
             left_out[index].append(axis)
-        self.loops = {index: LoopJointKind(subsystem.joints[index], left_out[index]) for index in subsystem.closing}
+        self.loops = {index: LoopJointKind(subsystem.joints[index], left_out[index]) for index in subsystem.loop_joints}
         self._classify(links)
         self._factor()
 

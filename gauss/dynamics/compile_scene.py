@@ -1,8 +1,9 @@
 """Compilation of a scene: Scene → System with its dynamics."""
 
-from gauss.dynamics.maximal_coordinates import floating
+from gauss.arguments import named_arguments
+from gauss.codegen import gc_pause
 from gauss.dynamics.system_dynamics import SystemDynamics
-from gauss.errors import SceneError, named_arguments, require
+from gauss.errors import SceneError, require
 from gauss.scene import Scene
 from gauss.system import System, build
 
@@ -39,5 +40,10 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     require(scene, (Scene,), "compile_scene")
     if coordinates not in COORDINATES:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
-    system = build(scene, SystemDynamics())
-    return build(floating(scene, system), SystemDynamics()) if coordinates == "maximal" else system
+    with gc_pause():
+        system = build(scene, SystemDynamics())
+        if coordinates != "maximal":
+            return system
+        from gauss.dynamics.maximal_coordinates import floating
+
+        return build(floating(scene, system), SystemDynamics())

@@ -33,7 +33,7 @@ class Assembler:
     """
 
     def __init__(self, system: System):
-        if system.contacts.placed or system.grips.placed or system.losses:
+        if system.contacts.placed or system.set_valued.placed or system.losses:
             raise SceneError(
                 "unilateral constraints, set-valued elements and losses have no fixed rows; they are solved state by state."
             )

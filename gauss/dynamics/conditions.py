@@ -24,28 +24,29 @@ MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
 
 def is_large(system) -> bool:
     """Whether the compiled dynamics are a recursion over kernels of links, instead of straight-line code."""
-    return _n_bodies(system.parts) > LARGE_TREE_BODIES and not system.has_closures
+    return _n_bodies(system.subsystems) > LARGE_TREE_BODIES and not system.has_closures
 
 
 def has_large_loops(system) -> bool:
     """Whether the compiled dynamics are a call graph of kernels of links and loops, instead of straight-line code."""
-    parts = system.parts
-    if not any(part.closing for part in parts) or any(part.couplings or part.relations or part.trains for part in parts):
+    subsystems = system.subsystems
+    bound = any(subsystem.couplings or subsystem.relations or subsystem.trains for subsystem in subsystems)
+    if bound or not any(subsystem.loop_joints for subsystem in subsystems):
         return False
     if not all(bound.on_coordinates for bound in system.loads):
         return False
-    if system.n_v <= WIDE and _loop_work(parts) <= MOST_WORK:
+    if system.n_v <= WIDE and _loop_work(subsystems) <= MOST_WORK:
         return False
-    return sum(part.meetings for part in parts) <= MOST_SHARED_JOINTS * _n_bodies(parts)
+    return sum(subsystem.shared_joints for subsystem in subsystems) <= MOST_SHARED_JOINTS * _n_bodies(subsystems)
 
 
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled as one smooth function; none if they are."""
     reasons = [f"{name!r} is unilateral" for name in system.scene.contacts]
     reasons += _limits_and_losses(system.scene)
-    if not system.parts:
+    if not system.subsystems:
         reasons.append("nothing in it can move")
-    if not has_large_loops(system) and (work := _loop_work(system.parts)) > MOST_WORK:
+    if not has_large_loops(system) and (work := _loop_work(system.subsystems)) > MOST_WORK:
         reasons.append(f"its loops share so many links that straight-line code would have about {work:.0e} operations")
     if is_large(system):
         on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]
@@ -54,16 +55,16 @@ def obstacles(system) -> list[str]:
 
 
 def _limits_and_losses(scene) -> list[str]:
-    limits = [f"{name!r} has a limited force" for name in scene.grips]
-    return limits + [f"{name!r} has losses" for name in scene.losses if name not in scene.grips]
+    limits = [f"{name!r} has a limited force" for name in scene.set_valued]
+    return limits + [f"{name!r} has losses" for name in scene.losses if name not in scene.set_valued]
 
 
-def _loop_work(parts) -> int:
-    return sum(part.loop_elimination_work for part in parts)
+def _loop_work(subsystems) -> int:
+    return sum(subsystem.loop_elimination_work for subsystem in subsystems)
 
 
-def _n_bodies(parts) -> int:
-    return sum(part.n_bodies for part in parts)
+def _n_bodies(subsystems) -> int:
+    return sum(subsystem.n_bodies for subsystem in subsystems)
 
 
 def own_backend(ask: Question) -> list[str]:
@@ -139,7 +140,7 @@ def contacts_alone(ask: Question) -> list[str]:
 def small_contact_problem(ask: Question) -> list[str]:
     """The contact problem is small enough for dense matrices."""
     scene = ask.system.scene
-    rows = len(sides(scene)) + 2 * len(slips(scene)) + len(scene.grips)
+    rows = len(sides(scene)) + 2 * len(slips(scene)) + len(scene.set_valued)
     found = [f"its contacts have {rows} rows, more than {MOST_CONTACT_ROWS}"] if rows > MOST_CONTACT_ROWS else []
     n_v = ask.system.n_v
     return found + ([f"{n_v} rates beside contacts are more than {WIDEST_CONTACT}"] if n_v > WIDEST_CONTACT else [])

@@ -67,7 +67,7 @@ def consistent(
             return found
         if required:
             if not least_violation:
-                _judge(system, found, _while_kept(kept))
+                _check_start(system, found, _while_kept(kept))
             return found
     found = project_rates(system, _assembled(system, state, [], rough or _is_free(system, state, columns)))
     if columns and not _is_met(system, found):
@@ -75,7 +75,7 @@ def consistent(
         if _is_met(system, other):
             return other
     if not least_violation:
-        _judge(system, found, "from this start")
+        _check_start(system, found, "from this start")
     return found
 
 
@@ -114,18 +114,20 @@ def violations(system: System, state: State) -> dict[str, str]:
 def _assembled(system: System, state: State, held, restart: bool) -> State:
     """Pose by projection of the guess; by random restarts at growing distances where that fails."""
     best = project_positions(system, state, NEWTON_STEPS, held)
-    rng, smallest = np.random.default_rng(0), relative(system, position_residual_of(system, best))
-    free = np.ones(system.n_v)
+    smallest = relative(system, position_residual_of(system, best))
+    if not restart or smallest <= RESIDUAL_TOLERANCE:
+        return best
+    rng, free = np.random.default_rng(0), np.ones(system.n_v)
     free[list(held)] = 0.0
-    for k in range(RESTARTS if restart else 0):
-        if smallest <= RESIDUAL_TOLERANCE:
-            break
+    for k in range(RESTARTS):
         away = free * rng.uniform(-1.0, 1.0, system.n_v) * SPREAD * (k + 1) / RESTARTS
         moved = within_limits(system, replace(state, q=retract(system, state.q, away * system.scale.coordinates)))
         found = project_positions(system, moved, NEWTON_STEPS, held)
         size = relative(system, position_residual_of(system, found))
         if size < smallest:
             best, smallest = found, size
+        if smallest <= RESIDUAL_TOLERANCE:
+            break
     return best
 
 
@@ -145,7 +147,7 @@ def _keeps(system: System, start: State, kept: State, held) -> bool:
     return max([moved, *turned]) <= RESIDUAL_TOLERANCE and slowed <= RESIDUAL_TOLERANCE * scale.fastest(start.v)
 
 
-def _judge(system: System, state: State, where: str):
+def _check_start(system: System, state: State, where: str):
     """Refuse a state that violates its constraints; warn if the residual is that of numbers with few digits."""
     found = violations(system, state)
     if not found:

@@ -50,8 +50,8 @@ def set_valued_scales(system: System) -> np.ndarray:
     """Scales (g,) of the slip coordinates of set-valued elements."""
     units = system.scale.coordinates
     slides = [
-        max((abs(factor) * units[system.column(joint)] for joint, factor in grip.acts_on.items()), default=1.0)
-        for grip in system.scene.grips.values()
+        max((abs(factor) * units[system.column(joint)] for joint, factor in element.acts_on.items()), default=1.0)
+        for element in system.scene.set_valued.values()
     ]
     return np.array(slides)
 

@@ -9,7 +9,7 @@ from gauss.codegen import Kernel, forward, jacobian, write
 from gauss.dynamics.kinematics import kinematics
 from gauss.system import State, System, coordinate_rates, guards, sides
 from gauss.system.build import slips
-from gauss.system.relations import OPTIMISED_OPERATIONS, place_residuals
+from gauss.system.relations import place_residuals
 
 
 class ContactTerms(NamedTuple):
@@ -48,7 +48,7 @@ class ContactTermsKernel:
     def __init__(self, system: System):
         scene = system.scene
         gaps, whole = sides(scene), guards(scene)
-        watched = place_residuals(system, [*gaps, *slips(scene), *scene.grips.values()])
+        watched = place_residuals(system, [*gaps, *slips(scene), *scene.set_valued.values()])
         guarded = place_residuals(system, whole)
         m, self.n_v = len(gaps), system.n_v
 
@@ -72,7 +72,7 @@ class ContactTermsKernel:
     @cached_property
     def kernel(self) -> Kernel:
         """Machine code."""
-        return Kernel(self.function, batch=False, optimise=int(self.operations < OPTIMISED_OPERATIONS))
+        return Kernel(self.function, batch=False)
 
     def __call__(self, state: State) -> ContactTerms:
         """Contact terms of a state."""

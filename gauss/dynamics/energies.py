@@ -8,7 +8,7 @@ from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import stretch
 from gauss.scene import ElasticLink, JointSpring, Spring
 
-PARTING = 1e-10  # rad, lengths of the scene: flanks closer than this still touch, and keep their elastic energy
+PARTING = 1e-10  # rad, lengths of the scene: backlash sides closer than this still touch, and keep their elastic energy
 
 
 def kinetic_energy_of_bodies(motion: Kinematics) -> Scalar:

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen import Function, Interface, PythonWrapper, fastcall, write
+from gauss.codegen import Function, Interface, PythonWrapper, entry_code, fastcall, write
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import inverse_dynamics as traced_inverse_dynamics
 from gauss.dynamics.mechanism import loop_constraints
-from gauss.dynamics.store import cached
+from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_system import FINITE, applied_loads, off_unit
 from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
@@ -50,7 +50,8 @@ class LoopConstraintKernel:
             c, J, gamma = loop_constraints(system, q, v, t[0])
             return c, J.ravel(), gamma, _input_errors(system, q, v, t)
 
-        self.compiled = _compiled(system, "closing_rows", write(rows, system.n_q, system.n_v, 1), ("q", "v"), ROWS)
+        make = lambda: write(rows, system.n_q, system.n_v, 1)  # noqa: E731
+        self.compiled = _compiled(system, "closing_rows", (LoopConstraintKernel,), make, ("q", "v"), ROWS)
 
     def __call__(self, q, v, t: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residual [rad, m], Jacobian and bias."""
@@ -79,8 +80,8 @@ def inverse_dynamics(system: System) -> Callable:
         )
 
     def make():
-        function, names = write(forces, system.n_q, system.n_v, system.n_v, 1), ("q", "v", "acceleration")
-        return _compiled(system, "inverse_dynamics", function, names, INVERSE)
+        trace, names = lambda: write(forces, system.n_q, system.n_v, system.n_v, 1), ("q", "v", "acceleration")
+        return _compiled(system, "inverse_dynamics", (inverse_dynamics, laws.key), trace, names, INVERSE)
 
     return cached(system, (inverse_dynamics, laws.key), make)
 
@@ -90,7 +91,7 @@ def _input_errors(system: System, q, v, t, *others) -> list:
     return [off_unit(system, q), sum(np.abs(part).sum() for part in (q, v, t, *others))]
 
 
-def _compiled(system: System, name: str, function: Function, names, doc: str) -> Callable:
+def _compiled(system: System, name: str, key: tuple, trace: Callable[[], Function], names, doc: str) -> Callable:
     sizes = {given: system.n_q if given == "q" else system.n_v for given in names}
 
     def normalised(given):
@@ -101,7 +102,9 @@ def _compiled(system: System, name: str, function: Function, names, doc: str) ->
         return run(state.q, state.v, *others, None, t)
 
     interface = Interface(sizes, "t", limits=(RESIDUAL_TOLERANCE, FINITE))
-    n_out = len(function.outputs) - len(interface.limits)
-    fallback = PythonWrapper(normalised, replace(interface, limits=()), n_out, None, name, doc)
-    run = fastcall(function, interface, fallback, name, doc)
+    entry = cached_on_disk(system, (entry_code, *key), lambda: entry_code(trace(), interface))
+    fallback = PythonWrapper(
+        normalised, replace(interface, limits=()), entry.outputs - len(interface.limits), None, name, doc
+    )
+    run = fastcall(entry, interface, fallback, name, doc)
     return run

@@ -15,9 +15,9 @@ from gauss.codegen import Kernel, trace, write
 from gauss.dynamics.constraint_scales import gap_scales
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.errors import SceneError
-from gauss.scene import Contact, Place
+from gauss.scene import Contact, FeaturePair
 from gauss.system import Relations, State, System, guards, sides
-from gauss.system.relations import OPTIMISED_OPERATIONS, place_residuals
+from gauss.system.relations import place_residuals
 
 TOUCHING = 1e-8  # distance over its scale below which a gap is closed; integration leaves about 1e-10
 RESTING = 1e-8  # opening rate over its scale and the fastest rate, below which a gap does not open
@@ -101,7 +101,7 @@ def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarra
 
 def set_valued_rows(motion: Kinematics):
     """Slip rates (g,) of the set-valued elements, gradients J (g, 6n + p), and D of the slip accelerations J (a, q̈) − D."""
-    J, C, D, _ = stacked_rows(motion, motion.system.grips)
+    J, C, D, _ = stacked_rows(motion, motion.system.set_valued)
     return J @ np.concatenate([motion.quasi_velocities(), motion.state.v]) - C, J, D
 
 
@@ -139,12 +139,12 @@ def with_contacts(motion: Kinematics, compulsion: Compulsion) -> Compulsion:
         If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: these are no rows.
     """
     system = motion.system
-    if system.slips.placed or system.grips.placed or system.losses:
+    if system.slips.placed or system.set_valued.placed or system.losses:
         rough = [contact.name for contact in system.scene.contacts.values() if getattr(contact, "friction", 0.0)]
         raise SceneError(
-            f"{', '.join(dict.fromkeys([*system.scene.grips, *rough, *system.losses]))}: friction, clutches, limited drives "
-            "and losses are no rows of a compulsion; simulate() solves them, and reactions(), contact_forces() and "
-            "grip_forces() tell of its motion."
+            f"{', '.join(dict.fromkeys([*system.scene.set_valued, *rough, *system.losses]))}: friction, clutches, limited "
+            "drives and losses are no rows of a compulsion; simulate() solves them, and reactions(), contact_forces() and "
+            "set_valued_forces() tell of its motion."
         )
     if not system.contacts.placed:
         return compulsion
@@ -165,10 +165,10 @@ def gap_kernel(system: System) -> Kernel:
         return [watched.values(kinematics(system, State(t[0], q, v)))]
 
     function = write(flat, 1, system.n_q, system.n_v)
-    return Kernel(function, batch=False, optimise=int(sum(function.operations().values()) < OPTIMISED_OPERATIONS))
+    return Kernel(function, batch=False)
 
 
-def margin_kernel(system: System, places: Sequence[Place]) -> Kernel:
+def margin_kernel(system: System, places: Sequence[FeaturePair]) -> Kernel:
     """Machine code of (t, q, v) → margins of places with fixed features (k,) [m]; a place is left where one is negative."""
 
     def flat(t, q, v):

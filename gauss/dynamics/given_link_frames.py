@@ -40,7 +40,7 @@ def with_given_frames(subsystem: Subsystem) -> GivenLinkFrames:
     links = link_frames(subsystem)
     own = {f.name: getattr(subsystem, f.name) for f in fields(Subsystem)}
     return GivenLinkFrames(
-        **own, links=links, sides={index: joint_sides(subsystem, links, index) for index in subsystem.closing}
+        **own, links=links, sides={index: joint_sides(subsystem, links, index) for index in subsystem.loop_joints}
     )
 
 

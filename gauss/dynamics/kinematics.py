@@ -89,6 +89,11 @@ class Kinematics(View):
         If the state has not as many coordinates or rates as the system.
     """
 
+    R: list[np.ndarray]
+    x: list[np.ndarray]
+    W: list[np.ndarray]
+    u: list[np.ndarray]
+
     def __init__(self, system: System, state: State):
         require(system, (System,), "Kinematics")
         require(state, (State,), "Kinematics: state")

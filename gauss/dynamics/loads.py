@@ -98,12 +98,12 @@ def _(load: JointSpring, laws, motion: Kinematics, applied: Applied):
 
 @apply.register
 def _(load: Slipping, laws, motion: Kinematics, applied: Applied):
-    grip = load.grip
-    force = _evaluate(laws[0], motion, grip.what, 1)[0]
-    for joint, factor in load.pushes.items():
+    element = load.element
+    force = _evaluate(laws[0], motion, element.what, 1)[0]
+    for joint, factor in load.joint_factors.items():
         applied.P[motion.system.column(joint)] += factor * force
-    power = force * sum(factor * motion.rate(joint) for joint, factor in load.pushes.items())
-    if grip.lossy:
+    power = force * sum(factor * motion.rate(joint) for joint, factor in load.joint_factors.items())
+    if element.lossy:
         applied.dissipated -= power
     else:
         applied.driven += power
@@ -113,7 +113,7 @@ def _(load: Slipping, laws, motion: Kinematics, applied: Applied):
 def _(load: ElasticLink, laws, motion: Kinematics, applied: Applied):
     twist, lead = load.ends(motion)
     for side, acts in load.touching(twist, lead).items():
-        force = acts * load.pressed(twist, lead, side)
+        force = acts * load.side_force(twist, lead, side)
         for joint, factor in load.acts_on.items():
             applied.P[motion.system.column(joint)] += factor * force
         applied.dissipated += acts * load.damping * lead**2

@@ -1,5 +1,7 @@
 """Dynamics of a system in joint coordinates: the equations of its subsystems, each by itself, over numbers or symbols."""
 
+from copy import copy
+
 import numpy as np
 
 from gauss.codegen import Scalar
@@ -51,11 +53,25 @@ class Mechanism:
 
     def __init__(self, system: System, q, v, t: Scalar = 0.0, subsystems=None):
         relations = _relations(system, State(t, q, v))
-        self.system = system
+        self.system, self.q, self.t = system, q, t
         self.bodies = [
             ConstrainedArticulatedBody(one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
-            for one in (system.parts if subsystems is None else subsystems)
+            for one in (system.subsystems if subsystems is None else subsystems)
         ]
+
+    def moving(self, v) -> "Mechanism":
+        """The same system in the same position at other rates; what depends on the position alone is not made again."""
+        relations, found = _relations(self.system, State(self.t, self.q, v)), copy(self)
+        found.bodies = [
+            body.moving(v[body.subsystem.v], [relations[r.index] for r in body.subsystem.relations]) for body in self.bodies
+        ]
+        return found
+
+    def eliminated(self) -> "Mechanism":
+        """The same, with K M⁻¹ Kᵀ factored."""
+        for body in self.bodies:
+            body.eliminated()
+        return self
 
     def motion(self, tau, forces=None, feedback: list[BaumgarteFeedback] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the loop constraints.
@@ -96,6 +112,10 @@ class Mechanism:
         """Change (n_v,) of the joint accelerations that removes the residuals of :meth:`residual`."""
         pairs = zip(self.bodies, self._rows_of(rows), strict=True)
         return self._whole([body.correction(residual[body.subsystem.v], own) for body, own in pairs])
+
+    def damped(self, rows) -> np.ndarray:
+        """Residual (m,) of the loop constraints without its part along nearly dependent rows."""
+        return _joined([body.damped(own) for body, own in zip(self.bodies, self._rows_of(rows), strict=True)])
 
     def dependent_accelerations(self, rates) -> np.ndarray:
         """Joint accelerations (n_v,), with those of loop joints replaced by those that follow from the trees."""
@@ -146,13 +166,13 @@ class Mechanism:
         """Right side C of the velocity rows."""
         return _joined([body.velocity_rhs for body in self.bodies])
 
-    def projected_rates(self, v) -> np.ndarray:
-        """Rates (n_v,) nearest to v in the mass metric with K v = C."""
-        return self._whole([body.projected_rates(v[body.subsystem.v]) for body in self.bodies])
+    def nearest(self, v, target) -> np.ndarray:
+        """Rates x (n_v,) nearest to v in the mass metric with K x = target (m,).
 
-    def along(self, v) -> np.ndarray:
-        """Component of rates (n_v,) in the null space of K; the rest is orthogonal to it in the mass metric."""
-        return self._whole([body.along(v[body.subsystem.v]) for body in self.bodies])
+        With a target of zeros, v − x is orthogonal to the null space of K in the mass metric.
+        """
+        pairs = zip(self.bodies, self._rows_of(target), strict=True)
+        return self._whole([body.nearest(v[body.subsystem.v], own) for body, own in pairs])
 
     def power(self, multipliers) -> Scalar:
         """Power of rheonomic constraints [W]: −λᵀ C."""
@@ -192,8 +212,8 @@ def refined_forward_dynamics(system: System, state: State, tau, forces=None, cut
         Rank tolerance: loop constraints with less than this share of their length outside the span of the others are
         left out.
     """
-    relations, found, places = _relations(system, state), [], [one.v for one in system.parts]
-    for one in system.parts:
+    relations, found, places = _relations(system, state), [], [one.v for one in system.subsystems]
+    for one in system.subsystems:
         rows = [relations[r.index] for r in one.relations]
         body = RefinedForwardDynamics(one, state.q[one.q], state.v[one.v], rows, cut)
         found.append(body.found(tau[one.v], _carried(one, forces)))
@@ -208,7 +228,7 @@ def loop_residual(system: System, q, t: Scalar = 0.0, subsystems=None) -> tuple[
     relations = _relations(system, State(t, q, np.zeros(system.n_v)))
     found = [
         constrained_aba.loop_residual(one, q[one.q], [relations[r.index] for r in one.relations])
-        for one in (system.parts if subsystems is None else subsystems)
+        for one in (system.subsystems if subsystems is None else subsystems)
     ]
     return _joined([held for held, _ in found]), [slack for _, slack in found]
 
@@ -217,7 +237,7 @@ def loop_constraint_scales(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`loop_residual`, see :mod:`gauss.dynamics.constraint_scales`."""
     n, sizes, q = len(system.relations.placed), constraint_scales(system), system.reference.q
     own = [sizes[constraint.rows] for constraint in system.structure.constraints[len(system.structure.constraints) - n :]]
-    pairs = [(one, [own[relation.index] for relation in one.relations]) for one in system.parts]
+    pairs = [(one, [own[relation.index] for relation in one.relations]) for one in system.subsystems]
     found = [constrained_aba.loop_constraint_scales(one, q[one.q], system.scale, rows) for one, rows in pairs]
     return _joined(found).astype(float)
 
@@ -245,8 +265,8 @@ def dependent_coordinates(system: System, q, t: Scalar = 0.0) -> np.ndarray:
     """Coordinates, with those of loop joints replaced by those that follow from the trees; others meet the constraints."""
     for _ in range(COORDINATE_STEPS):
         step = np.zeros(system.n_v, dtype=object)
-        for one, slack in zip(system.parts, loop_residual(system, q, t)[1], strict=True):
-            for index, off in zip(one.closing, slack, strict=True):
+        for one, slack in zip(system.subsystems, loop_residual(system, q, t)[1], strict=True):
+            for index, off in zip(one.loop_joints, slack, strict=True):
                 step[one.v[one.joints[index].v]] = off
         q = retract(system, q, step)
     return q
@@ -254,14 +274,14 @@ def dependent_coordinates(system: System, q, t: Scalar = 0.0) -> np.ndarray:
 
 def kinetic_energy(system: System, q, v) -> Scalar:
     """Kinetic energy [J] from the rates of the tree alone."""
-    trees = [(one, KinematicTree(one, q[one.q], v[one.v])) for one in system.parts]
+    trees = [(one, KinematicTree(one, q[one.q], v[one.v])) for one in system.subsystems]
     return sum((tree.kinetic_energy(v[one.v]) for one, tree in trees), 0.0)
 
 
 def condensed(system: System, tau) -> np.ndarray:
     """Generalised forces (n_v,) along the independent coordinates."""
     found = np.zeros(system.n_v, dtype=object)
-    for one in system.parts:
+    for one in system.subsystems:
         found[one.v] = constrained_aba.condensed(one, tau[one.v])
     return found
 

@@ -35,16 +35,16 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
         kind.append(array.tobytes())
         return array
 
-    parts = [with_given_frames(part) for part in system.parts]
+    subsystems = [with_given_frames(subsystem) for subsystem in system.subsystems]
     take(np.array(system.scene.gravity))
     _mapped([getattr(system, name) for name in SYSTEM_FIELDS], take, kind.append)
     _mapped([bound.load for bound in system.loads], take, kind.append)
-    for part in parts:
-        _mapped([getattr(part, name) for name in SUBSYSTEM_FIELDS], take, kind.append)
-        kind += [repr(getattr(part, f.name)) for f in fields(Subsystem) if f.name not in SUBSYSTEM_FIELDS]
-    for relations in (system.relations, system.contacts, system.slips, system.grips):
+    for subsystem in subsystems:
+        _mapped([getattr(subsystem, name) for name in SUBSYSTEM_FIELDS], take, kind.append)
+        kind += [repr(getattr(subsystem, f.name)) for f in fields(Subsystem) if f.name not in SUBSYSTEM_FIELDS]
+    for relations in (system.relations, system.contacts, system.slips, system.set_valued):
         kind.append(relations.function.text() if relations.placed else "")
-    _mapped([system.scene.contacts, system.scene.grips], keep, kind.append)
+    _mapped([system.scene.contacts, system.scene.set_valued], keep, kind.append)
     return np.concatenate([np.ravel(array) for array in found]), tuple(kind)
 
 
@@ -69,19 +69,19 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         given = values[place - array.size : place].reshape(array.shape)
         return given if any(not isinstance(entry, float) for entry in given.flat) else given.astype(float)
 
-    subsystems, ignore = [with_given_frames(part) for part in system.parts], lambda word: None
+    ignore = lambda word: None  # noqa: E731
     scene = _changed(system.scene, {"gravity": tuple(give(np.array(system.scene.gravity)))})
     moved = _mapped([getattr(system, name) for name in SYSTEM_FIELDS], give, ignore)
     loads = _mapped([bound.load for bound in system.loads], give, ignore)
     loads = tuple(BoundLoad(load, _laws(load)) for load in loads)
-    parts = tuple(
+    subsystems = tuple(
         _changed(
-            part,
-            zip(SUBSYSTEM_FIELDS, _mapped([getattr(part, name) for name in SUBSYSTEM_FIELDS], give, ignore), strict=True),
+            written,
+            zip(SUBSYSTEM_FIELDS, _mapped([getattr(written, name) for name in SUBSYSTEM_FIELDS], give, ignore), strict=True),
         )
-        for part in subsystems
+        for written in map(with_given_frames, system.subsystems)
     )
-    stages = (Stage("parameters stand for numbers", (), parts),)
+    stages = (Stage("parameters stand for numbers", (), subsystems),)
     others = {"scene": scene, "loads": loads, "dynamics": dynamics, "reduction": stages, "scale": system.scale}
     return _changed(system, dict(zip(SYSTEM_FIELDS, moved, strict=True)) | others)
 

@@ -49,20 +49,18 @@ from gauss.dynamics.store import cached
 from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
 
-OURS = {id(method): IdentityKey(method) for method in METHODS.values()}  # immutable: identity stands for content
-
 
 def is_time_stepping(ask: Question) -> bool:
     """Whether the integrator is Moreau–Jean time stepping."""
     return isinstance(ask.method, FixedStep) and ask.method.nonsmooth
 
 
-def _changing(ask: Question) -> bool:
-    return bool(ask.system.scene.changing) and not is_time_stepping(ask)
+def _is_nonsmooth(ask: Question) -> bool:
+    return bool(ask.system.scene.nonsmooth) and not is_time_stepping(ask)
 
 
 def _smooth(ask: Question) -> bool:
-    return not (is_time_stepping(ask) or _changing(ask) or isinstance(ask.method, Library))
+    return not (is_time_stepping(ask) or _is_nonsmooth(ask) or isinstance(ask.method, Library))
 
 
 def _library(ask: Question) -> bool:
@@ -101,8 +99,8 @@ MOTIONS = RuleTable(
         Rule("constant", "none", when=lambda ask: not ask.system.n_v),
         Rule("time stepping", "compiled", "certified", is_time_stepping, _STEP),
         Rule("time stepping", "certified", when=is_time_stepping),
-        Rule("events", "compiled", "certified", _changing, (own_backend,)),
-        Rule("events", "certified", when=_changing),
+        Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend,)),
+        Rule("events", "certified", when=_is_nonsmooth),
         Rule("library", "compiled", "", _library, _WHOLE),
         Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _WHOLE),
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _WHOLE),
@@ -187,4 +185,5 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
-    return OURS.get(id(method)) or content_key(method)
+    ours = METHODS.get(method.name) is method  # immutable: identity stands for content
+    return IdentityKey(method) if ours else content_key(method)

@@ -50,7 +50,7 @@ def project_rates(system: System, state: State, held=(), steps: int = RATE_STEPS
         motion = kinematics(system, state)
         compulsion = assemble_motion(motion, Applied(motion, ()))
         momentum = metric(system) * motion.quasi_velocities()
-        factor = holding(system, compulsion, held)
+        factor = held_factor(system, compulsion, held)
         v = _least_change(factor, momentum, state.v[list(held)])
         scale = system.scale
         converged = np.abs((v - state.v) / scale.coordinates).max(initial=0.0) <= RESIDUAL_ROUNDOFF * scale.fastest(v)
@@ -96,7 +96,7 @@ def _step(system: System, state: State, phi, held, lowest, highest) -> np.ndarra
     compulsion = assemble_motion(motion, Applied(motion, ()))
     plain, held = scalar_coordinates(system, state), list(held)
     while True:
-        _, step, _, _ = holding(system, compulsion, held).solve(np.zeros(system.Phi.size), -phi, np.zeros(system.n_v))
+        _, step, _, _ = held_factor(system, compulsion, held).solve(np.zeros(system.Phi.size), -phi, np.zeros(system.n_v))
         outward = ((plain <= lowest) & (step < 0)) | ((plain >= highest) & (step > 0))
         crossing = [k for k in np.flatnonzero(outward) if k not in held]
         if not crossing:
@@ -149,7 +149,7 @@ def velocity_residual_of(system: System, motion) -> np.ndarray:
     return compulsion.residuals(motion.quasi_velocities(), motion.state.v, np.zeros(compulsion.D.size))[1]
 
 
-def holding(system: System, compulsion, held) -> KKTFactor:
+def held_factor(system: System, compulsion, held) -> KKTFactor:
     """Factorisation in which held rates are prescribed by rows of their own."""
     held = list(held)
     G = np.zeros((len(held), system.Phi.size + system.n_v))

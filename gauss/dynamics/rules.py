@@ -4,11 +4,11 @@ Of the rules that apply, the first whose conditions all hold gives the :class:`P
 conditions that they violate. The tables are in :mod:`gauss.dynamics.plan`.
 """
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Protocol
 
+from gauss.codegen.tiers import AUTO, checked
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
 from gauss.errors import SimulationError
@@ -54,6 +54,10 @@ class Plan:
         Dynamics used once compiled accelerations fail a check; empty where every acceleration is certified.
     rejected : tuple of Rejected
         Applicable rules that precede the chosen one in the table.
+    tier : str
+        Tier of the machine code (:mod:`gauss.codegen.tiers`). Of a plan to be followed: "quick", "optimised", or "auto",
+        that of the environment variable ``GAUSS_TIER``; code that is optimised already stays so, for the results are the
+        same. Of a motion that has run: "quick" if quick code ran in it, else "optimised".
     """
 
     driver: str
@@ -61,17 +65,32 @@ class Plan:
     stabilisation: str = "projection"
     fallback: str = ""
     rejected: tuple[Rejected, ...] = field(default=(), compare=False)
+    tier: str = field(default=AUTO, compare=False)
+
+    def __post_init__(self):
+        checked(self.tier, "Plan: tier")
 
     @classmethod
     def from_json(cls, text: str) -> "Plan":
         """Plan from the text of :meth:`to_json`."""
-        driver, dynamics, stabilisation, fallback, found = json.loads(text)
+        import json  # few runs need it
+
+        driver, dynamics, stabilisation, fallback, found, *tier = json.loads(text)  # no tier in files of before it
         rejected = tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in found)
-        return cls(driver, dynamics, stabilisation, fallback, rejected)
+        return cls(driver, dynamics, stabilisation, fallback, rejected, *tier)
+
+    def ran(self, tier: str) -> "Plan":
+        """Copy with the tier of the code that ran."""
+        made = self.__dict__.setdefault("made", {})  # once for all motions of this plan
+        if tier not in made:
+            made[tier] = replace(self, tier=tier)
+        return made[tier]
 
     def to_json(self) -> str:
         """All fields as JSON."""
-        return json.dumps([self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected])
+        import json
+
+        return json.dumps([self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected, self.tier])
 
     def __str__(self) -> str:
         fallback = f"; fallback: {self.fallback}" if self.fallback else ""
@@ -110,6 +129,14 @@ class Question(NamedTuple):
     stabilisation: str = "projection"
 
 
+class Asked(Protocol):
+    """What every question of a table says."""
+
+    @property
+    def stabilisation(self) -> str:
+        """Name of the constraint stabilisation."""
+
+
 class Rule(NamedTuple):
     """One row of a table.
 
@@ -126,10 +153,10 @@ class Rule(NamedTuple):
     driver: str
     dynamics: str
     fallback: str = ""
-    when: Callable[[Question], bool] = lambda ask: True
-    conditions: tuple[Callable[[Question], list[str]], ...] = ()
+    when: Callable[[Any], bool] = lambda ask: True
+    conditions: tuple[Callable[[Any], list[str]], ...] = ()
 
-    def against(self, ask: Question) -> list[str]:
+    def against(self, ask: Asked) -> list[str]:
         """Violated conditions, each once."""
         return list(dict.fromkeys(reason for condition in self.conditions for reason in condition(ask)))
 
@@ -146,9 +173,9 @@ class RuleTable(NamedTuple):
     """
 
     rules: tuple[Rule, ...]
-    refusal: Callable[[Question, str], str]
+    refusal: Callable[[Any, str], str]
 
-    def plan(self, ask: Question, wanted: Plan | None = None) -> Plan:
+    def plan(self, ask: Asked, wanted: Plan | None = None) -> Plan:
         """Plan of the first rule whose conditions hold; with ``wanted``, of the rule with that driver and dynamics.
 
         Raises

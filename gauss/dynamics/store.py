@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
-from gauss.codegen import gc_pause
+from gauss.codegen import compile_notice, from_disk, gc_pause
 from gauss.system import System
 
 T = TypeVar("T")
@@ -35,7 +35,7 @@ class Store:
                 being_made = self._being_made.setdefault(key, RLock())
             with being_made:  # a lock for each key: making one entry may request others
                 if key not in self._made:
-                    with gc_pause():
+                    with gc_pause(), compile_notice():
                         self._made[key] = make()
                     self._being_made.pop(key, None)
         return self._made[key]
@@ -52,3 +52,18 @@ def cached(system: System, key: Key, make: Callable[[], T]) -> T:
         As of :meth:`Store.on_demand`.
     """
     return system.dynamics.on_demand(key, make) if isinstance(system.dynamics, Store) else make()
+
+
+def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> T:
+    """Entry of the cache of a system that a new process reads from disk, by the content of the system and the key.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    key, make
+        As of :meth:`Store.on_demand`; see :func:`gauss.codegen.from_disk`.
+    *beside
+        What else the entry depends on, where the system is a part of another.
+    """
+    return cached(system, key, lambda: from_disk((system, *key, *beside), make))

@@ -1,4 +1,7 @@
-"""Dynamics of one system: accelerations, compiled functions, consistent states, plans; cached on first request."""
+"""Dynamics of one system: accelerations, compiled functions, consistent states, plans; cached on first request.
+
+Each method imports what it answers with: a motion needs few of them.
+"""
 
 from collections.abc import Callable
 
@@ -6,14 +9,10 @@ import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import count, write
-from gauss.dynamics.accelerations import Accelerations, forward_dynamics
 from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.consistent_states import consistent
-from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes
-from gauss.dynamics.equations import LoopConstraintKernel, inverse_dynamics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
-from gauss.dynamics.mobility import mobility
 from gauss.dynamics.plan import ACCELERATIONS, motion_plan
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import Store
@@ -39,35 +38,45 @@ class SystemDynamics(Store):
         """Loads with opaque laws, and the reasons."""
         return Laws(system).reasons
 
-    def operations(self, system: System, parts: tuple[Subsystem, ...]) -> int | None:
+    def operations(self, system: System, subsystems: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of subsystems; None for large trees, which are not traced."""
-        if sum(part.n_bodies for part in parts) > LARGE_TREE_BODIES:
+        if sum(subsystem.n_bodies for subsystem in subsystems) > LARGE_TREE_BODIES:
             return None
         function = write(
-            lambda t, q, v, effort: Mechanism(system, q, v, t[0], parts).motion(effort)[0],
+            lambda t, q, v, effort: Mechanism(system, q, v, t[0], subsystems).motion(effort)[0],
             *(1, system.n_q, system.n_v, system.n_v),
         )
         return sum(count(function.outputs).values())
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""
+        from gauss.dynamics.accelerations import Accelerations
+
         with judged_later():
             return self.on_demand((Accelerations,), lambda: Accelerations(system))(state, load)
 
     def held(self, system: System, state: State, load=None) -> Compulsion | None:
         """Compulsion of the mode in a state; None without set-valued elements, or where the state alone determines none."""
+        from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes
+
         return active_mode(system, state, load).solution.compulsion if has_joint_modes(system) else None
 
     def forward_dynamics(self, system: System) -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → q̈."""
+        from gauss.dynamics.accelerations import forward_dynamics
+
         return forward_dynamics(system)
 
     def inverse_dynamics(self, system: System) -> Callable:
         """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
+        from gauss.dynamics.equations import inverse_dynamics
+
         return inverse_dynamics(system)
 
     def loop_constraints(self, system: System) -> Callable:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
+        from gauss.dynamics.equations import LoopConstraintKernel
+
         return self.on_demand((LoopConstraintKernel,), lambda: LoopConstraintKernel(system))
 
     def consistent(self, system: System, state: State, kept=(), required=False, least_violation=False, rough=False) -> State:
@@ -77,4 +86,6 @@ class SystemDynamics(Store):
 
     def mobility(self, system: System):
         """Freedoms and redundant constraints at the start of the scene."""
+        from gauss.dynamics.mobility import mobility
+
         return mobility(system)

@@ -29,9 +29,9 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     state, n, m, acts = point.state, mechanics.system.n_v, mechanics.n_constraints, mechanics.acts
     sums, energy = CompensatedSums.of(method_state_of(point)[:-1], n), method_state_of(point)[-1]
     carried = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state))
-    begin, lost = mechanics.in_own_axes(state.q, carried), mechanics.in_own_axes(state.q, sums.lost_momentum)
+    begin, compensation = mechanics.in_own_axes(state.q, carried), mechanics.in_own_axes(state.q, sums.momentum_compensation)
     kinetic, potential = mechanics.energies(state)
-    size, energy = kinetic + np.abs(potential), math.where(sums.begun > 0.0, energy, kinetic + potential)
+    size, energy = kinetic + abs(potential), math.where(sums.begun > 0.0, energy, kinetic + potential)
     mechanism, middle, t = mechanics.mechanism(state), state.t + h / 2.0, state.t + h
     least = finest(mechanics.system, state.q, h, mechanics.extent) + SMALLEST_DIVISOR
 
@@ -44,11 +44,11 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
         found = mechanics.impulses(middle, state.q, h / 2.0 * u, u)
         along = acts * mechanics.impulses(middle, state.q, h / 2.0 * u, acts * u).momentum
         held, power, _ = mechanics.reaction(state.t, state.q, np.zeros(n), L) if m else (np.zeros(n), 0.0, None)
-        theta, gained = sums.lost + h * u, 2.0 * (found.momentum - begin) - lost
+        theta, gained = sums.compensation + h * u, 2.0 * (found.momentum - begin) - compensation
         end = reached(theta, gained - h / 2.0 * held)
         work = h * found.power + np.array([h / 2.0 * power, 0.0, 0.0])
         excess = sum(mechanics.energies(end.state)) - energy - (work[0] + end.work + work[1] - work[2])
-        excess = excess - u @ (gained - lost - h * (found.force + held))
+        excess = excess - u @ (gained - compensation - h * (found.force + held))
         gain = h * (along @ u)
         gamma = math.where(
             np.abs(gain) > LEAST_GAIN * mechanics.system.scale.time * size, -excess / (gain + SMALLEST_DIVISOR), 0.0
@@ -58,7 +58,7 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     def iterate(x):
         u = x[:n]
         found, force, held, _ = over(x)
-        residual = begin + (lost + h / 2.0 * (force + held)) - found.momentum
+        residual = begin + (compensation + h / 2.0 * (force + held)) - found.momentum
         if not m:
             return changed(mechanics.system, x, mechanism.released(residual, np.zeros(0)), u, least)
         off = mechanics.violation(t, retract(mechanics.system, state.q, h * u))
@@ -68,10 +68,10 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     start = state.v + h / 2.0 * point.rates.acceleration
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([start, np.zeros(m)]))
     _, force, held, work = over(x)
-    theta, push = sums.lost + h * x[:n], lost + h * (force + held / 2.0)
+    theta, push = sums.compensation + h * x[:n], compensation + h * (force + held / 2.0)
     end = reached(theta, push)
     energy = energy + (work[0] + end.work + work[1] - work[2])
-    return arrived(mechanics, point, theta, end, sums.lost_work + work, energy), Cost(2 * (count + 1), 0, unsolved)
+    return arrived(mechanics, point, theta, end, sums.work_compensation + work, energy), Cost(2 * (count + 1), 0, unsolved)
 
 
 def _size(system: System) -> int:

@@ -108,3 +108,6 @@ def generalised_alpha(rho: float = 0.8) -> FixedStep:
         mechanical=True,
         starts_from_accelerations=True,
     )
+
+
+GENERALISED_ALPHA = (generalised_alpha(),)

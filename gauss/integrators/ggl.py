@@ -26,7 +26,9 @@ class RadauGGL(RadauIIA):
     evaluations: int = 160
     mechanical: bool = True
 
-    def _step(self, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, np.ndarray, Cost]:
+    def _step(  # type: ignore[override]  # the drivers give mechanical methods the mechanics
+        self, mechanics: Mechanics, point: Point, h: Scalar
+    ) -> tuple[Point, np.ndarray, Cost]:
         """End of the step, slopes (3, 2 n_v) of (θ, v), and the cost."""
         system, state, spread = mechanics.system, point.state, mechanics.spread
         scale, n, s = mechanics.mechanism(state).scale, spread.shape[1], len(C)

@@ -76,7 +76,7 @@ def newton(
 
 
 @np.errstate(over="ignore", invalid="ignore")  # divergence is reported as unsolved
-def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> NonlinearSolution:
+def _newton_of_numbers(residual: Callable, x: np.ndarray, size: Scalar, softness: np.ndarray) -> NonlinearSolution:
     r, calls, before, firm = residual(x), 1 + x.size, np.inf, softness == 0.0
     steps = DIFFERENCE * (size + np.abs(x))
     columns = [(residual(x + step * axis) - r) / step for step, axis in zip(steps, np.eye(x.size), strict=True)]

@@ -62,7 +62,7 @@ class Reached(NamedTuple):
 
     state: State
     momentum: np.ndarray
-    lost: np.ndarray
+    compensation: np.ndarray
     work: Scalar
 
 
@@ -71,27 +71,27 @@ class CompensatedSums(NamedTuple):
 
     Attributes
     ----------
-    lost : ndarray, shape (n_v,)
+    compensation : ndarray, shape (n_v,)
         Compensation of the coordinates.
-    momentum, lost_momentum : ndarray, shape (n_v,)
+    momentum, momentum_compensation : ndarray, shape (n_v,)
         Momentum in axes of parents, and its compensation.
-    lost_work : ndarray, shape (3,)
+    work_compensation : ndarray, shape (3,)
         Compensation of the work.
     begun : float
         0 before the first step, when the momentum is not yet computed.
     """
 
-    lost: np.ndarray
+    compensation: np.ndarray
     momentum: np.ndarray
-    lost_momentum: np.ndarray
-    lost_work: np.ndarray
+    momentum_compensation: np.ndarray
+    work_compensation: np.ndarray
     begun: Scalar
 
     @classmethod
     def of(cls, method_state: np.ndarray, n_v: int) -> "CompensatedSums":
         """Sums of a method state."""
-        lost, momentum, lost_momentum, lost_work, begun = np.split(method_state, np.cumsum([n_v, n_v, n_v, 3]))
-        return cls(lost, momentum, lost_momentum, lost_work, begun[0])
+        *sums, begun = np.split(method_state, np.cumsum([n_v, n_v, n_v, 3]))
+        return cls._make([*sums, begun[0]])
 
     @staticmethod
     def size(system: System) -> int:

@@ -60,15 +60,15 @@ def step(method: SymplecticTableau, mechanics: Mechanics, point: Point, h: Scala
         found = [mechanics.reaction(t, state.q, *of_node) for t, *of_node in zip(times, nodes, L, strict=True)]
         return tuple(map(np.array, zip(*found, strict=True)))
 
-    def impulse(F, held, lost=0.0):
+    def impulse(F, held, compensation=0.0):
         """Change of momentum by forces, and by reactions at all nodes but the last."""
-        push = lost + h * (method.b @ F)
+        push = compensation + h * (method.b @ F)
         return push if held is None else push + h * (method.b_nodes[:-1] @ held)
 
     def lead(V, F, carried, held):
         """Difference of the momentum in the chart and along the rates at the start, of the order of the local error."""
         in_chart, in_space = (None, None) if held is None else (held[0], held[2])
-        whole = impulse(carried, in_space, sums.lost_momentum)
+        whole = impulse(carried, in_space, sums.momentum_compensation)
         return mechanics.in_chart(state.q, h * (method.b @ V), begin, whole) - impulse(F, in_chart)
 
     def violation(c, moved):
@@ -79,12 +79,12 @@ def step(method: SymplecticTableau, mechanics: Mechanics, point: Point, h: Scala
         P, F, _, carried = stages(V)
         held = reactions(V, L) if m else None
         if flat:
-            residual = begin + (sums.lost_momentum + h * (method.a_momenta @ F)) - P
+            residual = begin + (sums.momentum_compensation + h * (method.a_momenta @ F)) - P
         else:
             residual = own + (lead(V, F, carried, held) + h * (method.a_momenta @ F)) - P
-        if not m:
-            change = np.array([mechanism.released(own, np.zeros(0)) for own in residual])
-            return changed(mechanics.system, x, change.ravel(), V, least)
+        if held is None:
+            free = np.array([mechanism.released(own, np.zeros(0)) for own in residual])
+            return changed(mechanics.system, x, free.ravel(), V, least)
         residual = residual + h * (method.a_reactions @ held[0])
         nodes = zip(method.a_nodes, method.a_nodes @ residual, method.c_nodes[1:], strict=True)
         pulls = mixed @ np.array([mechanism.response(own, -violation(c, a @ V) / h)[1] for a, own, c in nodes])
@@ -96,10 +96,10 @@ def step(method: SymplecticTableau, mechanics: Mechanics, point: Point, h: Scala
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
     V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
-    (_, F, power, carried), theta = stages(V), sums.lost + h * (method.b @ V)
+    (_, F, power, carried), theta = stages(V), sums.compensation + h * (method.b @ V)
     held = reactions(V, L) if m else (None, None, None)
-    push = impulse(F if flat else carried, held[2], sums.lost_momentum)
-    work = sums.lost_work + h * (method.b @ power)
+    push = impulse(F if flat else carried, held[2], sums.momentum_compensation)
+    work = sums.work_compensation + h * (method.b @ power)
     if m:
         work = work + h * np.array([method.b_nodes[:-1] @ held[1], 0.0, 0.0])
     end = mechanics.reached(state.t + h, state.q, theta, begin, push)
@@ -109,8 +109,8 @@ def step(method: SymplecticTableau, mechanics: Mechanics, point: Point, h: Scala
 def arrived(mechanics: Mechanics, point: Point, theta, end: Reached, work, *more: Scalar) -> Point:
     """End of a step; its method state holds the compensation of coordinates, momentum and work, and further numbers."""
     work, free = work + np.array([end.work, 0.0, 0.0]), np.any(mechanics.spread != 0.0, axis=1)
-    lost, done = rounded(mechanics.system, point.state.q, end.state.q, theta), point.work + work
-    sums = CompensatedSums(np.where(free, lost, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
+    moved, done = rounded(mechanics.system, point.state.q, end.state.q, theta), point.work + work
+    sums = CompensatedSums(np.where(free, moved, 0.0), end.momentum, end.compensation, work - (done - point.work), 1.0)
     return Point(end.state, done, mechanics.evaluate(end.state), np.concatenate([sums.packed, [*more]]))
 
 

@@ -4,9 +4,10 @@ Rows are dictionaries {stage: coefficient}, because most entries are zero.
 """
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
+
+ONE = 2**400  # units of the exact sums in one: coefficients and their products are multiples of one such unit
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,12 @@ class EmbeddedPair(Tableau):
         return np.concatenate([[moved, first - moved, 2 * moved - first - last], self.dense])
 
 
+def _units(number: float) -> int:
+    """A number in units of 1 / ONE: exact where it is a multiple of them."""
+    numerator, denominator = number.as_integer_ratio()
+    return numerator * ONE // denominator
+
+
 def rounded_together(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients of which some are moved by a last digit, so that Σ bᵢ = 1 and Σ bᵢ aᵢⱼ = ½ hold beyond rounding.
 
@@ -64,17 +71,17 @@ def rounded_together(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarr
     it leaves in the second feeds or damps every oscillation.
     """
     A, b = A.copy(), b.copy()
-    _move(b, np.ones_like(b), sum(map(Fraction, b.tolist()), Fraction(-1)))
-    half = sum(Fraction(weight) * Fraction(a) for weight, row in zip(b.tolist(), A.tolist(), strict=True) for a in row)
-    _move(A, np.broadcast_to(b[:, None], A.shape), half - Fraction(1, 2))
+    _move(b, np.ones_like(b), sum(map(_units, b.tolist())) - ONE)
+    half = sum(_units(weight) * _units(a) for weight, row in zip(b.tolist(), A.tolist(), strict=True) for a in row) // ONE
+    _move(A, np.broadcast_to(b[:, None], A.shape), half - ONE // 2)
     return A, b
 
 
-def _move(values: np.ndarray, weights: np.ndarray, excess: Fraction):
+def _move(values: np.ndarray, weights: np.ndarray, excess: int):
     """Move entries by one unit in the last place each, the weightiest first, where that lessens the weighted excess."""
     units = np.where(values == 0.0, 0.0, np.spacing(np.abs(values)) * weights)
     for k in np.argsort(-np.abs(units), axis=None):
-        unit = Fraction(float(units.flat[k]))
+        unit = _units(float(units.flat[k]))
         if 2 * abs(excess) > abs(unit) > 0:
             sign = -1 if (excess > 0) == (unit > 0) else 1
             values.flat[k] += sign * np.spacing(abs(values.flat[k]))

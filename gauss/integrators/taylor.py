@@ -6,6 +6,7 @@ Mathematics 14, 2005, sections 3.2 and 3.3.
 
 from dataclasses import dataclass, field
 from math import ceil, log
+from typing import cast
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class Taylor:
         """Order of the least cost per time for a tolerance."""
         if self.terms is not None:
             return self.terms
-        finest = max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * tolerance.least)
+        finest = cast(float, max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * tolerance.least))
         return max(LOWEST_ORDER, min(HIGHEST_DEFAULT_ORDER, ceil(EXTRA_ORDERS + 1.0 - 0.5 * log(finest))))
 
 
@@ -116,3 +117,6 @@ def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:
             continue
         found += [part[:k], 2.0 * multiply(here[k:] * CONJUGATE, part[k:])[1:]]
     return np.concatenate(found)
+
+
+TAYLOR = (Taylor(),)

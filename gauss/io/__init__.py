@@ -1,7 +1,5 @@
 """Scenes and motions in files and by name."""
 
-from gauss.io.catalog import catalog, linkages, networks, servos
-from gauss.io.load import load, save
-from gauss.io.results import write_csv
+from gauss.lazy import attach
 
-__all__ = ["catalog", "linkages", "load", "networks", "save", "servos", "write_csv"]
+__all__, __getattr__, __dir__ = attach(__name__, __file__)

@@ -1,23 +1,11 @@
-"""Where scenes come from by name: shipped models, families of models, robots of example-robot-data."""
+"""Where scenes come from by name: shipped models, families of models."""
 
-import importlib.metadata
 import importlib.util
 import inspect
 from itertools import takewhile
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
-from gauss.errors import FileError, did_you_mean
-
-PACKAGE = "example-robot-data"
-# Short names of robots that people ask for.
-ALIASES = {
-    "anymal": "anymal_b_simple_description/robots/anymal",
-    "hyq": "hyq_no_sensors",
-    "talos": "talos_reduced",
-    "ur3": "ur3_robot",
-    "ur5": "ur5_robot",
-    "ur10": "ur10_robot",
-}
+from gauss.errors import FileError
 
 
 def folder() -> Path:
@@ -92,27 +80,3 @@ def _first_comment(path: Path) -> str:
     lines = takewhile(lambda line: line.startswith("#"), path.read_text(encoding="utf-8").splitlines())
     sentence, end, _ = " ".join(line.removeprefix("#").strip() for line in lines).partition(". ")
     return sentence + end.strip()
-
-
-def robot(name: str) -> Path:
-    """URDF file of a robot of example-robot-data, by the name of the file, or "folder/…/file" where that is not unique.
-
-    Raises
-    ------
-    FileError
-        If the package is not installed or has no such robot.
-    """
-    try:
-        package = importlib.metadata.distribution(PACKAGE)
-    except importlib.metadata.PackageNotFoundError:
-        raise FileError(f"robot {name!r}: robots come with another package: pip install {PACKAGE}.") from None
-    listed = (line.partition(",")[0] for line in (package.read_text("RECORD") or "").splitlines())
-    urdfs = [PurePosixPath(file) for file in listed if file.endswith(".urdf")]
-    wanted = ALIASES.get(name, name)
-    found = [f for f in urdfs if str(f.with_suffix("")).endswith(f"/{wanted}")]
-    if not found:
-        raise FileError(f"no robot {name!r} in {PACKAGE}. {did_you_mean(name, [*ALIASES, *(f.stem for f in urdfs)])}")
-    if len(found) > 1:
-        places = ", ".join("/".join(f.with_suffix("").parts[-3:]) for f in found)
-        raise FileError(f"robot {name!r} is not unique in {PACKAGE}; choose one of {places}.")
-    return Path(package.locate_file(found[0]))

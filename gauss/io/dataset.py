@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from gauss.dynamics import Plan, compile_scene
 from gauss.errors import ArgumentError, FileError, require
 from gauss.io.labelled import energies, of_motion, of_rollout, of_rotors, of_tracking
+from gauss.io.results import write_csv
 from gauss.rotors import RotorMotion
 from gauss.scene.toml import from_tables
 from gauss.servo import Tracking
@@ -18,7 +20,7 @@ from gauss.simulation.provenance import library
 from gauss.simulation.trajectory import Event, Stats
 from gauss.system import System, coordinate_units, rate_units
 
-MAKERS = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}
+MAKERS: dict[type, Callable] = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}
 
 
 def to_dataset(motion, joints=()):
@@ -94,6 +96,11 @@ def columns(trajectory: Trajectory) -> dict[str, np.ndarray]:
     return found | {f"{name} [J]": row for name, row in energies(trajectory).items()}
 
 
+def write_table(trajectory: Trajectory, path: Path) -> Path:
+    """Write the columns of a motion as CSV."""
+    return write_csv(columns(trajectory), path)
+
+
 def write_netcdf(motion, path: Path) -> Path:
     """Write the Dataset of a motion as netCDF 4, which any netCDF or HDF5 reader reads."""
     library("h5netcdf")
@@ -150,7 +157,8 @@ def load_motion(path) -> Trajectory:
     system = compile_scene(replace(from_tables(tomllib.loads(text)), source=str(about.get("source", ""))))
     _require_own(path, system, names, columns[1])
     settings = {key.removeprefix("setting_"): _read(value) for key, value in about.items() if key.startswith("setting_")}
-    return Trajectory(system, *columns, work, stats, events, settings=settings)
+    t, q, v = columns
+    return Trajectory(system, t, q, v, work, stats, events, settings=settings)
 
 
 def _columns(found, *names: str) -> list[np.ndarray]:

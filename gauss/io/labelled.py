@@ -26,7 +26,7 @@ def of_motion(trajectory: Trajectory, joints=()):
         "axis": list(AXES),
         "component": list(COMPONENTS),
     }
-    data = {
+    data: dict[str, tuple] = {
         "q": (("time", "coordinate"), trajectory.q, {"long_name": "coordinates", "units": "see coordinate_unit"}),
         "v": (("time", "rate"), trajectory.v, {"long_name": "rates of the coordinates", "units": "see rate_unit"}),
         "position": (("time", "body", "axis"), positions, {"units": "m", "long_name": "origins of the body frames"}),
@@ -72,7 +72,9 @@ def of_rotors(motion: RotorMotion):
     by_link |= {"elastic_energy": ("J", motion.elastic), "forward": ("1", motion.forward)}
     slips = [motion.slip(name) for name in links]
     by_link["slip"] = ("1", np.stack(slips, axis=1) if slips else np.zeros((len(motion), 0)))
-    data = {name: (("time", "shaft"), values, {"units": unit}) for name, (unit, values) in by_shaft.items()}
+    data: dict[str, tuple] = {
+        name: (("time", "shaft"), values, {"units": unit}) for name, (unit, values) in by_shaft.items()
+    }
     data |= {name: (("time", "link"), values, {"units": unit}) for name, (unit, values) in by_link.items()}
     for name in (*found.__dataclass_fields__, "balance"):
         data[f"energy_{name}"] = ("time", getattr(found, name), {"units": "J"})

@@ -6,13 +6,9 @@ from importlib import import_module
 from pathlib import Path
 
 from gauss.errors import ArgumentError, FileError, SceneError, StateError, did_you_mean, extra, require
-from gauss.io.catalog import families, robot, servo_files, shipped
-from gauss.io.results import write_csv, write_npz
-from gauss.io.urdf.guard import guarded
-from gauss.io.urdf.unknown import warn_of_rest
+from gauss.io.catalog import families, servo_files, shipped
 from gauss.scene import Scene
 from gauss.scene.toml import from_tables, tables, write_toml
-from gauss.simulation import Trajectory
 
 EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
 READ = (".toml", ".urdf", ".xml", ".sdf", ".world")
@@ -47,7 +43,7 @@ def load(source, **options):
     require(source, (str, Path), "load")
     name, path = str(source), Path(source)
     if name.startswith("robot:"):
-        return _read_urdf(robot(name.removeprefix("robot:")), options, name)
+        return _read_urdf(_robots().robot(name.removeprefix("robot:")), options, name)
     if path.suffix.lower() == ".urdf":
         return _read_urdf(path, options, name)
     if path.suffix.lower() == ".toml":
@@ -133,10 +129,12 @@ def _read_toml(path: Path):
 def _read_urdf(path: Path, options, name: str) -> Scene:
     options = _known(str(path), options, ("root", "mimic", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
-    scene = import_module("gauss.io.urdf.read").read_urdf(path, **options)  # Pinocchio takes long to import
-    warn_of_rest(guarded(path))
-    scene = import_module("gauss.io.urdf.extras").with_extras(scene, path, **extras)
-    return replace(import_module("gauss.io.urdf.side").with_side(scene, path), source=name)
+    return replace(_robots().read_robot(path, options, extras), source=name)
+
+
+def _robots():
+    """Robots, whose parser takes long to import."""
+    return import_module("gauss.io.urdf.robots")
 
 
 def _read_mjcf(path: Path, options) -> Scene:
@@ -145,28 +143,9 @@ def _read_mjcf(path: Path, options) -> Scene:
     return reader.read_mjcf(path, **options)
 
 
-def _write_tracking(tracking, path: Path) -> Path:
-    return import_module("gauss.io.servo").write_tracking(tracking, path)
-
-
-def _write_netcdf(motion, path: Path) -> Path:
-    return import_module("gauss.io.dataset").write_netcdf(motion, path)
-
-
-def _write_zarr(motion, path: Path) -> Path:
-    return import_module("gauss.io.dataset").write_zarr(motion, path)
-
-
-def _write_table(trajectory: Trajectory, path: Path) -> Path:
-    return write_csv(import_module("gauss.io.dataset").columns(trajectory), path)
-
-
-def _write_urdf(scene: Scene, path: Path) -> Path:
-    return import_module("gauss.io.urdf.write").write_urdf(scene, path)
-
-
-def _write_mjcf(scene: Scene, path: Path) -> Path:
-    return import_module("gauss.io.mjcf.write").write_mjcf(scene, path)  # few need it: its parts take milliseconds to import
+def _later(module: str, name: str) -> Callable:
+    """Writer that is imported when it is first called: few need it, and its parts take milliseconds to import."""
+    return lambda thing, path: getattr(import_module(module), name)(thing, path)
 
 
 def _known(name: str, options: dict, names: tuple[str, ...]) -> dict:
@@ -183,11 +162,19 @@ def _without_options(name: str, options, read, path) -> Scene:
     return read(path)
 
 
-LABELLED = {".nc": _write_netcdf, ".zarr": _write_zarr}
-WRITERS = {  # by the name of the class: most are not imported yet
-    "scene": {".toml": write_toml, ".xml": _write_mjcf, ".urdf": _write_urdf},
-    "trajectory": {".npz": write_npz, ".csv": _write_table} | LABELLED,
-    "tracking": {".npz": _write_tracking} | LABELLED,
+LABELLED = {".nc": _later("gauss.io.dataset", "write_netcdf"), ".zarr": _later("gauss.io.dataset", "write_zarr")}
+WRITERS: dict[str, dict[str, Callable]] = {  # by the name of the class: most are not imported yet
+    "scene": {
+        ".toml": write_toml,
+        ".xml": _later("gauss.io.mjcf.write", "write_mjcf"),
+        ".urdf": _later("gauss.io.urdf.write", "write_urdf"),
+    },
+    "trajectory": {
+        ".npz": _later("gauss.io.results", "write_npz"),
+        ".csv": _later("gauss.io.dataset", "write_table"),
+    }
+    | LABELLED,
+    "tracking": {".npz": _later("gauss.io.servo", "write_tracking")} | LABELLED,
     "rotormotion": LABELLED,
     "rollout": LABELLED,
 }

@@ -3,6 +3,7 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ def write_npz(trajectory: Trajectory, path: Path) -> Path:
     return path
 
 
-def arrays(trajectory: Trajectory) -> dict[str, np.ndarray]:
+def arrays(trajectory: Trajectory) -> dict[str, Any]:
     """Arrays of a motion by name."""
     system = trajectory.system
     positions = [[motion.position(name) for name in system.structure.bodies] for motion in trajectory.motions]

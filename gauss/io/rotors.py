@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 from gauss.errors import FileError, SceneError
 from gauss.io.catalog import network_files
@@ -23,7 +24,7 @@ from gauss.rotors.interpolant import Interpolant
 from gauss.rotors.laws import LAWS
 from gauss.scene.toml import check_sections, elements, entries_of, read_file
 
-SECTIONS = {
+SECTIONS: dict[str, type] = {
     "shaft": Shaft,
     "gear": GearPair,
     "friction_drive": FrictionDrive,
@@ -119,7 +120,8 @@ def toml_text(network: Network) -> str:
         If a law or curve is a Python function, which no file can hold.
     """
     lines = [_line("name", network.name)]
-    for thing in (*network.shafts.values(), *network.links.values()):
+    things: list[Any] = [*network.shafts.values(), *network.links.values()]
+    for thing in things:
         section = next(name for name, kind in SECTIONS.items() if type(thing) is kind)
         lines += ["", f"[[{section}]]", *(_line(key, value) for key, value in _entries(thing, thing.name))]
     for torque in network.torques.values():

@@ -4,9 +4,11 @@ A constraint in ``[[guided]]`` is kept by a contact; the same table as ``[[servo
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from gauss.dynamics import compile_scene
 from gauss.errors import SceneError, did_you_mean
 from gauss.io.results import arrays
 from gauss.scene import Relation
@@ -37,8 +39,8 @@ def servo_from_tables(data: dict) -> Servo:
     for key in TABLES:
         if not isinstance(given.get(key, {}), dict):
             raise SceneError(f"section 'servo': write [servo.{key}] with single brackets, once.")
-    relations, actuators = (list(elements(given, kinds)) for kinds in (RELATIONS, ACTUATORS))
-    return Servo(from_tables(data), relations, actuators, *(given.get(key, {}) for key in TABLES))
+    relations, actuators = (tuple(elements(given, kinds)) for kinds in (RELATIONS, ACTUATORS))
+    return Servo(compile_scene(from_tables(data)), relations, actuators, *(given.get(key, {}) for key in TABLES))
 
 
 def write_tracking(tracking: Tracking, path: Path) -> Path:
@@ -48,14 +50,13 @@ def write_tracking(tracking: Tracking, path: Path) -> Path:
     ``effort_work`` (k, j) [J], ``gaps`` (k, r), ``relation_names`` (r,), ``smallest`` (k,) singular values.
     """
     servo = tracking.servo
-    np.savez_compressed(
-        path,
-        **arrays(tracking.motion),
-        efforts=tracking.efforts,
-        effort_names=np.array(servo.efforts),
-        effort_work=tracking.work,
-        gaps=tracking.residuals,
-        relation_names=np.array(servo.held),
-        smallest=tracking.smallest,
-    )
+    found: dict[str, Any] = arrays(tracking.motion) | {
+        "efforts": tracking.efforts,
+        "effort_names": np.array(servo.efforts),
+        "effort_work": tracking.work,
+        "gaps": tracking.residuals,
+        "relation_names": np.array(servo.held),
+        "smallest": tracking.smallest,
+    }
+    np.savez_compressed(path, **found)
     return path

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from gauss.errors import FileError, NotImportedWarning
-from gauss.io.catalog import robot
 from gauss.io.urdf.guard import guarded, require_own_meshes
 from gauss.io.urdf.numbers import for_parser
 from gauss.io.urdf.read import ROOTS, base_of, body_names
+from gauss.io.urdf.robots import robot
 from gauss.scene import GROUND, Scene
 
 ABOVE = 6  # folders above a file in which its package:// paths are looked for
@@ -106,4 +106,5 @@ def _visual(entry, body: str) -> Visual:
     shape = entry.geometry
     faces = np.array([[triangle[k] for k in range(3)] for triangle in map(shape.tri_indices, range(shape.num_tris))])
     vertices = np.array(shape.vertices()) @ entry.placement.rotation.T + entry.placement.translation
-    return Visual(body, vertices, faces, tuple(float(c) for c in entry.meshColor[:3]))
+    red, green, blue = (float(c) for c in entry.meshColor[:3])
+    return Visual(body, vertices, faces, (red, green, blue))

@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.errors import LinkageError, NearSingularWarning
 from gauss.linkages.chain import Dyad
-from gauss.linkages.closing import closing_ranges
+from gauss.linkages.crank_ranges import closing_ranges
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.motion import LinkageKinematics
 

@@ -11,8 +11,8 @@ import numpy as np
 from gauss.errors import LinkageError
 from gauss.linkages.assembly_checks import check_assembled, check_regular
 from gauss.linkages.chain import Chain
-from gauss.linkages.closing import near
 from gauss.linkages.conditioning import conditions, loss
+from gauss.linkages.crank_ranges import near
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.extended import FIELDS, extended
 from gauss.linkages.motion import move

@@ -8,7 +8,7 @@ import numpy as np
 from gauss.errors import LinkageError, SimulationError
 from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.chain import Chain
-from gauss.linkages.closing import closing_ranges, follow, near
+from gauss.linkages.crank_ranges import closing_ranges, follow, near
 from gauss.linkages.kernels import reduced_kernel
 from gauss.linkages.motion import move
 from gauss.linkages.reduced import inertia_terms

@@ -29,7 +29,7 @@ class LinkageKinematics:
         Angle [rad] and speed [rad/s] of the crank.
     links : dict of LinkMotion
         Links by name, the ground among them.
-    meetings : tuple
+    freedoms : tuple
         Freedoms of the groups at their inner joints, in order.
     slack : tuple of dict
         For each group: reason for a failed assembly, and closure slack [m], negative where it fails.

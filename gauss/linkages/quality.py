@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, Dyad
-from gauss.linkages.closing import FULL, closing_ranges, near
+from gauss.linkages.crank_ranges import FULL, closing_ranges, near
 from gauss.linkages.cycle_result import transmission_angles
 from gauss.linkages.cycles import cycle
 from gauss.linkages.elements import GROUND

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.balancing import shaking
-from gauss.linkages.closing import FULL
+from gauss.linkages.crank_ranges import FULL
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.elements import GROUND
 from gauss.linkages.energy import power_balance

@@ -176,7 +176,7 @@ class TorsionSpring(Elastic, ShaftLink):
 
     def contact_torque(self, ends: LinkKinematics, state: Scalar) -> Scalar:
         """Torque in contact [N m]."""
-        return self.pressed(ends.twist, ends.lead, state)
+        return self.side_force(ends.twist, ends.lead, state)
 
     def effort(self, ends: LinkKinematics, state: Scalar) -> Scalar:
         """Q_em of spring and damper [N m]."""

@@ -18,7 +18,6 @@ from gauss.rotors.reduced import ReducedNetwork, psi
 from gauss.scene.values import returned
 
 MOST_ELEMENTS = 5000  # shafts and links: larger networks take minutes to compile
-MOST_OPTIMISED = 150  # shafts and links: larger networks are compiled in linear time, to code of half the speed
 
 
 class Conditions(NamedTuple):
@@ -203,7 +202,7 @@ class NetworkEquations:
         if compiled is False:
             return "compiled=False is asked for"
         try:
-            self._kernel = trace(self._traced, *sizes(self.reduced), batch=False, optimise=int(size <= MOST_OPTIMISED))
+            self._kernel = trace(self._traced, *sizes(self.reduced), batch=False)
         except Exception as error:  # a law of the user may fail in any way on symbols: it is called then
             if compiled:
                 raise

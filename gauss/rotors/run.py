@@ -24,8 +24,7 @@ from gauss.rotors.mode_search import find_phase
 from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import REST
 from gauss.rotors.stops import StepEnd
-from gauss.rotors.switching import NetworkSwitching
-from gauss.rotors.unseen import resolved_share
+from gauss.rotors.switching import NetworkSwitching, resolved_share
 
 METHODS: dict[str, type[OdeSolver]] = {"dop853": DOP853, "radau": Radau}
 STABLE_STEP = 0.5  # largest explicit step times the fastest decay: nearer to the limit of stability the error estimate fails

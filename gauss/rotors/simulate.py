@@ -4,7 +4,9 @@ import time
 
 import numpy as np
 
-from gauss.errors import SimulationError, did_you_mean, named_arguments
+from gauss.arguments import named_arguments
+from gauss.codegen import one_tier
+from gauss.errors import SimulationError, did_you_mean
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import NetworkEquations
@@ -15,14 +17,14 @@ from gauss.rotors.run import METHODS, RotorRun
 from gauss.rotors.stops import stops
 from gauss.rotors.switching import switching
 from gauss.simulation.arguments import check_breaks
-from gauss.simulation.opaque_laws import SPARSE_STEP
-from gauss.simulation.undetected_switching import warn_of_opaque
+from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 CHOICES = ("auto", *METHODS)
 DEFAULT_ATOL = 1e-9  # rad, and relative to the slow speed of the network
 
 
 @named_arguments
+@one_tier()
 def simulate(
     network: Network,
     duration: float,

@@ -15,14 +15,14 @@ from gauss import math
 from gauss.rotations import along, cross
 from gauss.scene import values
 from gauss.scene.collision import Box, Capsule, Collider
-from gauss.scene.contact_distances import PARALLEL_SEGMENTS, Place, Touch, across, ball, corner
+from gauss.scene.contact_distances import PARALLEL_SEGMENTS, FeaturePair, Touch, across, ball, corner
 
 RIM_WIDTH = 1e-7  # relative to the length of the scene: of a face beyond its rim; wider than a closed gap
 FAR_APART = 1e3  # relative to the length of the scene: gap function of edges that do not cross, or do not separate the boxes
 
 
 @dataclass(frozen=True)
-class CornerOnBox(Place):
+class CornerOnBox(FeaturePair):
     """Corner of a shape, or the ball around it, and a box.
 
     Parameters
@@ -92,7 +92,7 @@ class CornerOnBox(Place):
 
 
 @dataclass(frozen=True)
-class Edges(Place):
+class Edges(FeaturePair):
     """An edge of a box that crosses one of another.
 
     The four edges along an axis come in two pairs that lie opposite to each other; of a pair only the one that faces the

@@ -2,16 +2,11 @@
 
 from typing import TypeVar
 
+from gauss import scene as elements
 from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.gears import Gear, Rack
-from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.joint import Coupling, Joint
-from gauss.scene.losses import LossyGear
-from gauss.scene.motions import Guided
 from gauss.scene.relation import Constraint
-from gauss.scene.rolling import KnifeEdge, Rolling
-from gauss.scene.transmissions import Cam, Transmission
 
 Element = TypeVar("Element")
 
@@ -33,37 +28,39 @@ class SceneBuilder:
 class ConstraintBuilder(SceneBuilder):
     """Builder methods for bilateral constraints; each adds one element and returns it."""
 
-    def coincident(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0)) -> Coincident:
+    def coincident(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0)) -> "elements.Coincident":
         """Let points of two bodies coincide."""
-        return self.add(Coincident(name, name_of(body), name_of(other), at, other_at))
+        return self.add(elements.Coincident(name, name_of(body), name_of(other), at, other_at))
 
-    def distance(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), length=None) -> Distance:
+    def distance(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), length=None) -> "elements.Distance":
         """Keep points of two bodies at a distance [m], or at a law of time; see :class:`gauss.scene.Distance`."""
-        return self.add(Distance(name, name_of(body), name_of(other), at, other_at, length))
+        return self.add(elements.Distance(name, name_of(body), name_of(other), at, other_at, length))
 
-    def on_plane(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), normal=(0, 0, 1)) -> OnPlane:
+    def on_plane(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), normal=(0, 0, 1)) -> "elements.OnPlane":
         """Keep a point of a body on a plane of another."""
-        return self.add(OnPlane(name, name_of(body), name_of(other), at, other_at, normal))
+        return self.add(elements.OnPlane(name, name_of(body), name_of(other), at, other_at, normal))
 
-    def on_line(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), axis=(1, 0, 0)) -> OnLine:
+    def on_line(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), axis=(1, 0, 0)) -> "elements.OnLine":
         """Keep a point of a body on a line of another."""
-        return self.add(OnLine(name, name_of(body), name_of(other), at, other_at, axis))
+        return self.add(elements.OnLine(name, name_of(body), name_of(other), at, other_at, axis))
 
-    def on_curve(self, name: str, body, other, curve, at=(0, 0, 0), other_at=(0, 0, 0)) -> OnCurve:
+    def on_curve(self, name: str, body, other, curve, at=(0, 0, 0), other_at=(0, 0, 0)) -> "elements.OnCurve":
         """Keep a point of a body on a curve or surface of another, given by equations; see :class:`gauss.scene.OnCurve`."""
-        return self.add(OnCurve(name, name_of(body), name_of(other), at, other_at, curve))
+        return self.add(elements.OnCurve(name, name_of(body), name_of(other), at, other_at, curve))
 
-    def angle(self, name: str, body, other, axis=(0, 0, 1), other_axis=(0, 0, 1), angle=None) -> Angle:
+    def angle(self, name: str, body, other, axis=(0, 0, 1), other_axis=(0, 0, 1), angle=None) -> "elements.Angle":
         """Keep axes of two bodies at an angle [rad], or at a law of time; see :class:`gauss.scene.Angle`."""
-        return self.add(Angle(name, name_of(body), name_of(other), axis=axis, other_axis=other_axis, angle=angle))
+        return self.add(elements.Angle(name, name_of(body), name_of(other), axis=axis, other_axis=other_axis, angle=angle))
 
-    def gear(self, name: str, body, other, teeth, at=(0, 0, 0), other_at=(0, 0, 0), **options) -> Gear:
+    def gear(self, name: str, body, other, teeth, at=(0, 0, 0), other_at=(0, 0, 0), **options) -> "elements.Gear":
         """Let two wheels mesh: external, internal or bevel; see :class:`gauss.scene.Gear`."""
-        return self.add(Gear(name, name_of(body), name_of(other), at, other_at, teeth, **options))
+        return self.add(elements.Gear(name, name_of(body), name_of(other), at, other_at, teeth, **options))
 
-    def rack(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), axis=(0, 0, 1), along=(1, 0, 0)) -> Rack:
+    def rack(
+        self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), axis=(0, 0, 1), along=(1, 0, 0)
+    ) -> "elements.Rack":
         """Let a wheel roll along a rack; see :class:`gauss.scene.Rack`."""
-        return self.add(Rack(name, name_of(body), name_of(other), at, other_at, axis, along))
+        return self.add(elements.Rack(name, name_of(body), name_of(other), at, other_at, axis, along))
 
     def belt(self, name: str, driven, driver, radii, crossed: bool = False) -> Coupling:
         """Couple two pulleys on one carrier by a belt that does not slip.
@@ -84,29 +81,35 @@ class ConstraintBuilder(SceneBuilder):
             raise SceneError(f"belt {name!r}: radii must be positive, got {(one, two)}.")
         return self.add(Coupling(name, name_of(driven), name_of(driver), (-1.0 if crossed else 1.0) * two / one))
 
-    def lossy_gear(self, name: str, driven, driver, ratio: float, efficiency: float = 1.0, **options) -> LossyGear:
+    def lossy_gear(
+        self, name: str, driven, driver, ratio: float, efficiency: float = 1.0, **options
+    ) -> "elements.LossyGear":
         """Gear two joints with losses, by an efficiency or a constant slip; see :class:`gauss.scene.LossyGear`."""
-        return self.add(LossyGear(name, name_of(driven), name_of(driver), ratio, efficiency, **options))
+        return self.add(elements.LossyGear(name, name_of(driven), name_of(driver), ratio, efficiency, **options))
 
-    def cam(self, name: str, cam, follower, profile) -> Cam:
+    def cam(self, name: str, cam, follower, profile) -> "elements.Cam":
         """Let a follower's coordinate be a function of the cam's; see :class:`gauss.scene.Cam`."""
-        return self.add(Cam(name, name_of(cam), name_of(follower), profile))
+        return self.add(elements.Cam(name, name_of(cam), name_of(follower), profile))
 
-    def transmission(self, name: str, driven, driver, ratio) -> Transmission:
+    def transmission(self, name: str, driven, driver, ratio) -> "elements.Transmission":
         """Gear two joints by a ratio that varies; see :class:`gauss.scene.Transmission`."""
-        return self.add(Transmission(name, name_of(driven), name_of(driver), ratio))
+        return self.add(elements.Transmission(name, name_of(driven), name_of(driver), ratio))
 
-    def rolling(self, name: str, body, other, radius: float, at=(0, 0, 0), other_at=(0, 0, 0), **options) -> Rolling:
+    def rolling(
+        self, name: str, body, other, radius: float, at=(0, 0, 0), other_at=(0, 0, 0), **options
+    ) -> "elements.Rolling":
         """Let a ball, wheel or disk roll without slipping; see :class:`gauss.scene.Rolling`."""
-        return self.add(Rolling(name, name_of(body), name_of(other), at, other_at, radius, **options))
+        return self.add(elements.Rolling(name, name_of(body), name_of(other), at, other_at, radius, **options))
 
-    def knife_edge(self, name: str, body, other="ground", at=(0, 0, 0), edge=(1, 0, 0), normal=(0, 0, 1)) -> KnifeEdge:
+    def knife_edge(
+        self, name: str, body, other="ground", at=(0, 0, 0), edge=(1, 0, 0), normal=(0, 0, 1)
+    ) -> "elements.KnifeEdge":
         """Let a blade slide along its edge only."""
-        return self.add(KnifeEdge(name, name_of(body), name_of(other), at, edge=edge, normal=normal))
+        return self.add(elements.KnifeEdge(name, name_of(body), name_of(other), at, edge=edge, normal=normal))
 
-    def guide(self, name: str, body, path, at=(0, 0, 0), **options) -> Guided:
+    def guide(self, name: str, body, path, at=(0, 0, 0), **options) -> "elements.Guided":
         """Lead a point of a body along a path in time; see :class:`gauss.scene.Guided`."""
-        return self.add(Guided(name, name_of(body), at, path, **options))
+        return self.add(elements.Guided(name, name_of(body), at, path, **options))
 
     def constrain(self, name: str, position=None, velocity=None) -> Constraint:
         """Add a constraint of your own: functions of a view of the mechanism that return residuals.

@@ -10,7 +10,7 @@ from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import values
 from gauss.scene.box_distances import separation
-from gauss.scene.contact_distances import Place, Touch
+from gauss.scene.contact_distances import FeaturePair, Touch
 from gauss.scene.contact_pairs import have_edges, places
 from gauss.scene.relation import Relation
 from gauss.scene.unilateral import Unilateral
@@ -69,11 +69,11 @@ class Contact(Unilateral):
         """Contact distance, point and normal of one pair of features."""
         return self.places(at.system.scene)[index].touch(at)
 
-    def fixed(self, at, index: int) -> Place | None:
+    def fixed(self, at, index: int) -> FeaturePair | None:
         """One pair with the features that touch; None if its features never change."""
         return self.places(at.system.scene)[index].fixed(at)
 
-    def places(self, scene) -> list[Place]:
+    def places(self, scene) -> list[FeaturePair]:
         """Pairs of features that may touch."""
         return places(scene.shapes[self.shape], scene.shapes[self.other])
 

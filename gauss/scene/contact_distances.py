@@ -31,7 +31,7 @@ class Touch(NamedTuple):
     normal: np.ndarray
 
 
-class Place:
+class FeaturePair:
     """Pair of features, one of each shape, that may touch.
 
     A kind gives ``touch``, of a view of the mechanism. Most gap functions are smooth wherever they may become zero. One that
@@ -43,7 +43,7 @@ class Place:
         """Contact distance, point and normal, by a view of the mechanism."""
         raise NotImplementedError
 
-    def fixed(self, at) -> "Place | None":
+    def fixed(self, at) -> "FeaturePair | None":
         """Pair of the features that touch now, by a view in numbers; None if the features never change."""
         return None
 
@@ -53,10 +53,10 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Turned(Place):
+class Turned(FeaturePair):
     """Pair of features with the two shapes swapped."""
 
-    place: Place
+    place: FeaturePair
 
     def touch(self, at) -> Touch:
         """Contact distance, with the opposite normal."""
@@ -74,7 +74,7 @@ class Turned(Place):
 
 
 @dataclass(frozen=True)
-class OnHalfSpace(Place):
+class OnHalfSpace(FeaturePair):
     """Corner of a shape over a half-space: its height."""
 
     shape: Collider
@@ -89,7 +89,7 @@ class OnHalfSpace(Place):
 
 
 @dataclass(frozen=True)
-class Balls(Place):
+class Balls(FeaturePair):
     """Balls around corners of two shapes."""
 
     shape: Collider
@@ -104,7 +104,7 @@ class Balls(Place):
 
 
 @dataclass(frozen=True)
-class OnCapsule(Place):
+class OnCapsule(FeaturePair):
     """Ball around a corner of a shape, and a capsule."""
 
     shape: Collider
@@ -119,7 +119,7 @@ class OnCapsule(Place):
 
 
 @dataclass(frozen=True)
-class Capsules(Place):
+class Capsules(FeaturePair):
     """Two capsules."""
 
     shape: Capsule
@@ -133,7 +133,7 @@ class Capsules(Place):
 
 
 @dataclass(frozen=True)
-class OnEdge(Place):
+class OnEdge(FeaturePair):
     """A capsule across an edge of a box.
 
     Parameters

@@ -6,12 +6,12 @@ from itertools import product
 from gauss.errors import SceneError
 from gauss.scene.box_distances import CornerOnBox, Edges
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
-from gauss.scene.contact_distances import Balls, Capsules, OnCapsule, OnEdge, OnHalfSpace, Place, Turned
+from gauss.scene.contact_distances import Balls, Capsules, FeaturePair, OnCapsule, OnEdge, OnHalfSpace, Turned
 
 BOTH_SIDES = (-1, 1)
 
 
-def places(first: Collider, second: Collider) -> list[Place]:
+def places(first: Collider, second: Collider) -> list[FeaturePair]:
     """Pairs of features by which the first shape may touch the second; normals point out of the second.
 
     Raises
@@ -32,39 +32,39 @@ def have_edges(first: Collider, second: Collider) -> bool:
     return {type(first), type(second)} in ({Box}, {Box, Capsule})
 
 
-def _on_half_space(first, second: HalfSpace) -> list[Place]:
+def _on_half_space(first, second: HalfSpace) -> list[FeaturePair]:
     return [OnHalfSpace(first, k, second) for k in range(len(first.corners))]
 
 
-def _balls(first, second) -> list[Place]:
+def _balls(first, second) -> list[FeaturePair]:
     if not first.radius + second.radius:
         raise SceneError(f"{first.what} and {second.what}: two points never touch; give one of them a radius [m].")
     return [Balls(first, i, second, k) for i, k in product(range(len(first.corners)), range(len(second.corners)))]
 
 
-def _on_capsule(first, second: Capsule) -> list[Place]:
+def _on_capsule(first, second: Capsule) -> list[FeaturePair]:
     return [OnCapsule(first, k, second) for k in range(len(first.corners))]
 
 
-def _capsules(first: Capsule, second: Capsule) -> list[Place]:
+def _capsules(first: Capsule, second: Capsule) -> list[FeaturePair]:
     return [Capsules(first, second)]
 
 
-def _on_box(first, second: Box) -> list[Place]:
+def _on_box(first, second: Box) -> list[FeaturePair]:
     return [CornerOnBox(first, k, second) for k in range(len(first.corners))]
 
 
-def _capsule_on_box(first: Capsule, second: Box) -> list[Place]:
+def _capsule_on_box(first: Capsule, second: Box) -> list[FeaturePair]:
     edges = [OnEdge(first, second, axis, sides) for axis in range(3) for sides in product(BOTH_SIDES, BOTH_SIDES)]
     return _on_box(first, second) + edges
 
 
-def _boxes(first: Box, second: Box) -> list[Place]:
+def _boxes(first: Box, second: Box) -> list[FeaturePair]:
     corners = _on_box(first, second) + [Turned(place) for place in _on_box(second, first)]
     return corners + [Edges(first, second, *which) for which in product(range(3), range(3), BOTH_SIDES, BOTH_SIDES)]
 
 
-Rule = Callable[..., list[Place]]
+Rule = Callable[..., list[FeaturePair]]
 RULES: dict[tuple[type[Collider], type[Collider]], Rule] = {}
 RULES |= {(kind, HalfSpace): _on_half_space for kind in (Sphere, Points, Capsule, Box)}
 RULES |= {(first, second): _balls for first in (Sphere, Points) for second in (Sphere, Points)}

@@ -25,13 +25,13 @@ class Elastic:
         """Strain z [rad, m] from the middle, or from the contact of a side."""
         return twist - self.rest - side * 0.5 * self.backlash
 
-    def pressed(self, twist, lead, side):
+    def side_force(self, twist, lead, side):
         """Force Q [N m, N] if a side is in contact."""
         return self.stiffness * self.strain(twist, side) + self.damping * lead
 
     def touch(self, twist, lead, side):
         """Positive if a side is in contact, strained and under pressure; relative to one radian of strain."""
-        return math.minimum(self.strain(twist, side) * side, self.pressed(twist, lead, side) * side / self.stiffness)
+        return math.minimum(self.strain(twist, side) * side, self.side_force(twist, lead, side) * side / self.stiffness)
 
     def stored(self, twist, side):
         """Elastic energy [J] if a side is in contact."""

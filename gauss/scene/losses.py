@@ -17,11 +17,11 @@ def torque_factor(link, forward: bool) -> float:
     return (1.0 / link.efficiency if forward else link.back_efficiency) / link.ratio
 
 
-def pushes(link, way: int) -> dict[str, float]:
+def joint_factors(link, power_flow: int) -> dict[str, float]:
     """Joints that the force of a link acts on, with factors, by the direction of power flow: 1, −1, or 0 without losses."""
-    if not way:
+    if not power_flow:
         return link.acts_on
-    return {link.driven: 1.0, link.driver: -torque_factor(link, way > 0)}
+    return {link.driven: 1.0, link.driver: -torque_factor(link, power_flow > 0)}
 
 
 def keep_efficiencies(link, largest_back: float = 1.0):

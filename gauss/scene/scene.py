@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from gauss.arguments import named_arguments, named_methods
 from gauss.errors import SceneError, did_you_mean
-from gauss.scene import values
+from gauss.scene import builder, contact_builder, values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, Element, name_of
 from gauss.scene.collision import Collider
@@ -17,6 +18,7 @@ from gauss.scene.motions import Prescribed
 from gauss.scene.relation import Relation
 from gauss.scene.set_valued import LimitedDrive, SetValued
 from gauss.scene.unilateral import Unilateral
+from gauss.versions import FormerAttribute
 
 GROUND = "ground"
 LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
@@ -37,7 +39,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     Attributes
     ----------
-    bodies, frames, joints, couplings, relations, shapes, contacts, grips, loads, starts : dict
+    bodies, frames, joints, couplings, relations, shapes, contacts, set_valued, loads, starts : dict
         Elements by name; the methods fill them.
 
     Examples
@@ -58,7 +60,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     relations: dict[str, Relation] = field(default_factory=dict)
     shapes: dict[str, Collider] = field(default_factory=dict)
     contacts: dict[str, Unilateral] = field(default_factory=dict)
-    grips: dict[str, SetValued] = field(default_factory=dict)
+    set_valued: dict[str, SetValued] = field(default_factory=dict)
     loads: dict[str, Drive | ElasticLink | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
     source: str = field(default="", compare=False, repr=False)
@@ -274,7 +276,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
             relation.sides(self)  # refuses shapes that have no contact
             self.contacts[relation.name] = relation
         elif isinstance(relation, SetValued):
-            self.grips[relation.name] = relation
+            self.set_valued[relation.name] = relation
         else:
             self.relations[relation.name] = relation
 
@@ -286,21 +288,25 @@ class Scene(ConstraintBuilder, ContactBuilder):
     @property
     def losses(self) -> dict[str, Relation]:
         """Non-ideal links that lose power: gears, then set-valued elements."""
-        return {name: link for name, link in (self.relations | self.grips).items() if link.loses}
+        return {name: link for name, link in (self.relations | self.set_valued).items() if link.loses}
 
     @property
-    def plays(self) -> dict[str, ElasticLink]:
+    def backlashes(self) -> dict[str, ElasticLink]:
         """Elastic links with backlash."""
         return {name: load for name, load in self.loads.items() if isinstance(load, ElasticLink) and load.backlash}
 
     @property
-    def changing(self) -> dict[str, object]:
+    def nonsmooth(self) -> dict[str, object]:
         """Unilateral and set-valued elements, losses and backlash: with these a motion has events between smooth phases."""
-        return {**self.contacts, **self.grips, **self.losses, **self.plays}
+        return {**self.contacts, **self.set_valued, **self.losses, **self.backlashes}
+
+    grips = FormerAttribute("set_valued")
+    plays = FormerAttribute("backlashes")
+    changing = FormerAttribute("nonsmooth")
 
     @property
     def _constraints(self) -> dict[str, Relation]:
-        return self.relations | self.contacts | self.grips
+        return self.relations | self.contacts | self.set_valued
 
     def _place_load(self, load):
         what = f"{values.kind(load)} {load.name!r}"
@@ -377,3 +383,11 @@ class Scene(ConstraintBuilder, ContactBuilder):
         taken = [*self.loads, *self._constraints]
         count = sum(1 for load in taken if load == name or load.startswith(f"{name} "))
         return name if not count else f"{name} {count + 1}"
+
+
+_HERE = (*vars(builder).values(), *vars(contact_builder).values(), *list(globals().values()))
+_KINDS = {kind for kind in _HERE if isinstance(kind, type) and kind.__module__.startswith("gauss.scene.")}
+for _kind in _KINDS:
+    named_arguments(_kind)
+for _builder in (Scene, ConstraintBuilder, ContactBuilder):
+    named_methods(_builder)

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.losses import pushes
+from gauss.scene.losses import joint_factors
 from gauss.scene.relation import Relation
 
 
@@ -145,18 +145,18 @@ class Slipping:
     ----------
     name : str
         Name of the element.
-    grip : SetValued
+    element : SetValued
         The element.
     sign : int
         Sign of its force, against the sliding.
-    way : int
+    power_flow : int
         Direction of power flow through a non-ideal element: 1 forward, −1 back; 0 without losses.
     """
 
     name: str
-    grip: SetValued
+    element: SetValued
     sign: int
-    way: int = 0
+    power_flow: int = 0
 
     def __post_init__(self):
         """Check the sign."""
@@ -166,12 +166,12 @@ class Slipping:
     @property
     def effort(self):
         """Force [N m, N], a number or a law."""
-        return self.grip.effort(self.sign)
+        return self.element.effort(self.sign)
 
     @property
-    def pushes(self) -> dict[str, float]:
+    def joint_factors(self) -> dict[str, float]:
         """Joints that it acts on, with the factors of its force."""
-        return pushes(self.grip, self.way)
+        return joint_factors(self.element, self.power_flow)
 
 
 def limit_at(limit, t: float, what: str) -> float:

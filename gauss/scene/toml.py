@@ -1,88 +1,54 @@
 """Scene files in TOML: one section per kind of element, one key per field of its class. Nothing is executed."""
 
-import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, fields
+from functools import partial
 from pathlib import Path
 
+from gauss import scene as package
 from gauss.errors import FileError, SceneError, did_you_mean
-from gauss.scene import (
-    Angle,
-    Body,
-    Box,
-    Capsule,
-    Clutch,
-    Coincident,
-    Contact,
-    Coupling,
-    Distance,
-    Drive,
-    ElasticLink,
-    Force,
-    Frame,
-    Freewheel,
-    Gear,
-    Guided,
-    HalfSpace,
-    Joint,
-    JointFriction,
-    JointSpring,
-    KnifeEdge,
-    LimitedDrive,
-    LossyGear,
-    OnLine,
-    OnPlane,
-    Points,
-    Prescribed,
-    Rack,
-    Rolling,
-    Rope,
-    Scene,
-    Sphere,
-    Spring,
-    Start,
-    Stop,
-    profiles,
-)
+from gauss.lazy import LazyTable
+from gauss.scene import Scene
 
 # Section → class, in the order in which elements may refer to each other.
-SECTIONS = {
-    "body": Body,
-    "frame": Frame,
-    "joint": Joint,
-    "coupling": Coupling,
-    "prescribed": Prescribed,
-    "guided": Guided,
-    "coincident": Coincident,
-    "distance": Distance,
-    "on_plane": OnPlane,
-    "on_line": OnLine,
-    "angle": Angle,
-    "gear": Gear,
-    "rack": Rack,
-    "rolling": Rolling,
-    "knife_edge": KnifeEdge,
-    "sphere": Sphere,
-    "capsule": Capsule,
-    "box": Box,
-    "points": Points,
-    "half_space": HalfSpace,
-    "contact": Contact,
-    "stop": Stop,
-    "rope": Rope,
-    "joint_friction": JointFriction,
-    "limited_drive": LimitedDrive,
-    "clutch": Clutch,
-    "freewheel": Freewheel,
-    "lossy_gear": LossyGear,
-    "elastic_link": ElasticLink,
-    "drive": Drive,
-    "force": Force,
-    "joint_spring": JointSpring,
-    "spring": Spring,
-    "start": Start,
+CLASSES = {
+    "body": "Body",
+    "frame": "Frame",
+    "joint": "Joint",
+    "coupling": "Coupling",
+    "prescribed": "Prescribed",
+    "guided": "Guided",
+    "coincident": "Coincident",
+    "distance": "Distance",
+    "on_plane": "OnPlane",
+    "on_line": "OnLine",
+    "angle": "Angle",
+    "gear": "Gear",
+    "rack": "Rack",
+    "rolling": "Rolling",
+    "knife_edge": "KnifeEdge",
+    "sphere": "Sphere",
+    "capsule": "Capsule",
+    "box": "Box",
+    "points": "Points",
+    "half_space": "HalfSpace",
+    "contact": "Contact",
+    "stop": "Stop",
+    "rope": "Rope",
+    "joint_friction": "JointFriction",
+    "limited_drive": "LimitedDrive",
+    "clutch": "Clutch",
+    "freewheel": "Freewheel",
+    "lossy_gear": "LossyGear",
+    "elastic_link": "ElasticLink",
+    "drive": "Drive",
+    "force": "Force",
+    "joint_spring": "JointSpring",
+    "spring": "Spring",
+    "start": "Start",
 }
+SECTIONS = LazyTable(CLASSES, partial(getattr, package))
 HEADER_KEYS = ("name", "gravity")
 RENAMED_KEYS = {("joint", "type"): "kind"}  # key in the file → field of the class
 # A name may be left out: that of the joint serves.
@@ -144,11 +110,11 @@ def check_sections(data: dict, sections: list[str]):
             raise SceneError(f"unknown section {key!r}. {did_you_mean(key, sections)}")
 
 
-def elements(data: dict, sections: dict) -> Iterator:
+def elements(data: dict, sections: Mapping) -> Iterator:
     """Yield an element for each entry of the sections, {name: class}."""
-    for section, kind in sections.items():
+    for section in sections:
         for number, entry in enumerate(entries_of(data, section), start=1):
-            yield element(section, kind, entry, number)
+            yield element(section, sections[section], entry, number)
 
 
 def entries_of(data: dict, section: str) -> list[dict]:
@@ -189,11 +155,12 @@ def _keys(section: str, kind) -> dict[str, str]:
 def _frozen(value):
     """Value as a class takes it: lists as tuples, tables as profiles, a list with profiles in it as one law."""
     if isinstance(value, dict) and "profile" in value:
-        return profiles.from_table({key: _frozen(entry) for key, entry in value.items()})
+        return package.profiles.from_table({key: _frozen(entry) for key, entry in value.items()})
     if not isinstance(value, list):
         return value
     entries = tuple(_frozen(entry) for entry in value)
-    return profiles.Several(entries) if any(isinstance(entry, profiles.Profile) for entry in entries) else entries
+    several = any(callable(entry) and isinstance(entry, package.profiles.Profile) for entry in entries)
+    return package.profiles.Several(entries) if several else entries
 
 
 def write_toml(scene: Scene, path: Path) -> Path:
@@ -231,16 +198,18 @@ def _line(key: str, value) -> str:
 
 
 def _text(value) -> str:
-    if isinstance(value, profiles.Profile):
-        return "{ " + ", ".join(_line(key, entry) for key, entry in profiles.to_table(value).items()) + " }"
-    if isinstance(value, profiles.Several):
+    if isinstance(value, package.profiles.Profile):
+        return "{ " + ", ".join(_line(key, entry) for key, entry in package.profiles.to_table(value).items()) + " }"
+    if isinstance(value, package.profiles.Several):
         return f"[{', '.join(_text(entry) for entry in value.entries)}]"
+    import json  # scenes are read more often than written
+
     text = json.dumps(value, ensure_ascii=False)  # strings, numbers and arrays of JSON are those of TOML, but for one:
     return text.replace("\x7f", "\\u007f")
 
 
 def _elements(scene: Scene):
-    constraints = scene.couplings | scene.relations | scene.contacts | scene.grips
+    constraints = scene.couplings | scene.relations | scene.contacts | scene.set_valued
     for group in (scene.bodies, scene.frames, scene.shapes, scene.joints, constraints, scene.loads, scene.starts):
         yield from group.values()
 
@@ -249,7 +218,7 @@ def _entries(section: str, element):
     """Keys and values that differ from their defaults."""
     for key, name in _keys(section, type(element)).items():
         value, default = getattr(element, name), type(element).__dataclass_fields__[name].default
-        if callable(value) and not isinstance(value, profiles.Profile | profiles.Several):
+        if callable(value) and not isinstance(value, package.profiles.Profile | package.profiles.Several):
             raise FileError(f"{section} {element.name!r}: {name} is a Python function, which a file cannot hold.")
         if value is not None and value != default:
             yield key, value

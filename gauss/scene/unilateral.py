@@ -13,7 +13,8 @@ import numpy as np
 
 from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.contact_distances import Place
+from gauss.scene.contact_distances import FeaturePair
+from gauss.scene.geometry import Between
 from gauss.scene.relation import Relation
 
 
@@ -43,7 +44,7 @@ class Unilateral(Relation):
         """One of the gap functions."""
         return self.gaps(at)[index]
 
-    def fixed(self, at, index: int) -> Place | None:
+    def fixed(self, at, index: int) -> FeaturePair | None:
         """Pair of features that stays the same while a contact is closed; None where there is only one pair."""
         return None
 
@@ -74,13 +75,13 @@ class ClosedGap(Relation):
         The constraint.
     index : int
         Index of the gap function.
-    place : Place, optional
+    place : FeaturePair, optional
         Pair of features that stays the same.
     """
 
     whole: Unilateral
     index: int
-    place: Place | None = None
+    place: FeaturePair | None = None
 
     def positions(self, at) -> list:
         """Gap function."""
@@ -173,3 +174,35 @@ class OneSidedConstraint(Unilateral):
         if len(found) != 1:
             raise SceneError(f"{self.what}: gap must return one number, got {len(found)}; add one constraint for each.")
         return list(found)
+
+
+@dataclass(frozen=True)
+class Rope(Between, Unilateral):
+    """Two points no farther apart than the length of a rope, which pulls when it is taut and has no mass.
+
+    Parameters
+    ----------
+    length : float, optional
+        Length [m]; the distance of the points at the reference configuration when not given.
+    restitution : float
+        Speed after it jerks taut over that before it, 0 to 1.
+    """
+
+    length: float | None = None
+    restitution: float = 0.0
+
+    kind: ClassVar[str] = "rope"
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        if self.length is not None:
+            values.keep(self, length=values.number(self.length, f"{self.what}: length", "m", positive=True))
+        self._keep_restitution()
+
+    def gaps(self, at) -> list:
+        """(l² − d²)/(2 l): the slack, to first order, without a root."""
+        gap, length = self.gap(at), self.length
+        if length is None:
+            length = self._reference_length(at)
+        return [(length * length - gap @ gap) / (2.0 * length)]

@@ -18,8 +18,7 @@ from gauss.dynamics.projection import LEAST_DAMPING
 from gauss.errors import StateError
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.lagrange import contact_scalars, generalised_forces, loop_constraints, require_written
-from gauss.servo.line_search import first_accepted
-from gauss.servo.project import sizes_of
+from gauss.servo.project import first_accepted, sizes_of
 from gauss.servo.rows import rows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped

@@ -8,18 +8,20 @@ with them the correction is the least one in the mass metric.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from gauss.dynamics.consistent_states import NEWTON_STEPS, project
 from gauss.errors import StateError
 from gauss.servo.kernels import tree_rows
-from gauss.servo.line_search import first_accepted
 from gauss.servo.plan import RelationPlan
 from gauss.servo.realisable import contact_responses, instant, planned
 from gauss.servo.rows import ServoRows
 from gauss.servo.servo import Servo
 from gauss.system import State, System, retract
+
+Trial = TypeVar("Trial")
 
 ROUNDING_RESIDUAL = 1e-13  # residual relative to the size of its row, and its rate relative to the rates: rounding
 ACCEPTED = 1e-10  # the same: largest one of a consistent start
@@ -150,3 +152,24 @@ def _correction(servo: Servo, plan: RelationPlan, state: State, residual, level:
     root, own = np.sqrt(servo.weight), sizes(servo, plan)[count:][held]
     efforts = np.linalg.lstsq(part.S / own[:, None] / root, left / own, rcond=None)[0] / root
     return move + part.X_W[-width:] @ efforts
+
+
+def first_accepted(trial_at: Callable[[float], Trial], accepted: Callable[[Trial], bool], smallest: float) -> Trial | None:
+    """First accepted trial; None if there is none down to the smallest share.
+
+    Parameters
+    ----------
+    trial_at : callable
+        Share of the step → trial.
+    accepted : callable
+        Whether a trial lowers the residual.
+    smallest : float
+        Smallest share of the step.
+    """
+    share = 1.0
+    while share >= smallest:
+        trial = trial_at(share)
+        if accepted(trial):
+            return trial
+        share /= 2
+    return None

@@ -11,7 +11,7 @@ from gauss.servo.kernels import responses, tree_rows, untraced
 from gauss.servo.plan import NoReductionError, RelationPlan, direct, neighbours, reduced
 from gauss.servo.saddle import Saddle
 from gauss.servo.servo import Servo
-from gauss.servo.verdict import UnrealisableError, Verdict, judge
+from gauss.servo.verdict import UnrealisableError, Verdict, verdict_of
 from gauss.system import State
 
 
@@ -37,10 +37,10 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
     """
     state = servo.system.initial_state() if state is None else state
     plan = direct(servo)
-    verdict = judge(instant(servo, state, plan), servo.held, servo.efforts)
+    verdict = verdict_of(instant(servo, state, plan), servo.held, servo.efforts)
     if verdict.outcome != "rank lost":
         return replace(verdict, degree=plan.degree)
-    around = [judge(instant(servo, near, plan), servo.held, servo.efforts) for near in neighbours(servo, state)]
+    around = [verdict_of(instant(servo, near, plan), servo.held, servo.efforts) for near in neighbours(servo, state)]
     if any(near.outcome != "rank lost" for near in around):
         return verdict
     if len(servo.held) > len(servo.efforts):
@@ -50,7 +50,7 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
     except NoReductionError as error:
         return replace(verdict, outcome="no hold", reason=f"{verdict.reason}; {str(error).rstrip('.')}")
     names = tuple(plan.scalars[servo.n_contacts + i].name for i in plan.active)
-    local = judge(instant(servo, state, plan).part(list(plan.active)), names, servo.efforts)
+    local = verdict_of(instant(servo, state, plan).part(list(plan.active)), names, servo.efforts)
     if not local:
         return replace(local, degree=plan.degree)
     return Verdict(

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.arguments import named_arguments
+from gauss.codegen import one_tier
 from gauss.dynamics.laws.switching import Switching
-from gauss.errors import SimulationError, named_arguments
+from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
 from gauss.servo.dynamics import AVOID, ServoEngine
 from gauss.servo.instant import number
@@ -30,6 +32,7 @@ JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the r
 
 
 @named_arguments
+@one_tier()
 def simulate(
     servo: Servo,
     duration: float,
@@ -184,6 +187,7 @@ class ServoRun(PythonRun):
     def _allowed(self, state: State) -> float:
         """Largest error of a step, in units of the scene; of rates relative to the rates."""
         scale = self.system.scale
+        assert self.tolerance is not None
         places, rates = np.split(self.tolerance.scale(self.system, state), 2)
         return float(max((places / scale.coordinates).max(), (rates / scale.coordinates).max() / scale.fastest(state.v)))
 

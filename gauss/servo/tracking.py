@@ -10,6 +10,7 @@ from gauss.servo.servo import Servo
 from gauss.servo.verdict import Verdict
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
+from gauss.versions import FormerAttribute
 
 
 @dataclass(frozen=True)
@@ -66,11 +67,7 @@ class Tracking:
         warn("Tracking.gap is called Tracking.residual now.", DeprecationWarning, stacklevel=2)
         return self.residual(name)
 
-    @property
-    def gaps(self) -> np.ndarray:
-        """Former name of ``residuals``."""
-        warn("Tracking.gaps is called Tracking.residuals now.", DeprecationWarning, stacklevel=2)
-        return self.residuals
+    gaps = FormerAttribute("residuals")
 
 
 def _index(name: str, names: tuple[str, ...], what: str) -> int:

@@ -89,7 +89,7 @@ class Verdict:
         return "; ".join(lines) + (f"; {self.reason}" if self.reason else "")
 
 
-def judge(instant: ServoInstant, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
+def verdict_of(instant: ServoInstant, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
     """Verdict of one instant; "rank lost" where S has rank less than r there."""
     r, j = instant.S.shape
     cosines = instant.cosines

@@ -1,17 +1,5 @@
 """Simulation: arguments → problem → plan → driver → trajectory; batches and parameter sweeps."""
 
-from gauss.simulation.batch.rollout import Rollout, rollout
-from gauss.simulation.simulate import INTEGRATORS, simulate
-from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
-from gauss.simulation.zero_crossings import crossings
+from gauss.lazy import attach
 
-__all__ = [
-    "INTEGRATORS",
-    "BodyMotion",
-    "Rollout",
-    "Stats",
-    "Trajectory",
-    "crossings",
-    "rollout",
-    "simulate",
-]
+__all__, __getattr__, __dir__ = attach(__name__, __file__)

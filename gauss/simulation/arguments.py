@@ -2,24 +2,26 @@
 
 import numpy as np
 
+from gauss import integrators
 from gauss.backends import Backend, ready
+from gauss.codegen import from_disk
 from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
+from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Baumgarte, drift
+from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, did_you_mean, require
-from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, RadauGGL
+from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
-from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
+from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System, refuse_changed
-
-INTEGRATORS: dict[str, Integrator] = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 
 
 def checked_problem(
@@ -74,7 +76,7 @@ def checked_problem(
     if system.n_v:
         refuse(problem)
     if stabilisation == "ggl" and system.closes:
-        problem = problem._replace(method=RadauGGL())
+        problem = problem._replace(method=integrators.RadauGGL())
     warn_of_times(system, problem.switching.times)
     return problem
 
@@ -102,7 +104,19 @@ def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.
 
 def _start(system: System) -> State:
     """Initial state of the scene, cached."""
-    return system.initial_state() if system.dynamics is None else system.dynamics.on_demand((_start,), system.initial_state)
+    return cached(system, (_start,), lambda: _assembled(system) if system.has_closures else system.initial_state())
+
+
+def _assembled(system: System) -> State:
+    """Initial state of a scene with loops, from disk unless there is something to be warned of."""
+    found: list[State] = []
+
+    def make():
+        found.append(system.initial_state())
+        return found[0], not violations(system, found[0])
+
+    state, is_met = from_disk((_assembled, system), make)
+    return state if found or is_met else system.initial_state()
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:

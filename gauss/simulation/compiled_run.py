@@ -15,6 +15,7 @@ from gauss.codegen.kernels import ENERGY_RECORD, Control, Loop, LoopStatus
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import ExplicitPair, FixedStep, Point, Rates, Taylor
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
@@ -73,8 +74,12 @@ class CompiledRun:
 
     def _loop_of(self, kind: Hashable, make: Callable[[], Loop]) -> Loop:
         """Step loop of a kind, cached."""
-        self.kind, self.loop = kind, self._on_demand((Loop, kind), make)
+        self.kind, self.loop = kind, cached_on_disk(self.system, (Loop, kind, self.key), make, *self._beside())
         return self.loop
+
+    def _beside(self) -> tuple:
+        """Further content that the step loop depends on."""
+        return ()
 
     def _on_demand(self, what: tuple, make: Callable):
         return self.system.dynamics.on_demand((*what, self.key), make)
@@ -97,7 +102,7 @@ class CompiledRun:
     def _evaluate(self, state: State) -> Rates:
         """Rates by machine code."""
         found, n_v = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v])), self.system.n_v
-        return Rates(found[:n_v], found[n_v:])
+        return Rates(found[:n_v], found[n_v : n_v + 3])
 
     def _certified_start(self) -> np.ndarray:
         rates = self.certified.rates(self.system, self.start)

@@ -1,60 +1,63 @@
-"""Drivers: functions from a problem to its trajectory, selected by the :class:`gauss.dynamics.rules.Plan`."""
+"""Drivers: functions from a problem to its trajectory, selected by the :class:`gauss.dynamics.rules.Plan`.
+
+Each imports what it runs: one motion needs one of them.
+"""
 
 from collections.abc import Callable
 from typing import TypeVar
 
+from gauss.dynamics import engines
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.call_graph import call_graph_kernels
-from gauss.dynamics.engines.certified import CertifiedEngine
-from gauss.dynamics.engines.compiled import CompiledEngine
-from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.refined import RefinedEngine
-from gauss.dynamics.engines.tree_recursion import tree_recursion_kernels
 from gauss.dynamics.rules import Plan
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
-from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
-from gauss.simulation.compiled_fixed_run import CompiledFixedRun
-from gauss.simulation.constant_motion import constant
+from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.handover import finished
-from gauss.simulation.library_run import certified_rates, compiled_projection, compiled_rates, library_run
-from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
-from gauss.simulation.moreau.moreau_jean import MoreauRun
-from gauss.simulation.phases.event_driven_run import EventDrivenRun
 from gauss.simulation.problem import Problem
-from gauss.simulation.python_run import PythonRun
-from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.trajectory import Trajectory
 
 T = TypeVar("T")
 
 
-def engine(dynamics: str, problem: Problem) -> Engine:
+def engine(dynamics: str, problem: Problem) -> "engines.Engine":
     """Engine of a kind of dynamics."""
     system, laws, gains = problem.system, problem.laws, problem.drift.gains
     match dynamics:
         case "call graph":
-            return CompiledEngine(system, call_graph_kernels(system, gains), system.loads, (), gains)
+            return engines.CompiledEngine(system, engines.call_graph_kernels(system, gains), system.loads, (), gains)
         case "tree recursion":
-            return CompiledEngine(system, tree_recursion_kernels(system), system.loads, (), gains)
+            return engines.CompiledEngine(system, engines.tree_recursion_kernels(system), system.loads, (), gains)
         case "compiled":
-            return CompiledEngine(system, _cached(problem, Program.kernels), laws.called, laws.reasons, gains)
+            return engines.CompiledEngine(system, _cached(problem, Program.kernels), laws.called, laws.reasons, gains)
         case "refined":
-            return RefinedEngine(system, laws)
+            return engines.RefinedEngine(system, laws)
         case _:
-            return CertifiedEngine(problem.backend, gains)
+            return engines.CertifiedEngine(problem.backend, gains)
 
 
 def _constant(problem: Problem, plan: Plan) -> Trajectory:
+    from gauss.simulation.constant_motion import constant
+
     return constant(problem)
 
 
 def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
-    run = (CompiledFixedRun if isinstance(problem.method, FixedStep) else CompiledAdaptiveRun)(problem)
+    run = _compiled_run(problem)
     run.run()
     return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
+
+
+def _compiled_run(problem: Problem) -> CompiledRun:
+    if isinstance(problem.method, FixedStep):
+        from gauss.simulation.compiled_fixed_run import CompiledFixedRun
+
+        return CompiledFixedRun(problem)
+    from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+
+    return CompiledAdaptiveRun(problem)
 
 
 def _fallback(problem: Problem, plan: Plan) -> Trajectory:
@@ -71,31 +74,46 @@ def _python_loop(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _stepped(p: Problem, dynamics: str) -> Trajectory:
+    from gauss.simulation.python_run import PythonRun
+
     run = PythonRun(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.projects, p.switching)
     return run.collect(p.start, p.samples, p.progress)
 
 
 def _events(problem: Problem, plan: Plan) -> Trajectory:
+    from gauss.simulation.phases.event_driven_run import EventDrivenRun
+
     return EventDrivenRun(problem).collect(problem.start, problem.samples, problem.progress)
 
 
 def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
     if plan.dynamics == "compiled":
+        from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
+
         return CompiledMoreauRun(problem, smooth_question(problem.question).laws).collect()
+    from gauss.simulation.moreau.moreau_jean import MoreauRun
+
     run = MoreauRun(problem.system, problem.backend, problem.step, problem.end, problem.switching)
     return run.collect(problem.start, problem.samples, problem.progress)
 
 
 def _library(problem: Problem, plan: Plan) -> Trajectory:
+    from gauss.dynamics.engines.compiled import projected
+    from gauss.simulation.library_run import certified_rates, compiled_rates, library_run, projection_kernel, rates_kernel
+    from gauss.simulation.residual_run import ResidualEquations
+
     p, method = problem, problem.method
     if plan.dynamics == "compiled":
         if isinstance(method, Library) and method.implicit:
             method = _cached(p, ResidualEquations).by(method)
-        rates, projected = _cached(p, compiled_rates), _cached(p, compiled_projection)
+        rates, kernel = compiled_rates(p.system, _cached(p, rates_kernel)), None
+        if p.drift.projects and p.system.closes:
+            kernel = _cached(p, projection_kernel)
+        project_state = lambda state: state if kernel is None else projected(p.system, kernel, state)  # noqa: E731
     else:
         rates = certified_rates(p.system, engine(plan.dynamics, p))
-        projected = lambda state: project(p.system, state) if p.drift.projects else state  # noqa: E731
-    return library_run(p._replace(method=method), rates, projected)
+        project_state = lambda state: project(p.system, state) if p.drift.projects else state  # noqa: E731
+    return library_run(p._replace(method=method), rates, project_state)
 
 
 DRIVERS: dict[str, Callable[[Problem, Plan], Trajectory]] = {
@@ -111,4 +129,4 @@ DRIVERS: dict[str, Callable[[Problem, Plan], Trajectory]] = {
 def _cached(problem: Problem, make: Callable[[Program], T]) -> T:
     """Machine code of a problem's program, cached with the system."""
     system, laws, drift = problem.system, problem.laws, problem.drift
-    return system.dynamics.on_demand((make, drift, laws.key), lambda: make(Program(system, laws, drift)))
+    return cached_on_disk(system, (make, drift, laws.key), lambda: make(Program(system, laws, drift)))

@@ -17,6 +17,7 @@ from gauss.codegen import trace
 from gauss.codegen.kernels import initial_energy_record, updated_energy_record
 from gauss.dynamics.energies import look_at_energies
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.store import cached_on_disk
 from gauss.errors import BalanceWarning, require, user_level
 from gauss.simulation.advice import advice
 from gauss.simulation.trajectory import MANY, EnergyRecord, Trajectory
@@ -227,7 +228,8 @@ def _imbalance_by_samples(trajectory: Trajectory, start: State, record: EnergyRe
 
 def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
     """Start, and ``count`` samples spread over the motion."""
-    rows = np.unique(np.linspace(0, max(len(trajectory) - 1, 0), count).round().astype(int))[: len(trajectory)]
+    places = np.linspace(0, max(len(trajectory) - 1, 0), count).round().astype(int)
+    rows = sorted(set(places.tolist()))[: len(trajectory)]
     columns = {name: getattr(trajectory, name)[rows] for name in ("t", "q", "v", "work")}
     if not len(rows) or columns["t"][0] != start.t:
         first = {"t": start.t, "q": start.q, "v": start.v, "work": np.zeros(trajectory.work.shape[1])}
@@ -251,7 +253,7 @@ def _energies(trajectory: Trajectory) -> np.ndarray:
         seen = system.dynamics.on_demand((_energies,), lambda: [0])
         seen[0] += len(trajectory)
         if seen[0] >= MANY:
-            kernel = system.dynamics.on_demand((_kernel,), lambda: _kernel(system))
+            kernel = cached_on_disk(system, (_kernel,), lambda: _kernel(system))
             return kernel(np.concatenate([trajectory.t[None], trajectory.q.T, trajectory.v.T, work.T])).T
     states = (trajectory.state(k) for k in range(len(trajectory)))
     return np.array([look_at_energies(kinematics(system, s), own) for s, own in zip(states, work, strict=True)])

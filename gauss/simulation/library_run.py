@@ -9,7 +9,6 @@ import numpy as np
 from gauss.codegen import Kernel, write
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
-from gauss.dynamics.engines.compiled import projected
 from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.traced_system import Program
@@ -21,15 +20,24 @@ from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
 
 
-def compiled_rates(program: Program) -> Callable:
-    """Machine code of (t, y) → y'."""
+def rates_kernel(program: Program) -> Kernel:
+    """Machine code of (t, q, v) → (q̇, q̈, power of the loads)."""
     system, n_q, n_v = program.system, program.system.n_q, program.system.n_v
 
     def rates(t, q, v):
-        acceleration, power = np.split(program.rates(t, q, v), [n_v])
-        return coordinate_rates(system, q, v), acceleration, power
+        return coordinate_rates(system, q, v), *program.evaluate(State(t[0], q, v))
 
-    kernel = Kernel(write(rates, 1, n_q, n_v, name="library_rates"), batch=False)
+    return Kernel(write(rates, 1, n_q, n_v, name="library_rates"), batch=False)
+
+
+def projection_kernel(program: Program) -> Kernel:
+    """Machine code of the projection onto the constraints."""
+    return Kernel(program.projected_rates, batch=False)
+
+
+def compiled_rates(system: System, kernel: Kernel) -> Callable:
+    """(t, y) → y' by machine code."""
+    n_q, n_v = system.n_q, system.n_v
 
     def derivative(t: float, y: np.ndarray) -> np.ndarray:
         return kernel(np.concatenate([[t], _unit(system, y[:n_q]), y[n_q : n_q + n_v]]))
@@ -46,12 +54,6 @@ def certified_rates(system: System, engine: Engine) -> Callable:
         return np.concatenate([coordinate_rates(system, state.q, state.v), *engine.rates(system, state)])
 
     return derivative
-
-
-def compiled_projection(program: Program) -> Callable[[State], State]:
-    """Machine code of the projection onto the constraints."""
-    kernel = Kernel(program.projected_rates, batch=False) if program.projects else None
-    return lambda state: state if kernel is None else projected(program.system, kernel, state)
 
 
 def library_run(problem: Problem, derivative: Callable, project_state: Callable[[State], State]) -> Trajectory:

@@ -26,7 +26,6 @@ from gauss.integrators import (
     first_step,
 )
 from gauss.simulation.grid import grid_of
-from gauss.simulation.opaque_laws import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.progress import Progress
 from gauss.simulation.step_limits import (
@@ -39,6 +38,7 @@ from gauss.simulation.step_limits import (
     too_small,
 )
 from gauss.simulation.trajectory import Event, Stats, Trajectory
+from gauss.simulation.undetected_switching import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
 from gauss.system import State, System
 
 SLIDING_PROGRESS = 1e-3  # relative to the duration, per PROGRESS_TRIALS, below which a sliding motion is refused

@@ -1,19 +1,20 @@
 """Invalid combinations of scene, integrator and stabilisation, each with a remedy."""
 
+from gauss import integrators
 from gauss.dynamics.plan import is_time_stepping
 from gauss.errors import SimulationError
-from gauss.integrators import EXPLICIT, Library, RadauIIA
+from gauss.integrators import Library
 from gauss.simulation.problem import Problem
 
 
 def refuse(problem: Problem):
     """Raise a SimulationError if the method does not apply to the scene, or not with its stabilisation."""
     system, method, stabilisation = problem.system, problem.method, problem.stabilisation
-    if stabilisation == "ggl" and not isinstance(method, RadauIIA):
+    if stabilisation == "ggl" and not isinstance(method, integrators.RadauIIA):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
     if problem.drift.partitioned and (isinstance(method, Library) or method.mechanical):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
-    nonsmooth, time_stepping = system.scene.changing, is_time_stepping(problem.question)
+    nonsmooth, time_stepping = system.scene.nonsmooth, is_time_stepping(problem.question)
     if stabilisation != "projection" and (nonsmooth or time_stepping):
         raise SimulationError(
             f"stabilisation {stabilisation!r}: motions with unilateral constraints, friction, limited forces or time "
@@ -27,7 +28,7 @@ def refuse(problem: Problem):
 
 def _refuse_links(problem: Problem):
     system = problem.system
-    links = [name for name, grip in system.scene.grips.items() if callable(getattr(grip, "limit", callable))]
+    links = [name for name, element in system.scene.set_valued.items() if callable(getattr(element, "limit", callable))]
     if links or system.losses:
         raise SimulationError(
             "integrator 'time_stepping' takes no clutches, freewheels and losses, and no limit that is a function of "
@@ -43,8 +44,8 @@ def _refuse_friction(problem: Problem):
             f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
             f"{', '.join(rough)}."
         )
-    if method.name not in [explicit.name for explicit in EXPLICIT]:  # dense output of others costs a step each
+    if method.name not in [explicit.name for explicit in integrators.EXPLICIT]:  # dense output of others costs a step each
         raise SimulationError(
             f"integrator {method.name!r} does not locate the events of unilateral constraints, friction and limited "
-            f"forces; use 'dop853' for {', '.join(system.scene.changing)}."
+            f"forces; use 'dop853' for {', '.join(system.scene.nonsmooth)}."
         )

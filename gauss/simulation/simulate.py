@@ -5,15 +5,18 @@ from functools import partial
 
 import numpy as np
 
+from gauss.arguments import named_arguments
 from gauss.backends import Backend
+from gauss.codegen import gc_pause, one_tier
+from gauss.codegen.tiers import AUTO, Run
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Baumgarte
-from gauss.errors import SimulationError, judged_later, named_arguments, require
+from gauss.errors import SimulationError, judged_later, require
 from gauss.integrators import Integrator
 from gauss.scene import Scene
-from gauss.simulation.arguments import INTEGRATORS, checked_problem, described
+from gauss.simulation.arguments import checked_problem, described
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.energy_balance import watch_balance
 from gauss.simulation.history import History
@@ -23,8 +26,6 @@ from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.simulation.verify import verified
 from gauss.system import State, System
-
-__all__ = ["INTEGRATORS", "simulate"]
 
 
 @named_arguments
@@ -96,10 +97,11 @@ def simulate(
     verify : bool
         Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool
-        Show a progress bar on runs of more than a second, in a terminal.
+        In a terminal, show a progress bar on runs of more than a second, and a line while code is made for as long.
     plan : Plan, optional
         Driver and dynamics to be used, if their conditions hold, instead of the first row of
-        :data:`gauss.dynamics.plan.MOTIONS` whose conditions hold; ``stats.plan`` tells which it was.
+        :data:`gauss.dynamics.plan.MOTIONS` whose conditions hold; ``stats.plan`` tells which it was. Its ``tier`` chooses
+        between quick and optimised machine code.
 
     Returns
     -------
@@ -124,27 +126,33 @@ def simulate(
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """
-    problem = checked_problem(
-        scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
-    )
-    settings = described(problem, duration, integrator, rtol, atol)
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
-    plan = plan_of(problem.question, plan)
-    found, history = None, History(problem.laws)
+    with gc_pause(), one_tier(AUTO if plan is None else plan.tier, progress) as run:
+        problem = checked_problem(
+            scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
+        )
+        history = History(problem.laws)
+        settings = described(problem, duration, integrator, rtol, atol)
+        found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
+    watch_balance(found, problem.start)
+    warn_of_switching(found, problem.method)
+    history.warn(found)
+    return found
+
+
+def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: Run) -> Trajectory:
+    """Trajectory with its settings and its plan; an error carries the motion so far."""
+    found = None
     try:
         found = _motion(problem, plan)
         found = verified(found, problem, partial(_again, problem, plan)) if verify else found
     except (SimulationError, KeyboardInterrupt) as error:
         reached = found if found is not None else getattr(error, "trajectory", None)
-        recorded = None if reached is None else _recorded(reached, settings, plan)
+        recorded = None if reached is None else _recorded(reached, settings, plan.ran(run.ran))
         error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
         raise
-    found = _recorded(found, settings, plan)
-    watch_balance(found, problem.start)
-    warn_of_switching(found, problem.method)
-    history.warn(found)
-    return found
+    return _recorded(found, settings, plan.ran(run.ran))
 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:

@@ -73,7 +73,7 @@ class Event:
     kind : str
         "impact": a gap closes with a velocity, or a prescribed velocity jumps; "opens" or "closes" without impact; "slips"
         or "holds" of joint friction and limited drives; "power reversal", "starts", "stuck" of links with losses;
-        "contact" or "separate" of flanks.
+        "contact" or "separate" of backlash sides.
     gaps : tuple of str
         Names of the gaps or elements, and of drives and constraints whose velocity jumps.
     loss : float

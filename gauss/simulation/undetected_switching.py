@@ -1,14 +1,55 @@
-"""Warnings of switching events that may be undetected: with fixed steps, other libraries, and opaque laws."""
+"""Switching that no event locates: where opaque laws switch within a step, and warnings where switching may be undetected.
+
+The defect y' − f(t, y) of the dense output of an accepted step is small wherever the equations of motion are smooth
+(Enright, *A new error-control for initial value solvers*, Appl. Math. Comput. 31, 1989): a large one shows that an opaque
+law has switched within the step.
+"""
 
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 
 from gauss.dynamics.laws.switching_times import Timetable
 from gauss.errors import SwitchingWarning, user_level
-from gauss.integrators import FixedStep, Integrator, Library
+from gauss.integrators import FixedStep, Integrator, Library, Rates
 from gauss.simulation.trajectory import Trajectory
-from gauss.system import System
+from gauss.system import State, System
+
+PLACES = (0.187, 0.431, 0.569, 0.813)  # of the samples, relative to the step
+INCREMENT = 1e-4  # of the differences for y', relative to the step
+LARGEST_DEFECT = 1e5  # over the tolerance
+REJECTED_SHARE = 0.5  # of a step with a larger defect that is tried next
+RESOLVED_STEP = 1e-6  # relative to the duration: the defect of shorter steps is not sampled
+SPARSE_STEP = 0.01  # relative to the duration: longer steps with opaque laws may miss short features
+
+
+def defect_is_large(
+    evaluate: Callable[[State], Rates],
+    dense: Callable[[float], tuple[State, np.ndarray]],
+    begin: float,
+    h: float,
+    allowed: np.ndarray,
+) -> bool:
+    """Whether the defect of v' at a place in a step exceeds :data:`LARGEST_DEFECT` times the tolerance.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Rates of a state.
+    dense : callable
+        Dense output of the step: t → (state, work).
+    begin, h : float
+        Begin and length of the step [s].
+    allowed : ndarray, shape (n_v,)
+        Tolerance of the rates.
+    """
+    for place in PLACES:
+        before, at, after = (dense(begin + (place + shift) * h)[0] for shift in (-INCREMENT, 0.0, INCREMENT))
+        defect = (after.v - before.v) / (after.t - before.t) - evaluate(at).acceleration
+        if (h * np.abs(defect) > LARGEST_DEFECT * allowed).any():
+            return True
+    return False
 
 
 def warn_of_switching(trajectory: Trajectory, method: Integrator):
@@ -60,7 +101,7 @@ def warn_of_times(system: System, times: Timetable):
     SwitchingWarning
         With the scene, and the number of features.
     """
-    for text in times.lacks:
+    for text in times.limitations:
         warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
 
 

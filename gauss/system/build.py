@@ -46,8 +46,8 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     )
     system = _with_relations(system)
     _check_inertia(system)
-    if scene.grips:
-        system = replace(system, grips=place_relations(system, scene.grips.values()))
+    if scene.set_valued:
+        system = replace(system, set_valued=place_relations(system, scene.set_valued.values()))
     if scene.contacts:
         contacts, sliding = place_relations(system, sides(scene)), place_relations(system, slips(scene))
         system = replace(system, contacts=contacts, slips=sliding)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from gauss.scene import IdealCounterpart, JointAtRest, Place, Relation, Scene, Slipping
+from gauss.scene import FeaturePair, IdealCounterpart, JointAtRest, Relation, Scene, Slipping
 from gauss.system.build import sides
 
 
@@ -17,26 +17,28 @@ class ContactMode:
 
     Parameters
     ----------
-    grips : dict of str to int
+    set_valued : dict of str to int
         Sign of the force of a set-valued element that slips; 0 while it sticks.
-    ways : dict of str to int
+    power_flow : dict of str to int
         Direction of power flow through a non-ideal link, 1 forward, −1 back; 0 without losses.
     trains : dict of str to int
         Direction in which the first joint of a gear train turns, 1 or −1; 0 if its losses stick; :data:`FREE` at rest else.
-    flanks : dict of str to int
+    backlash_sides : dict of str to int
         Backlash side of an elastic link in contact, −1 or 1, or 0.
     """
 
-    grips: dict = field(default_factory=dict)
-    ways: dict = field(default_factory=dict)
+    set_valued: dict = field(default_factory=dict)
+    power_flow: dict = field(default_factory=dict)
     trains: dict = field(default_factory=dict)
-    flanks: dict = field(default_factory=dict)
+    backlash_sides: dict = field(default_factory=dict)
 
     def __hash__(self):
-        return hash(tuple(tuple(part.items()) for part in (self.grips, self.ways, self.trains, self.flanks)))
+        return hash(
+            tuple(tuple(part.items()) for part in (self.set_valued, self.power_flow, self.trains, self.backlash_sides))
+        )
 
     def but(self, **parts) -> "ContactMode":
-        """Copy with some entries changed: grips, ways, trains or flanks by name."""
+        """Copy with some entries changed: set_valued, power_flow, trains or backlash_sides by name."""
         return replace(self, **{key: getattr(self, key) | change for key, change in parts.items()})
 
 
@@ -47,8 +49,8 @@ IDLE_MODE = ContactMode()  # no element sticks or slips
 def phase_scene(
     scene: Scene,
     closed: Iterable[str] = (),
-    told: ContactMode = IDLE_MODE,
-    places: Mapping[str, Place] = MappingProxyType({}),
+    mode: ContactMode = IDLE_MODE,
+    places: Mapping[str, FeaturePair] = MappingProxyType({}),
     cut: bool = False,
 ) -> Scene:
     """Scene in which active unilateral and set-valued elements are constraints or loads, and all others are dropped.
@@ -59,7 +61,7 @@ def phase_scene(
         With unilateral and set-valued elements, non-ideal links, backlash.
     closed : iterable of str
         Names of closed contacts.
-    told : ContactMode
+    mode : ContactMode
         Mode of the others; non-ideal links keep their rows, those of their ideal counterpart.
     places : mapping
         Pair of features of each closed contact whose features might change, by name.
@@ -67,30 +69,33 @@ def phase_scene(
         Drop the rows of non-ideal links with power flow: the caller adds their forces.
     """
     bilateral = _closed_gaps(scene, set(closed), places)
-    bilateral |= {name: scene.grips[name] for name, sign in told.grips.items() if not sign}
+    bilateral |= {name: scene.set_valued[name] for name, sign in mode.set_valued.items() if not sign}
     bilateral |= {
-        f"rest of {joint}": JointAtRest(f"rest of {joint}", joint) for joint, way in told.trains.items() if not way
+        f"rest of {joint}": JointAtRest(f"rest of {joint}", joint) for joint, way in mode.trains.items() if not way
     }
     relations = {
         name: IdealCounterpart(name, relation) if relation.loses else relation
         for name, relation in (scene.relations | bilateral).items()
-        if not (cut and told.ways.get(name))
+        if not (cut and mode.power_flow.get(name))
     }
     loads = {
-        name: replace(load, side=told.flanks[name]) if name in told.flanks else load for name, load in scene.loads.items()
+        name: replace(load, side=mode.backlash_sides[name]) if name in mode.backlash_sides else load
+        for name, load in scene.loads.items()
     }
-    every: dict = {**loads, **_slipping(scene, told)}
-    return replace(scene, relations=relations, contacts={}, grips={}, loads=every)
+    every: dict = {**loads, **_slipping(scene, mode)}
+    return replace(scene, relations=relations, contacts={}, set_valued={}, loads=every)
 
 
-def _closed_gaps(scene: Scene, names: set[str], places: Mapping[str, Place]) -> dict[str, Relation]:
+def _closed_gaps(scene: Scene, names: set[str], places: Mapping[str, FeaturePair]) -> dict[str, Relation]:
     """Bilateral constraints of closed contacts, by name."""
     shut = [side for side in sides(scene) if side.name in names] if names else []
     return {side.name: replace(side, place=places.get(side.name)) for side in shut}
 
 
-def _slipping(scene: Scene, told: ContactMode) -> dict[str, Slipping]:
+def _slipping(scene: Scene, mode: ContactMode) -> dict[str, Slipping]:
     """Loads of the set-valued elements that slip, by name."""
     return {
-        name: Slipping(name, scene.grips[name], sign, told.ways.get(name, 0)) for name, sign in told.grips.items() if sign
+        name: Slipping(name, scene.set_valued[name], sign, mode.power_flow.get(name, 0))
+        for name, sign in mode.set_valued.items()
+        if sign
     }

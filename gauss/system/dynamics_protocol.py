@@ -43,7 +43,7 @@ class Dynamics(Protocol):
     def loop_constraints(self, system: "System") -> Callable:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
 
-    def operations(self, system: "System", parts: tuple[Subsystem, ...]) -> int | None:
+    def operations(self, system: "System", subsystems: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of subsystems; None if these are not traced."""
 
     def plans(self, system: "System") -> dict:

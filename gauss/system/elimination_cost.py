@@ -8,15 +8,15 @@ MOST_WORK = 250_000  # operations: traced in a few seconds
 OPERATIONS_PER_LINK = 30  # for the response of one link to one loop constraint
 
 
-def loop_elimination_work(part) -> int:
+def loop_elimination_work(subsystem) -> int:
     """Operations that eliminating the loop constraints takes, roughly.
 
     A row acts on whole branches, from the ground on, and is coupled with all other rows on these branches; the matrix K
     M⁻¹ Kᵀ is factored by least degree. With short branches, as of a ladder, the work grows with the number of rows; with all
     loops on one long branch, with its cube.
     """
-    groups = _closing_groups(part)
-    sizes = Counter(_branches(part).values())
+    groups = _closing_groups(subsystem)
+    sizes = Counter(_branches(subsystem).values())
     work = sum(rows * OPERATIONS_PER_LINK * sum(sizes[branch] for branch in branches) for rows, branches in groups)
     on: dict[int, set[int]] = {}
     for k, (_, branches) in enumerate(groups):
@@ -33,33 +33,33 @@ def loop_elimination_work(part) -> int:
     return work
 
 
-def _branches(part) -> dict[int, int]:
+def _branches(subsystem) -> dict[int, int]:
     """First body from the ground of the branch of each body."""
     branch: dict[int, int] = {}
-    for edge in part.tree:
+    for edge in subsystem.tree:
         branch[edge.outer] = branch.get(edge.inner, edge.outer)
     return branch
 
 
-def _closing_groups(part) -> list[tuple[int, set[int]]]:
+def _closing_groups(subsystem) -> list[tuple[int, set[int]]]:
     """Number of rows, and branches, of each loop joint, coupling and relation."""
-    branch, redundant = _branches(part), Counter(joint for joint, _ in part.redundant)
-    at = {joint.name: {joint.parent, joint.child} for joint in part.joints}
-    groups = [(6 - part.joints[k].pair.n_v - redundant[k], at[part.joints[k].name]) for k in part.closing]
-    groups += [(1, at[coupling.driven] | at[coupling.driver]) for coupling in part.couplings]
-    for relation in part.relations:
-        bodies = {part.carried[body].body for body in relation.bodies}
+    branch, redundant = _branches(subsystem), Counter(joint for joint, _ in subsystem.redundant)
+    at = {joint.name: {joint.parent, joint.child} for joint in subsystem.joints}
+    groups = [(6 - subsystem.joints[k].pair.n_v - redundant[k], at[subsystem.joints[k].name]) for k in subsystem.loop_joints]
+    groups += [(1, at[coupling.driven] | at[coupling.driver]) for coupling in subsystem.couplings]
+    for relation in subsystem.relations:
+        bodies = {subsystem.carried[body].body for body in relation.bodies}
         groups.append((relation.size, bodies.union(*(at.get(name, set()) for name in relation.joints))))
     return [(rows, {branch[body] for body in bodies if body != GROUND}) for rows, bodies in groups]
 
 
-def meetings(part) -> int:
+def shared_joints(subsystem) -> int:
     """Number of pairs of loops that share a joint of the tree, summed over the joints: blocks of the sum K M⁻¹ Kᵀ."""
-    inner = {edge.outer: edge.inner for edge in part.tree}
+    inner = {edge.outer: edge.inner for edge in subsystem.tree}
     crossed: Counter = Counter()
-    for index in part.closing:
+    for index in subsystem.loop_joints:
         bodies = set()
-        for body in (part.joints[index].parent, part.joints[index].child):
+        for body in (subsystem.joints[index].parent, subsystem.joints[index].child):
             while body != GROUND:
                 bodies.add(body)
                 body = inner[body]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss.codegen.optimiser import OPTIMISER
 from gauss.errors import AssemblyError, GaussError
 
 MOST_REASONS = 5  # number of reasons of a pass that are listed
@@ -16,6 +17,7 @@ def _method(system) -> list[str]:
     lines = []
     for what, plan in system.dynamics.plans(system).items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
+    lines.append(f"  machine code: {OPTIMISER.status()}")
     costs = system.dynamics.called(system)
     return lines + [
         f"  the law of {name!r} is an opaque Python callback, called in every evaluation ({why})"
@@ -57,13 +59,13 @@ def _freedoms(system, counted: str) -> list[str]:
 def _reductions(system) -> list[str]:
     """What each pass found, why, and what it saves."""
     written, *stages = system.reduction
-    counts = _counts(system, written.parts)
+    counts = _counts(system, written.subsystems)
     lines = ["", f"  subsystems in joint coordinates: {_listed(counts)} as written"]
     for stage in stages:
         if not stage.why:
             lines.append(f"    {stage.what}: none here")
             continue
-        before, counts = counts, _counts(system, stage.parts)
+        before, counts = counts, _counts(system, stage.subsystems)
         saved = {unit: _less(before[unit], left) for unit, left in counts.items()}
         more = f", and {len(stage.why) - MOST_REASONS} more" if len(stage.why) > MOST_REASONS else ""
         lines += [f"    {stage.what}: {'; '.join(stage.why[:MOST_REASONS])}{more}", f"      saves {_listed(saved)}"]
@@ -78,11 +80,11 @@ def _listed(counts) -> str:
     return ", ".join(f"{'uncounted' if number is None else number} {unit}" for unit, number in counts.items())
 
 
-def _counts(system, parts) -> dict[str, int | None]:
+def _counts(system, subsystems) -> dict[str, int | None]:
     return {
-        "rows": sum(part.n_rows for part in parts),
-        "coordinates": sum(part.n_coordinates for part in parts),
-        "operations": None if system.dynamics is None else system.dynamics.operations(system, parts),
+        "rows": sum(subsystem.n_rows for subsystem in subsystems),
+        "coordinates": sum(subsystem.n_coordinates for subsystem in subsystems),
+        "operations": None if system.dynamics is None else system.dynamics.operations(system, subsystems),
     }
 
 
@@ -105,7 +107,11 @@ def explain(system) -> str:
         if not loops
         else f"  loop constraints, couplings, relations: {', '.join(loops)}",
         *_one_sided(system),
-        *([f"  set-valued elements: {', '.join(list(system.scene.grips)[:MOST_LISTED])}"] if system.scene.grips else []),
+        *(
+            [f"  set-valued elements: {', '.join(list(system.scene.set_valued)[:MOST_LISTED])}"]
+            if system.scene.set_valued
+            else []
+        ),
         *_method(system),
         *_reductions(system),
         "",

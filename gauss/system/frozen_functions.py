@@ -32,7 +32,7 @@ def refuse_changed(system):
 
 
 def _with_functions(scene: Scene):
-    every = [*scene.relations.values(), *scene.contacts.values(), *scene.grips.values()]
+    every = [*scene.relations.values(), *scene.contacts.values(), *scene.set_valued.values()]
     return [relation for relation in every if any(callable(getattr(relation, field.name)) for field in fields(relation))]
 
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.errors import StateError
-from gauss.scene import Drive, ElasticLink, JointSpring, Pair, Slipping
+from gauss.scene import Drive, ElasticLink, Force, JointSpring, Pair, Slipping, Spring
+
+SceneLoad = Drive | ElasticLink | Force | JointSpring | Slipping | Spring
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class PlacedFrame:
 class BoundLoad:
     """Load with its laws as functions of (t, motion)."""
 
-    load: object
+    load: SceneLoad
     laws: tuple[Callable, ...] = ()
 
     @property

@@ -15,21 +15,21 @@ class Stage(NamedTuple):
         What the pass does.
     why : tuple of str
         Its reasons; empty if it changed nothing.
-    parts : tuple of Subsystem
+    subsystems : tuple of Subsystem
         The subsystems that remain.
     """
 
     what: str
     why: tuple[str, ...]
-    parts: tuple[Subsystem, ...]
+    subsystems: tuple[Subsystem, ...]
 
 
 def reduction(system) -> tuple[Stage, ...]:
     """Stages from the whole system to the subsystems that are integrated, one a pass."""
     stages = [Stage("the scene as it is written", (), (whole(system),))]
     for what, reduce in PASSES.items():
-        smaller = [reduce(part) for part in stages[-1].parts]
-        parts = tuple(part for some, _ in smaller for part in some)
+        smaller = [reduce(subsystem) for subsystem in stages[-1].subsystems]
+        subsystems = tuple(subsystem for some, _ in smaller for subsystem in some)
         why = dict.fromkeys(reason for _, reasons in smaller for reason in reasons)
-        stages.append(Stage(what, tuple(why), parts))
+        stages.append(Stage(what, tuple(why), subsystems))
     return tuple(stages)

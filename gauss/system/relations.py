@@ -19,8 +19,6 @@ from gauss.scene.values import is_scalar
 from gauss.system.named_access import View
 from gauss.system.symbolic_mechanism import Symbols
 
-OPTIMISED_OPERATIONS = 3000  # number of operations that LLVM optimises in half a second; more are compiled without
-
 
 class Rows(NamedTuple):
     """Rows of one relation.
@@ -75,9 +73,7 @@ class Relations:
     @cached_property
     def kernel(self) -> Kernel:
         """Machine code of all rows."""
-        return Kernel(
-            self.function, batch=False, optimise=int(sum(self.function.operations().values()) < OPTIMISED_OPERATIONS)
-        )
+        return Kernel(self.function, batch=False)
 
     @cached_property
     def asks_time(self) -> bool:

@@ -177,7 +177,7 @@ def _turns(system, length, mass, coordinates) -> float:
     for name, start in scene.starts.items():
         joint = system.joint(name)
         found.append(_inverse(np.abs(np.asarray(start.rate) / coordinates[joint.v]).max(initial=0.0)))
-    for part in [*scene.relations.values(), *scene.grips.values()]:
+    for part in [*scene.relations.values(), *scene.set_valued.values()]:
         unit = _unit(system, part, length, coordinates)
         if getattr(part, "speed", None) is not None:
             found.append(_reaches(part.speed, unit, 1))
@@ -199,7 +199,7 @@ def _oscillates(system, length, mass, coordinates) -> float:
 def _pushed(system, length, mass, coordinates) -> float:
     """Time in which the largest force, or without any a damper, moves the whole mass by one unit, or stops it."""
     found, damping = [], 0.0
-    for part in [*system.scene.loads.values(), *system.scene.grips.values()]:
+    for part in [*system.scene.loads.values(), *system.scene.set_valued.values()]:
         unit = _unit(system, part, length, coordinates)
         given = {field.name: getattr(part, field.name) for field in fields(part)}
         for key in ("effort", "force", "limit", "torque"):

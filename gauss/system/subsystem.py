@@ -15,8 +15,9 @@ import numpy as np
 from gauss.backends.structure import GROUND, Edge
 from gauss.errors import StateError
 from gauss.scene import Coupling
-from gauss.system.elimination_cost import loop_elimination_work, meetings
+from gauss.system.elimination_cost import loop_elimination_work, shared_joints
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
+from gauss.versions import FormerAttribute
 
 
 class Train(NamedTuple):
@@ -98,10 +99,12 @@ class Subsystem:
         return max((float(np.abs(p).max()) for joint in self.joints for p in (joint.p_parent, joint.p_child)), default=0.0)
 
     @cached_property
-    def closing(self) -> tuple[int, ...]:
+    def loop_joints(self) -> tuple[int, ...]:
         """Joints outside the tree: they close loops."""
         in_tree = {edge.constraint for edge in self.tree}
         return tuple(i for i in range(len(self.joints)) if i not in in_tree)
+
+    closing = FormerAttribute("loop_joints")
 
     @property
     def n_coordinates(self) -> int:
@@ -116,9 +119,9 @@ class Subsystem:
     @property
     def n_loop_constraints(self) -> int:
         """Number of rows of loop joints, couplings and relations."""
-        loops = sum(6 - self.joints[i].pair.n_v for i in self.closing)
+        loops = sum(6 - self.joints[i].pair.n_v for i in self.loop_joints)
         others = len(self.couplings) + sum(relation.size for relation in self.relations)
-        return loops + others - sum(i in self.closing for i, _ in self.redundant)
+        return loops + others - sum(i in self.loop_joints for i, _ in self.redundant)
 
     @cached_property
     def loop_elimination_work(self) -> int:
@@ -126,9 +129,9 @@ class Subsystem:
         return loop_elimination_work(self)
 
     @cached_property
-    def meetings(self) -> int:
+    def shared_joints(self) -> int:
         """Pairs of loops that share a joint of the tree, summed over the joints."""
-        return meetings(self)
+        return shared_joints(self)
 
     def has(self, name: str) -> bool:
         """Whether it has a joint of this name."""

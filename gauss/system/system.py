@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss.backends.structure import Structure
-from gauss.codegen import Scalar
+from gauss.codegen import IS_CONTENT, Scalar
 from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
@@ -25,6 +25,7 @@ from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
 from gauss.system.subsystem import Subsystem
+from gauss.versions import FormerAttribute
 
 UNIT_QUATERNION = 1e-6  # error of the length of a quaternion typed with 7 digits, which is normalised; more is a mistake
 
@@ -53,7 +54,7 @@ class System:
         Gap functions of unilateral constraints, one row each.
     slips : Relations
         Tangential velocities at contacts with friction, two rows each.
-    grips : Relations
+    set_valued : Relations
         Set-valued elements, one row each.
     written : dict of str to str
         Functions that became rows, as text, see :mod:`gauss.system.frozen_functions`.
@@ -70,9 +71,9 @@ class System:
     relations: Relations = field(repr=False, default=NO_RELATIONS)
     contacts: Relations = field(repr=False, default=NO_RELATIONS)
     slips: Relations = field(repr=False, default=NO_RELATIONS)
-    grips: Relations = field(repr=False, default=NO_RELATIONS)
+    set_valued: Relations = field(repr=False, default=NO_RELATIONS)
     written: dict[str, str] = field(repr=False, default_factory=dict)
-    dynamics: Dynamics | None = field(repr=False, default=None)
+    dynamics: Dynamics | None = field(repr=False, default=None, metadata={IS_CONTENT: False})
 
     def __reduce__(self):
         return rebuilding(self)
@@ -142,9 +143,12 @@ class System:
         return reduction(self)
 
     @property
-    def parts(self) -> tuple[Subsystem, ...]:
+    def subsystems(self) -> tuple[Subsystem, ...]:
         """Reduced subsystems in joint coordinates, which move independently."""
-        return self.reduction[-1].parts
+        return self.reduction[-1].subsystems
+
+    parts = FormerAttribute("subsystems")
+    grips = FormerAttribute("set_valued")
 
     @property
     def is_tree(self) -> bool:
@@ -154,7 +158,7 @@ class System:
     @property
     def closes(self) -> bool:
         """Whether integration can drift off constraints: some subsystem has loops, couplings or relations."""
-        return any(part.closing or part.couplings or part.relations for part in self.parts)
+        return any(subsystem.loop_joints or subsystem.couplings or subsystem.relations for subsystem in self.subsystems)
 
     def joint(self, name: str) -> PlacedJoint:
         """Return the joint of this name.
@@ -246,7 +250,7 @@ class System:
             )
         return array
 
-    def initial_state(self, q=None, v=None, t: float = 0.0, *, keep=None, least_violation: bool = False) -> State:
+    def initial_state(self, q=None, v=None, t: Scalar = 0.0, *, keep=None, least_violation: bool = False) -> State:
         """Consistent state, assembled from a rough guess and moved in the mass metric as little as needed.
 
         Without arguments it is the start of the scene; joints whose start the scene gives keep it, and the others
@@ -299,7 +303,7 @@ class System:
         """
         return self._supplier.consistent(self, self.state(state.q, state.v, state.t))
 
-    def start(self, t: float = 0.0) -> State:
+    def start(self, t: Scalar = 0.0) -> State:
         """State of the starts of the scene, consistent or not."""
         q, v = self.reference.q, self.reference.v
         for joint in self.joints:

@@ -1,16 +1,21 @@
 """Pareto fronts of a comparison: error against time over all problems, and problem by problem."""
 
+from collections.abc import Mapping, Sequence
+from typing import cast
+
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.view.backends import LARGEST_SHOWN, SMALLEST_SHOWN, _saved
+from gauss.view.backends import LARGEST_SHOWN, SMALLEST_SHOWN
+from gauss.view.style import PAGE_DPI, saved
 
+Panel = tuple[Mapping[str, Sequence[float]], list[str]]  # times and errors by solver, and the names of those on the front
 MARKERS = "osD^v<>PX*"
 COLUMNS = 5
 ZERO = SMALLEST_SHOWN / 30.0  # where errors of exactly zero are drawn, below a line and with a tick of their own
 
 
-def plot_fronts(names, overall: tuple, panels: dict[str, tuple], path=None, title: str = "") -> Figure:
+def plot_fronts(names, overall: Panel, panels: Mapping[str, Panel], path=None, title: str = "") -> Figure:
     """One large panel over all problems, and a small one for each.
 
     Parameters
@@ -28,7 +33,7 @@ def plot_fronts(names, overall: tuple, panels: dict[str, tuple], path=None, titl
     """
     rows = -(-len(panels) // COLUMNS)
     figure = Figure(figsize=(13, 5.0 + 2.3 * rows), layout="constrained")
-    upper, lower = figure.subfigures(2, 1, height_ratios=(5.0, max(2.3 * rows, 0.1)))
+    upper, lower = cast(np.ndarray, figure.subfigures(2, 1, height_ratios=(5.0, max(2.3 * rows, 0.1))))
     styles = {name: {"color": f"C{k % 10}", "marker": MARKERS[k // 10 + k % 3]} for k, name in enumerate(names)}
     axes = upper.subplots()
     _panel(axes, *overall, styles, size=60)
@@ -45,10 +50,10 @@ def plot_fronts(names, overall: tuple, panels: dict[str, tuple], path=None, titl
         for small in grid.flat[len(panels) :]:
             small.set_visible(False)
     figure.suptitle(f"{title}; lines: Pareto fronts", fontsize=10)
-    return _saved(figure, path)
+    return saved(figure, path, PAGE_DPI)
 
 
-def _panel(axes, points: dict[str, tuple[float, float]], best: list[str], styles: dict[str, dict], size: float):
+def _panel(axes, points: Mapping[str, Sequence[float]], best: list[str], styles: dict[str, dict], size: float):
     heights = {name: height(error) for name, (_, error) in points.items()}
     if best:
         x = [points[name][0] for name in best]

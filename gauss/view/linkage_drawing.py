@@ -1,5 +1,7 @@
 """A linkage drawn in the plane: links, pins, sliders on their guides, and the ground."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
@@ -128,7 +130,7 @@ class Drawing:
     def _link(self, name: str, index: int, alpha: float) -> list:
         moving = self.found.link(name)
         corners = np.array([_at(moving.point(c), index) for c in self.corners[name]])
-        style = {"color": self.colours[name], "alpha": alpha, "zorder": 3}
+        style: dict[str, Any] = {"color": self.colours[name], "alpha": alpha, "zorder": 3}
         artists = []
         if corners.size > 2 and _area(corners) > 1e-4 * self.size**2:
             corners = corners[np.argsort(np.angle(corners - corners.mean()))]
@@ -142,9 +144,9 @@ class Drawing:
             artists += self.axes.plot(x.real, x.imag, linewidth=6.0, solid_capstyle="round", **pale)
         for joint in self.found.chain.joints:
             if joint.kind == "prismatic" and joint.child == name:
-                x, u = _at(moving.point(joint.point(name)), index), joint.direction(name) * _at(moving.e, index)
+                at, u = _at(moving.point(joint.point(name)), index), joint.direction(name) * _at(moving.e, index)
                 half = np.array([1, -1, -1, 1]) * SLIDER[0] + 1j * np.array([1, 1, -1, -1]) * SLIDER[1]
-                box = x + self.size * u * half / 1.2
+                box = at + self.size * u * half / 1.2
                 artists.append(self.axes.add_patch(Polygon(_columns(box), **(style | {"alpha": 0.8 * alpha}))))
         return artists
 

@@ -15,7 +15,7 @@ from gauss.view.style import check_format, saved
 
 POSITIONS = 4  # of the mechanism in the figure
 FRAMES = 90  # pictures of an animation, at most
-MOVIES = {".gif": PillowWriter, ".mp4": FFMpegWriter}
+MOVIES: dict[str, type[PillowWriter] | type[FFMpegWriter]] = {".gif": PillowWriter, ".mp4": FFMpegWriter}
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)), (0, (8, 2)))  # curves differ in grey, too
 
 

@@ -47,12 +47,14 @@ def plot_precision(panels, path=None, title: str = "", note: str = "", uncertain
         _panel(place, name, found, looks, (uncertainties or {}).get(name, 0.0), _decades(panels))
     for place in list(axes.flat)[len(panels) :]:
         place.set_axis_off()
-    handles = {}
+    handles: dict = {}
     for place in axes.flat:
         for handle, label in zip(*place.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     columns = min(6, 2 + columns)
-    figure.legend(handles.values(), handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
+    figure.legend(
+        list(handles.values()), list(handles), loc="outside lower center", ncols=columns, fontsize=8, frameon=False
+    )
     figure.suptitle("\n".join(filter(None, (title, note))), fontsize=10)
     for one in [] if path is None else [path] if isinstance(path, str | Path) else path:
         with rc_context({"svg.fonttype": "none"}):  # letters as letters, not as thousands of outlines

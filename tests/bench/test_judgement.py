@@ -13,8 +13,9 @@ from gauss.backends.programme import FORMS, Outcome
 from gauss.bench.class_page import sentence
 from gauss.bench.clocks import FEWEST, ROUNDS, timed
 from gauss.bench.export import export
+from gauss.bench.folders import of_folder
 from gauss.bench.fronts import FrontPoint, front, fronts
-from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_folder, of_problem, of_selection
+from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_problem, of_selection
 from gauss.bench.levels import LIMIT
 from gauss.bench.measure import measure
 from gauss.bench.problems import INCONSISTENT, make_problem
@@ -187,7 +188,7 @@ def test_files_of_qpsolvers_are_instances(tmp_path):
     assert row["outcome"] == "answered" and np.isnan(row["error"]) and is_right(row)
     with pytest.raises(BackendError, match="take a compulsion"):
         measure(instance, "recursion", FILE, "own")
-    with pytest.raises(FileError, match="no .npz or .mat files"):
+    with pytest.raises(FileError, match="no .npz or .mat"):
         list(of_folder(tmp_path / "empty"))
     known = of_arrays("known", "mine", P, q, None, None, np.eye(2), np.array([2.0, 5.0]), x=np.array([2.0, -1.0]))
     assert is_right(measure(known, "daqp", FILE, "high"))
@@ -242,6 +243,7 @@ SMALLEST_OF = {  # a small problem of each class, few of whose multipliers are u
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), SMALLEST_OF.items())
 def test_errors_of_x_and_of_multipliers_are_those_that_were_put_in(kind, name):
     """Modulo loose directions, and in any units: those of a solver are small, of shifted ones as large as the shift."""
@@ -320,8 +322,8 @@ def test_verdicts_in_the_words_of_solvers(words, verdict):
 
 
 @pytest.mark.slow
-def test_every_class_without_cones_is_asked_and_sequences_start_at_the_step_before():
-    assert set(SUITE) == {*SMALLEST_OF, "infeasible", "unbounded", "sequences", "large"}
+def test_every_class_is_asked_and_sequences_start_at_the_step_before():
+    assert set(SUITE) == {*SMALLEST_OF, "infeasible", "unbounded", "sequences", "large", "cones", "coulomb"}
     first, second = of_suite("sequences", ["sequence falling chain 00", "sequence falling chain 01"])
     assert first.start is None and second.start == pytest.approx(first.known.x, rel=1e-15)
     row = measure(second, "osqp", FILE, "high")

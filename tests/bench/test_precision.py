@@ -40,7 +40,7 @@ def test_reference_is_as_good_as_it_says():
 
 @pytest.mark.parametrize("method", ["dop853", "rk4"])
 def test_finer_settings_are_more_exact(method):
-    found = list(attempts(_pendulum(), DURATION, methods=[method], patience=0.3))
+    found = list(attempts(_pendulum(), DURATION, methods=[method], time_limit=0.3))
     assert [one.setting for one in found] == sorted((one.setting for one in found), reverse=True)
     assert found[0].error > 1e3 * min(one.error for one in found)
     assert min(one.error for one in found) <= DIGITS

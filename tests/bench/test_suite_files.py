@@ -155,8 +155,8 @@ def test_the_checksum_of_the_data_is_that_of_what_every_format_holds(few, tmp_pa
     readers = {"npz": read_npz, "qps": read_qps}
     for kind, reader in readers.items():
         *paths, manifest = export_suite(plain, tmp_path / kind, kind)
-        told = [entry["data"] for entry in json.loads(manifest.read_text())["instances"]]
-        assert told == [fingerprint(reader(path)) for path in paths] == [fingerprint(instance) for instance in plain]
+        mode = [entry["data"] for entry in json.loads(manifest.read_text())["instances"]]
+        assert mode == [fingerprint(reader(path)) for path in paths] == [fingerprint(instance) for instance in plain]
     assert len({fingerprint(instance) for instance in few}) == len(few)
 
 

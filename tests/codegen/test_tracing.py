@@ -19,6 +19,7 @@ from gauss.codegen import (
     jacobian,
     machine,
     object_cache,
+    object_code,
     reverse,
     substitute,
     trace,
@@ -133,6 +134,7 @@ def test_folding():
     assert count(R @ np.eye(3)) == {"sin": 1, "cos": 1, "neg": 1}
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from("+-*/"), st.floats(0.5, 2.0), st.booleans()), min_size=1, max_size=30))
 def test_random_formulas(steps):
     def formula(x):
@@ -247,9 +249,9 @@ def test_code_is_kept_by_graph_processor_and_version(tmp_path, monkeypatch):
 
     assert [kept(), kept(), kept(3.5)] == [1, 1, 2]
     with monkeypatch.context() as other:
-        other.setattr(machine.llvm, "get_host_cpu_name", lambda: "generic")
+        other.setattr(object_code.llvm, "get_host_cpu_name", lambda: "generic")
         assert kept() == 3
-    monkeypatch.setattr(machine.llvmlite, "__version__", "another")
+    monkeypatch.setattr(object_code.llvmlite, "__version__", "another")
     assert kept() == 4
 
 

@@ -1,4 +1,4 @@
-"""Forces of contacts and grips over a step: every law is met on random problems, with more contacts than freedoms, too."""
+"""Forces of contacts and set-valued elements over a step meet every law, with more contacts than freedoms, too."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,9 @@ from gauss.dynamics.contact.contact_step import ACCEPTED_LAW_ERROR, CONVEX_ERROR
 FREEDOMS = 6
 
 
-def _problem(rng, smooth, rough, grips):
-    """Random contacts and grips of a body of six freedoms with random inertia, which a motion can satisfy."""
-    m, n = smooth + rough, smooth + 3 * rough + grips
+def _problem(rng, smooth, rough, set_valued):
+    """Random contacts and set-valued elements of a body of six freedoms with random inertia, which a motion can satisfy."""
+    m, n = smooth + rough, smooth + 3 * rough + set_valued
     J = rng.standard_normal((n, FREEDOMS))
     root = rng.standard_normal((FREEDOMS, FREEDOMS))
     W = 0.1 * J @ np.linalg.inv(root @ root.T + np.eye(FREEDOMS)) @ J.T
@@ -19,8 +19,8 @@ def _problem(rng, smooth, rough, grips):
         across=np.arange(m, m + 2 * rough).reshape(rough, 2),
         under=np.arange(smooth, m),
         friction=rng.uniform(0.05, 0.6, rough),
-        grip=np.arange(m + 2 * rough, n),
-        limit=rng.uniform(0.1, 2.0, grips),
+        set_valued=np.arange(m + 2 * rough, n),
+        limit=rng.uniform(0.1, 2.0, set_valued),
     )
     return ContactProblem(0.5 * (W + W.T), J @ rng.standard_normal(FREEDOMS), laws)
 
@@ -28,11 +28,11 @@ def _problem(rng, smooth, rough, grips):
 CASES = [(4, 0, 0), (8, 0, 0), (0, 1, 0), (0, 2, 0), (0, 4, 0), (2, 2, 2), (0, 0, 4), (0, 3, 3)]
 
 
-@pytest.mark.parametrize(("smooth", "rough", "grips"), CASES)
-def test_forces_obey_their_laws(smooth, rough, grips):
+@pytest.mark.parametrize(("smooth", "rough", "set_valued"), CASES)
+def test_forces_obey_their_laws(smooth, rough, set_valued):
     rng, settled = np.random.default_rng(0), 0
     for _ in range(40):
-        problem = _problem(rng, smooth, rough, grips)
+        problem = _problem(rng, smooth, rough, set_valued)
         laws, tolerance = problem.laws, ACCEPTED_LAW_ERROR * (1.0 + np.abs(problem.b).max())
         f, error = problem.solve(np.zeros(problem.b.size))
         u, w = problem.W @ f + problem.b, problem.sizes
@@ -49,7 +49,7 @@ def test_forces_obey_their_laws(smooth, rough, grips):
             assert size <= bound + off
             if speed > 1e3 * tolerance:  # it slides: all of the friction, against the sliding
                 assert f[t] == pytest.approx(-bound * u[t] / speed, abs=1e3 * off)
-        for g, limit in zip(laws.grip, laws.limit, strict=True):
+        for g, limit in zip(laws.set_valued, laws.limit, strict=True):
             assert abs(f[g]) <= limit + tolerance / w[g]
             if abs(u[g]) > tolerance:
                 assert f[g] == pytest.approx(-np.sign(u[g]) * limit, abs=tolerance / w[g])

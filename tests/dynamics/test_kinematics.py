@@ -86,13 +86,16 @@ def test_a_clutch_whose_torque_asks_where_bodies_are_slips_with_that_torque():
     angle = 0.6
     system = gauss.compile_scene(scene)
     trajectory = gauss.simulate(system, 0.05, state=system.state([angle, 0.0], [3.0, 0.0]), times=[0.0], progress=False)
-    force = gauss.grip_forces(trajectory, "C")
+    force = gauss.set_valued_forces(trajectory, "C")
     np.testing.assert_allclose(abs(force[0]), 2.0 + np.cos(angle), rtol=1e-12)
 
 
 def test_the_former_name_is_the_same_and_says_so():
     with pytest.warns(DeprecationWarning, match="Kinematics"):
         assert gauss.Motion is gauss.Kinematics
+    scene = gauss.load("four_bar")
+    with pytest.warns(DeprecationWarning, match=r"Scene.grips is called Scene.set_valued now"):
+        assert scene.grips is scene.set_valued
 
 
 def test_a_state_of_another_system_is_refused():

@@ -104,19 +104,20 @@ def test_a_motion_tells_its_plan(name, plans):
     assert bool(plan.fallback) == (dynamics not in ("none", "certified") and driver != "library")
 
 
+@pytest.mark.slow
 def test_every_rule_of_the_table_is_taken_by_some_case(plans):
     taken = {(plan.driver, plan.dynamics, plan.fallback) for plan in plans.values()}
     assert taken == {(rule.driver, rule.dynamics, rule.fallback) for rule in MOTIONS.rules}
 
 
 def test_what_was_rejected_names_what_speaks_against_it(plans):
-    told = {
+    mode = {
         "an opaque law": "drive of J1",
         "a law that asks": "drive of J1",
         "a backend": "kkt",
         "a large tree": str(LARGE_TREE_BODIES),
     }
-    for name, word in told.items():
+    for name, word in mode.items():
         assert all(any(word in why for why in found.why) for found in plans[name].rejected), name
 
 

@@ -16,7 +16,7 @@ TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 HELD = 1e-20  # m, m/s: rounding of forces that balance, over the mass and for a tenth of a second
 EXACT = 1e-9  # a motion at rtol 1e-10 against its closed form
 ROUNDING = 1e-14
-RELEASE = 1e-8  # s: a grip lets go when its force exceeds the limit by 1e-9
+RELEASE = 1e-8  # s: an element lets go when its force exceeds the limit by 1e-9
 
 
 @pytest.mark.slow
@@ -33,7 +33,7 @@ def test_every_half_swing_is_shorter_by_the_same_until_friction_holds():
     found = gauss.energy(trajectory)
     assert np.abs(found.balance).max() < EXACT
     assert found.dissipated[-1] == pytest.approx(50.0 * (0.21**2 - turns[-1] ** 2), abs=EXACT)
-    force = gauss.grip_forces(trajectory, "friction of rail")
+    force = gauss.set_valued_forces(trajectory, "friction of rail")
     assert force[0] == 2.0  # against the motion that begins
     assert force[-1] == pytest.approx(100.0 * trajectory.q[-1, 0], abs=EXACT)  # no more than it takes
 
@@ -48,7 +48,7 @@ def test_a_joint_sticks_up_to_its_limit(push):
     sticks = abs(push) < 2.0
     expected = 0.0 if sticks else 1e-5 * (1 - np.cos(1.0))
     assert np.abs(trajectory.q).max() == pytest.approx(expected, rel=1e-6, abs=HELD)
-    force = gauss.grip_forces(trajectory, "friction of rail")
+    force = gauss.set_valued_forces(trajectory, "friction of rail")
     assert force == pytest.approx(-push if sticks else -2.0 * np.sign(push), abs=EXACT)
 
 
@@ -100,18 +100,18 @@ def test_what_holds_minimises_the_compulsion_with_friction(seed):
         scene.start(joint, position=float(rng.uniform(-2, 2)))
     system = gauss.compile_scene(scene)
     state = system.initial_state()
-    holding = mode_selector(system).choose(state, np.zeros(0, dtype=int), "auto")
-    limits = np.array([grip.limit for grip in scene.grips.values()])
+    selected = mode_selector(system).choose(state, np.zeros(0, dtype=int), "auto")
+    limits = np.array([element.limit for element in scene.set_valued.values()])
 
     costs = {}
     for case in product((-1, 0, 1), repeat=3):
-        told = phase_scene(scene, (), ContactMode(grips=dict(zip(scene.grips, case, strict=True))))
-        bare = gauss.compile_scene(told)
+        mode = phase_scene(scene, (), ContactMode(set_valued=dict(zip(scene.set_valued, case, strict=True))))
+        bare = gauss.compile_scene(mode)
         found = gauss.solve(gauss.assemble(bare, bare.initial_state()))
         deviation = found.a - found.compulsion.a_free
         costs[case] = 0.5 * deviation @ (system.Phi * deviation) + limits @ np.abs(found.qdd)
-    assert tuple(holding.told.grips.values()) == min(costs, key=costs.get)
-    assert (np.abs(list(holding.forces.values())) <= limits * (1 + 1e-12)).all()
+    assert tuple(selected.mode.set_valued.values()) == min(costs, key=costs.get)
+    assert (np.abs(list(selected.forces.values())) <= limits * (1 + 1e-12)).all()
 
 
 @pytest.mark.slow
@@ -160,7 +160,7 @@ def test_friction_in_every_joint_of_a_loop_holds_though_its_shares_are_open():
     trajectory = gauss.simulate(scene, 0.2)
     assert np.abs(trajectory.v).max() < 1e-12
     for joint in scene.joints:
-        assert np.abs(gauss.grip_forces(trajectory, f"friction of {joint}")).max() <= 40.0
+        assert np.abs(gauss.set_valued_forces(trajectory, f"friction of {joint}")).max() <= 40.0
     with pytest.warns(NonUniqueReactionWarning):
         gauss.reactions(trajectory, next(iter(scene.joints)))
 
@@ -188,7 +188,7 @@ def test_time_stepping_takes_joint_friction_and_converges_with_the_step():
     for h in (1e-2, 2e-3):
         motion = gauss.simulate(scene, 1.8, integrator="time_stepping", step=h, progress=False)
         errors.append(abs(motion.q[-1, 0] - exact.q[-1, 0]))
-        force = gauss.grip_forces(motion, "friction of rail")
+        force = gauss.set_valued_forces(motion, "friction of rail")
         assert np.abs(force).max() <= 2.0 + EXACT
         slides = np.abs(motion.v[1:, 0]) > 1e-6
         assert force[:-1][slides] == pytest.approx(-2.0 * np.sign(motion.v[1:, 0][slides]), abs=EXACT)
@@ -202,7 +202,7 @@ def test_time_stepping_sticks_exactly_and_bears_what_it_takes():
     scene.drive("rail", force=1.9)
     motion = gauss.simulate(scene, 0.5, integrator="time_stepping", step=1e-2)
     assert np.abs(motion.q).max() < ROUNDING
-    assert gauss.grip_forces(motion, "friction of rail") == pytest.approx(-1.9, abs=EXACT)
+    assert gauss.set_valued_forces(motion, "friction of rail") == pytest.approx(-1.9, abs=EXACT)
 
 
 @pytest.mark.slow
@@ -224,7 +224,7 @@ def test_a_drive_of_limited_force_pulls_a_block_over_rough_ground():
     reached = mass * 1.0 / (4.0 - rub)
     speed = np.minimum(motion.t * (4.0 - rub) / mass, 1.0)
     assert motion.body("sled").velocity[:, 0] == pytest.approx(speed, abs=1e-6)
-    pull = gauss.grip_forces(motion, "tug")
+    pull = gauss.set_valued_forces(motion, "tug")
     assert pull[motion.t < reached - h] == pytest.approx(4.0, abs=1e-6)
     assert pull[-2] == pytest.approx(rub, abs=1e-6)
     assert np.abs(gauss.energy(motion).balance).max() < 1e-6
@@ -239,8 +239,8 @@ MISTAKES = {
         SimulationError,
         "'rk4' does not locate the events.*friction of rail",
     ),
-    "no such grip": (
-        lambda s: gauss.grip_forces(gauss.simulate(s, 0.01), "friction of rial"),
+    "no such element": (
+        lambda s: gauss.set_valued_forces(gauss.simulate(s, 0.01), "friction of rial"),
         StateError,
         "Did you mean 'friction of rail'",
     ),

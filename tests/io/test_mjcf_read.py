@@ -134,6 +134,7 @@ def _turned(joint, model) -> np.ndarray:
     return turn
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("seed", [0, 1])
@@ -162,6 +163,7 @@ def test_trees_accelerate_as_in_mujoco(tmp_path, name, seed):
     assert found[ours] == pytest.approx(data.qacc[theirs], rel=SAME, abs=SAME * abs(data.qacc).max())
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_accelerate_as_in_mujoco(tmp_path, name):
@@ -237,7 +239,7 @@ def test_a_tendon_of_limited_length_is_a_rope(tmp_path):
 
 def test_dry_friction_of_joints_is_read(tmp_path):
     scene = quietly(_file(tmp_path, DRY))
-    assert [grip.limit for grip in scene.grips.values()] == [0.4]
+    assert [element.limit for element in scene.set_valued.values()] == [0.4]
 
 
 def test_names_that_only_mujoco_tells_apart(tmp_path):

@@ -153,7 +153,7 @@ def test_what_resists_is_read(tmp_path):
     scene = _load(tmp_path, ARM.format(a="", b="", frame="", joint="", child="b", axis=axis))
     spring, coupling = scene.loads["spring of B"], scene.couplings["B mimics A"]
     assert (spring.stiffness, spring.damping, spring.rest) == (3.0, 2.0, 0.1)
-    assert scene.joints["B"].limits == (-1.0, 1e16) and scene.grips["friction of B"].limit == 0.2
+    assert scene.joints["B"].limits == (-1.0, 1e16) and scene.set_valued["friction of B"].limit == 0.2
     assert (coupling.ratio, coupling.offset) == pytest.approx((2.0, 0.3))
 
 

@@ -41,7 +41,7 @@ def test_what_moves_the_robot_and_is_left_out_is_named(arm):
     with pytest.warns(NotImportedWarning, match=r"damping and friction of shoulder \(resistance=True"):
         scene = gauss.load(arm)
     assert not scene.loads
-    assert not scene.grips
+    assert not scene.set_valued
     assert not scene.contacts
     assert not scene.shapes
     assert scene.joints["shoulder"].limits is None
@@ -63,10 +63,11 @@ def test_limits_hold_the_start_and_become_stops(arm):
     assert "stop of shoulder.highest" in {gap for event in motion.events for gap in event.gaps}
 
 
+@pytest.mark.slow
 def test_resistance_is_a_damper_and_friction(arm):
     scene = quietly(arm, resistance=True)
     assert scene.loads["damper of shoulder"].damping == 0.7
-    assert scene.grips["friction of shoulder"].limit == 0.3
+    assert scene.set_valued["friction of shoulder"].limit == 0.3
     motion = gauss.simulate(scene, 0.05, rtol=1e-9, progress=False)
     assert gauss.energy(motion).dissipated[-1] >= 0.0
 
@@ -80,7 +81,7 @@ def test_shapes_are_those_of_the_file_and_touch(arm):
     assert (type(upper), upper.radius, upper.length) == (Capsule, 0.1, 0.8)
     assert upper.axis == pytest.approx((np.sin(0.5), 0, np.cos(0.5)))
     assert (type(tip), tip.radius) == (Sphere, 0.2)
-    scene.grips.clear()
+    scene.set_valued.clear()
     scene.contact("lands", "tip", "base")
     motion = gauss.simulate(scene, 1.0, rtol=1e-8, progress=False)
     assert motion.body("tip").position[:, 2].min() >= 0.2 - 1e-8

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss.linkages import cycle_kernel, power_balance, scene_state, work
-from gauss.linkages.closing import near
+from gauss.linkages.crank_ranges import near
 from tests.support import linkages, mechanisms
 
 TABLE = 1e-9  # absolute, relative above 1: what the tables ask for; they agree to about 1e-13

@@ -138,9 +138,9 @@ def test_the_scene_moves_as_the_network(name):
     energies = gauss.energy(theirs)
     assert np.abs(energies.balance).max() <= BALANCE * energies.scale
     moving = ~ours.stuck.any(axis=1)  # what stands still by friction and losses shares its torques in many ways
-    for link in set(network.links) & set(theirs.system.scene.grips | theirs.system.scene.losses):
+    for link in set(network.links) & set(theirs.system.scene.set_valued | theirs.system.scene.losses):
         expected = ours.torque(link)
-        off = np.abs(gauss.grip_forces(theirs, link) - expected)[moving]
+        off = np.abs(gauss.set_valued_forces(theirs, link) - expected)[moving]
         assert off.max() <= TORQUES * np.abs(expected).max()
 
 
@@ -244,10 +244,10 @@ def test_a_system_without_losses_is_what_it_was():
     found = gauss.simulate(scene, 0.5, progress=False)
     assert found.rate("A")[-1] == pytest.approx(-0.5 * 3.0 * 0.5 / 1.25, rel=1e-12)
     assert found.stats.plan.driver == "compiled loop"
-    assert not scene.changing and isinstance(scene.relations["gear"], LossyGear)
+    assert not scene.nonsmooth and isinstance(scene.relations["gear"], LossyGear)
 
 
-def test_explain_and_the_outlook_know_losses():
+def test_explain_and_advise_know_losses():
     scene = _two()
     scene.lossy_gear("gear", "A", "B", 2.0, 0.9)
     system = gauss.compile_scene(scene)
@@ -265,7 +265,7 @@ def test_a_file_keeps_them(tmp_path):
     assert gauss.load(gauss.save(scene, tmp_path / "links.toml")) == scene
 
 
-def test_told_is_a_key():
-    one, other = ContactMode(grips={"a": 0}), ContactMode().but(grips={"a": 0})
-    assert hash(one) == hash(other) and one == other and one != one.but(grips={"a": 1})
+def test_contact_modes_are_keys():
+    one, other = ContactMode(set_valued={"a": 0}), ContactMode().but(set_valued={"a": 0})
+    assert hash(one) == hash(other) and one == other and one != one.but(set_valued={"a": 1})
     assert Clutch("c", "A", "B", 2.0).bounds(0.0) == (-2.0, 2.0)

@@ -144,15 +144,15 @@ def test_energy_that_a_wall_gives_to_long_steps_is_told_of_by_every_entry_point(
     pytest.importorskip("xarray")
     system = gauss.compile_scene(walled(opaque=False))
     start = system.initial_state()
-    for settings, told in ((LONG, 1), (SHORT, 0)):
+    for settings, mode in ((LONG, 1), (SHORT, 0)):
         steps = round(1.0 / settings["step"])
-        ways = [
+        power_flow = [
             lambda: gauss.simulate(system, 1.0, **settings),  # noqa: B023
             lambda: gauss.rollout(system, [start.q] * 3, [start.v] * 3, steps=steps, **settings),  # noqa: B023
             lambda: gauss.sweep(walled(opaque=False), {"rod.mass": [1.0, 2.0]}, 1.0, samples=3, **settings),  # noqa: B023
         ]
-        for way in ways:
-            assert len(_told(way)) == told
+        for way in power_flow:
+            assert len(_told(way)) == mode
 
 
 def test_rollouts_tell_of_motions_that_are_made_again(swinging, monkeypatch):

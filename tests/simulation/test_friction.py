@@ -24,15 +24,15 @@ STEPPING = {"integrator": "time_stepping"}
 def test_a_block_slides_up_stops_and_slides_back():
     scene, h = gauss.load("block_on_incline"), 0.01
     trajectory = gauss.simulate(scene, 1.0, step=h, **STEPPING)
-    down, grip = g * np.sin(0.6), 0.5 * g * np.cos(0.6)
-    turn = 3.0 / (down + grip)
-    v = np.where(trajectory.t < turn, -3.0 + (down + grip) * trajectory.t, (down - grip) * (trajectory.t - turn))
+    down, element = g * np.sin(0.6), 0.5 * g * np.cos(0.6)
+    turn = 3.0 / (down + element)
+    v = np.where(trajectory.t < turn, -3.0 + (down + element) * trajectory.t, (down - element) * (trajectory.t - turn))
     # in the step in which it turns, friction changes sign at its end only
     late = trajectory.t > turn + h
     delay = v[late] - trajectory.v[late, 0]
     assert trajectory.v[~late, 0][:-2] == pytest.approx(v[~late][:-2], abs=EXACT)
     assert np.ptp(delay) < EXACT
-    assert 0.0 <= delay[0] <= 2 * grip * h
+    assert 0.0 <= delay[0] <= 2 * element * h
     assert np.abs(trajectory.v[:, 1:]).max() < EXACT
     assert np.abs(trajectory.q[:, 2]).max() < EXACT  # the convex relaxation alone would lift it by h μ s
     assert (trajectory.stats.plan.driver, trajectory.stats.plan.dynamics) == ("time stepping", "compiled")
@@ -289,19 +289,19 @@ def test_friction_of_a_joint_that_a_drive_moves_changes_nothing_but_its_torque(h
     assert rubbed.q == pytest.approx(free.q, abs=1e-10) and rubbed.v == pytest.approx(free.v, abs=1e-10)
 
 
-PRESCRIBED_SLIPS = {  # how a grip is made, and the energy that it loses [J]: what one drive takes from another is no loss
-    "clutch": (lambda scene: scene.clutch("grip", "to a", "to b", torque=2.0), 2.0),
-    "joint friction": (lambda scene: scene.joint_friction("to b", 2.0, name="grip"), 2.0),
-    "limited drive": (lambda scene: scene.drive("to b", speed=0.0, limit=2.0, name="grip"), 0.0),
+PRESCRIBED_SLIPS = {  # how an element is made, and its loss [J]: what one drive takes from another is no loss
+    "clutch": (lambda scene: scene.clutch("element", "to a", "to b", torque=2.0), 2.0),
+    "joint friction": (lambda scene: scene.joint_friction("to b", 2.0, name="element"), 2.0),
+    "limited drive": (lambda scene: scene.drive("to b", speed=0.0, limit=2.0, name="element"), 0.0),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", ["auto", "recursion"])
-@pytest.mark.parametrize("grip", PRESCRIBED_SLIPS)
-def test_a_grip_slips_on_through_a_standstill_that_prescribed_motions_do_not_let_it_hold(grip, backend):
+@pytest.mark.parametrize("element", PRESCRIBED_SLIPS)
+def test_an_element_slips_on_through_a_standstill_that_prescribed_motions_do_not_let_it_hold(element, backend):
     """Both shafts turn as prescribed, one at 1 − t: 2 N m lose 2 ∫ |1 − t| dt = 2 J in 2 s, which the drive gives."""
-    make, loss = PRESCRIBED_SLIPS[grip]
+    make, loss = PRESCRIBED_SLIPS[element]
     scene = gauss.Scene("shafts")
     for name in ("a", "b"):
         scene.body(name, 1.0, (1.0, 1.0, 1.0))
@@ -310,7 +310,7 @@ def test_a_grip_slips_on_through_a_standstill_that_prescribed_motions_do_not_let
     scene.drive("to b", speed=lambda t: 1.0 - t)
     make(scene)
     motion = gauss.simulate(scene, 2.0, backend=backend, progress=False)
-    assert [(event.kind, event.gaps) for event in motion.events] == [("slips", ("grip",))]
+    assert [(event.kind, event.gaps) for event in motion.events] == [("slips", ("element",))]
     assert motion.events[0].t == pytest.approx(1.0, abs=1e-9)
     assert motion.rate("to b")[-1] == pytest.approx(-1.0, abs=1e-9)
     assert motion.work[-1] == pytest.approx([loss, 0.0, loss], abs=1e-7)

@@ -175,6 +175,6 @@ BUILT = {
     "tilted slider-crank": lambda: tilted(gauss.load("slider_crank")),
     "random tree": lambda: gauss.load("random_tree", n=12, seed=1),
 }
-# one-sided constraints and grips are stepped phase by phase
-SHIPPED = [name for name in shipped() if not (gauss.load(name).contacts or gauss.load(name).grips)]
+# one-sided constraints and set-valued elements are stepped phase by phase
+SHIPPED = [name for name in shipped() if not (gauss.load(name).contacts or gauss.load(name).set_valued)]
 SCENES = {name: lambda name=name: gauss.load(name) for name in SHIPPED} | BUILT

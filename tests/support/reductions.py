@@ -10,4 +10,4 @@ def stages(system) -> dict:
 
 def rows(stage) -> int:
     """Rows of the constraints that a stage leaves."""
-    return sum(part.n_rows for part in stage.parts)
+    return sum(part.n_rows for part in stage.subsystems)

@@ -55,7 +55,7 @@ def scaled(scene: Scene, units: Units) -> Scene:
     unit = _unit_of(system, units)
     made = Scene(scene.name, tuple(units.times(scene.gravity, 1, -2, 0)))
     parts = (scene.bodies, scene.frames, scene.joints, scene.couplings, scene.shapes, scene.relations)
-    for part in (*parts, scene.contacts, scene.grips, scene.loads):
+    for part in (*parts, scene.contacts, scene.set_valued, scene.loads):
         for element in part.values():
             made.add(_in_units(element, units, unit))
     for name, start in scene.starts.items():

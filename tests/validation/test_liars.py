@@ -230,7 +230,7 @@ def determined(case: Case, active, found):
     return multipliers - loose, mu
 
 
-def told(cases: dict[str, Case], count: int, seed: int = 0) -> Counter:
+def mode(cases: dict[str, Case], count: int, seed: int = 0) -> Counter:
     """What becomes of many lies."""
     rng, found = np.random.default_rng(seed), Counter()
     with np.errstate(all="ignore"):
@@ -242,7 +242,7 @@ def told(cases: dict[str, Case], count: int, seed: int = 0) -> Counter:
 
 @pytest.mark.slow
 def test_no_lie_is_certified_beyond_what_is_right(cases):
-    found = told(cases, COUNT)
+    found = mode(cases, COUNT)
     assert sum(found.values()) == COUNT and min(found[kind] for kind in ("refused", "multipliers replaced", "solved")) > 10
 
 
@@ -362,4 +362,4 @@ def test_workspaces_that_are_written_again_change_no_solution(cases):
 
 
 if __name__ == "__main__":
-    print(dict(told(made(), int(sys.argv[1]), seed=1)))
+    print(dict(mode(made(), int(sys.argv[1]), seed=1)))

@@ -17,9 +17,10 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss.errors import GaussError, NotImportedWarning
-from gauss.io.catalog import robot, shipped
+from gauss.io.catalog import shipped
 from gauss.io.numbers import numbers
 from gauss.io.urdf.numbers import COUNTS
+from gauss.io.urdf.robots import robot
 from gauss.scene.toml import toml_text
 
 ROBOTS = ("allegro_hand_description/urdf/allegro_left_hand", "panda", "solo12", "z1", "double_pendulum_simple", "laikago")

@@ -23,7 +23,7 @@ from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
-from gauss.io.catalog import robot
+from gauss.io.urdf.robots import robot
 from gauss.rotations import cross, from_quaternion, skew
 from gauss.scene import PAIRS
 from gauss.system import random_state
@@ -194,6 +194,7 @@ def extended_accelerations(system, state, load) -> np.ndarray:
     return answer[1]
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("size", [3, 40])
 def test_null_space_and_energies(size):

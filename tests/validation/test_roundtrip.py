@@ -6,8 +6,9 @@ import pytest
 
 import gauss
 from gauss.errors import FileError
-from gauss.io.catalog import families, robot, shipped
+from gauss.io.catalog import families, shipped
 from gauss.io.mjcf.write import to_mjcf
+from gauss.io.urdf.robots import robot
 from tests.support.files import linear, quietly
 from tests.support.in_mujoco import GIVES_WAY, SOFT, differences, mujoco_run
 

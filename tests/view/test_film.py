@@ -10,9 +10,8 @@ from PIL import Image
 import gauss
 from gauss.errors import FileError, StateError
 from gauss.view.viewer import export_film, page
-from gauss.view.viewer.frames import resampled
 from gauss.view.viewer.painter import Painter
-from gauss.view.viewer.shown import shown
+from gauss.view.viewer.shown import resampled, shown
 from gauss.view.viewer.touches import touches
 
 SIZE = (160, 120)

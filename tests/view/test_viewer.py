@@ -13,8 +13,8 @@ import gauss
 from gauss.errors import FileError
 from gauss.view.viewer import export_html, show
 from gauss.view.viewer.forms import forms
-from gauss.view.viewer.frames import resampled
 from gauss.view.viewer.show import LOOPBACK, _free_port
+from gauss.view.viewer.shown import resampled
 
 FLOATS = 1e-6  # relative: positions travel in single precision
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -34,6 +34,7 @@ def viewer(motion):
     found.close()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
 def test_the_stage_shows_the_motion(viewer):
     stage = viewer.player.stage

@@ -1,6 +1,5 @@
 """Cross-check of a scene with Pinocchio: a table of differences of the order of rounding."""
 
-from gauss.analysis.crosscheck.crosscheck import CrossCheck, Row, crosscheck
-from gauss.analysis.crosscheck.states import random_states
+from gauss.lazy import attach
 
-__all__ = ["CrossCheck", "Row", "crosscheck", "random_states"]
+__all__, __getattr__, __dir__ = attach(__name__, __file__)

@@ -126,7 +126,7 @@ def crosscheck(
     if not tolerance > 0:
         raise SimulationError(f"tolerance: expected a positive number, got {tolerance!r}.")
     system = scene if isinstance(scene, System) else compile_scene(scene)
-    left_out = ", ".join(system.scene.contacts | system.scene.grips | system.scene.losses)
+    left_out = ", ".join(system.scene.contacts | system.scene.set_valued | system.scene.losses)
     notes: tuple[str, ...] = ()
     if left_out:
         system, notes = compile_scene(phase_scene(system.scene)), (f"left out, as Pinocchio has none: {left_out}",)

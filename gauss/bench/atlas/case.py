@@ -58,13 +58,13 @@ def judged(case: FailureCase, method: Method, data) -> dict:
     return {"verdict": _verdict(case, figure, bool(words)), "figure": figure, "words": words[:300]}
 
 
-def _verdict(case: FailureCase, figure: float, told: bool) -> str:
+def _verdict(case: FailureCase, figure: float, warned: bool) -> str:
     if not case.solvable:
-        return PASSED if told else SILENT
-    if np.isnan(figure) and told:
+        return PASSED if warned else SILENT
+    if np.isnan(figure) and warned:
         return HONEST
     if figure <= case.passes:
         return PASSED
     if figure <= case.fails:
         return DEGRADED
-    return HONEST if told else SILENT
+    return HONEST if warned else SILENT

@@ -1,14 +1,13 @@
 """Methods of the atlas: a formulation, a solver, an integrator, and what is done against drift."""
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gauss.analysis import warn_of_balance
-from gauss.backends import BACKENDS, make, solve
+from gauss.backends import BACKENDS, Backend, make, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Answer
 from gauss.dynamics.engines.certified import CertifiedEngine
@@ -129,22 +128,22 @@ class Believing(CertifiedEngine):
         As of :class:`CertifiedEngine`.
     """
 
-    def __init__(self, backend: Callable, gains=None):
+    def __init__(self, backend: Backend, gains=None):
         super().__init__(gains=gains)
-        self.backend = backend
+        self.believed = self.backend = backend
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
         """Accelerations and the power of the loads; a SimulationError where the backend claims no success."""
         compulsion, (driven, loaded, dissipated) = self.assembled(system, state, load, loads)
-        answer = _asked(self.backend, compulsion)
+        answer = _asked(self.believed, compulsion)
         self.evaluations += 1
         if not answer.found:
-            raise SimulationError(f"t = {state.t:.6g} s, backend {self.backend.name!r}: {answer.message}.")
+            raise SimulationError(f"t = {state.t:.6g} s, backend {self.believed.name!r}: {answer.message}.")
         driven = driven - answer.multipliers @ compulsion.C
         return Rates(answer.qdd, np.array([driven, loaded, dissipated]))
 
 
-def _asked(backend: Callable, compulsion: Compulsion) -> Answer:
+def _asked(backend: Backend, compulsion: Compulsion) -> Answer:
     """Answer of a backend; methods for equality rows say that they take no others."""
     if compulsion.h.size and backend.name in BACKENDS:
         raise BackendError(f"backend {backend.name!r} takes no inequality rows.")

@@ -150,7 +150,7 @@ def _lost_hold(method: Method, _) -> float:
     scene = load("cart_pole")
     tilt = ServoRelation("lean", lambda t, motion: motion.coordinate("pin") - 0.5 - 2.0 * t, unit="rad")
     scene.start("pin", position=0.5, rate=2.0)
-    held(Servo(scene, [tilt], [Motor("motor", "rail")]), 1.5, progress=False)
+    held(Servo(compile_scene(scene), (tilt,), (Motor("motor", "rail"),)), 1.5, progress=False)
     return np.inf
 
 

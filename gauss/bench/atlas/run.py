@@ -11,8 +11,7 @@ from tqdm import tqdm
 from gauss.bench.atlas.case import HONEST, SILENT, SLOW, judged
 from gauss.bench.atlas.cases import CASES
 from gauss.bench.atlas.methods import METHODS
-from gauss.bench.choice import chosen
-from gauss.bench.measurement import Measurement
+from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers
 
@@ -34,16 +33,16 @@ def explore(
     fresh: bool = False,
     progress: bool = True,
 ) -> ResultTable:
-    """Judge all cells that are not judged yet, and return the table.
+    """Examine all cells that have no verdict yet, and return the table.
 
     Parameters
     ----------
     folder : Path
         Where ``stability.csv`` is, or shall be.
     cases, methods : sequence of str, optional
-        What is judged; all that there are when not given.
+        What is examined; all that there are when not given.
     fresh : bool
-        Judge again what has been judged.
+        Examine again what has a verdict.
     progress : bool
         Show a bar.
 

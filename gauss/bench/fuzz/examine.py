@@ -37,7 +37,7 @@ def examine(seed: int, numbers: list[int], backends: list[str]) -> list[dict]:
     * ratio: the largest of error over certificate, and the number of this problem, or of one that ended the process;
     * error, certificate: medians over certified answers; seconds: median of solving and certifying.
     """
-    found = {backend: [] for backend in backends}
+    found: dict[str, list] = {backend: [] for backend in backends}
     for number in numbers:
         _, compulsion = fuzzed(seed, number)
         try:

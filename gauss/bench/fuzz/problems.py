@@ -6,6 +6,7 @@ every joint is said at the reference configuration, and rates are drawn among th
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def random_tree(rng, most: int = 8, spread: float | None = None, size: float | N
     size = decades(rng, -3, 3) if size is None else size
     scene = Scene("tree", gravity=tuple(size * rng.standard_normal(3) * 10))
     spread = rng.choice([0.3, 2.0, 4.0]) if spread is None else spread
-    places = []
+    places: list[np.ndarray] = []
     for i in range(rng.integers(1, most + 1)):
         on = int(rng.integers(-1, i)) if rng.random() < 0.3 else i - 1
         before = places[on] if on >= 0 else np.zeros(3)
@@ -170,7 +171,7 @@ def _stops(rng) -> Compulsion:
     scene = chain([decades(rng, -1, 1) for _ in range(links)])
     for k in range(links):
         if rng.random() < 0.6:
-            scene.stop(f"joint{k}", **{str(rng.choice(["highest", "lowest"])): 0.0})
+            scene.stop(f"joint{k}", **dict[str, Any]({str(rng.choice(["highest", "lowest"])): 0.0}))
     system = compile_scene(scene)
     return assemble(system, system.state(), _effort(system, rng, _strength(system, 1.0)))
 

@@ -61,7 +61,7 @@ def examine_motion(seed: int, number: int, without: tuple = ()) -> dict:
     routes = [_route(given, given.integrator, "auto", RTOL, verify=True)]
     if routes[0].outcome not in ("timed out", "raised"):  # the verdict is clear then
         routes.append(_second(given))
-    if len(routes) > 1 and given.integrator == "dop853" and number % 3 == 0 and not given.scene.changing:
+    if len(routes) > 1 and given.integrator == "dop853" and number % 3 == 0 and not given.scene.nonsmooth:
         routes.append(_caught(lambda: _rolled_out(given)))
     verdict, off, why = _verdict(given, routes)
     warned = "+".join(sorted({kind for route in routes for kind in route.warned}))
@@ -75,12 +75,12 @@ def _row(seed, number, words, verdict, begin, off=np.nan, claim=np.nan, warned="
 
 def _second(given: MovedScene) -> Route:
     """The certified route; with friction of contacts, which nothing else takes, by the same steps in time."""
-    if _rubs(given):
+    if _has_friction(given):
         return _route(given, given.integrator, "recursion", TIGHT)
     return _route(given, "dop853", "recursion", TIGHT)
 
 
-def _rubs(given: MovedScene) -> bool:
+def _has_friction(given: MovedScene) -> bool:
     return any(getattr(contact, "friction", 0.0) for contact in given.scene.contacts.values())
 
 
@@ -115,7 +115,7 @@ def _failed(routes: list[Route]) -> tuple[str, str] | None:
 
 def _third_route(given: MovedScene, moved: list[Route], far: float) -> tuple[str, float, str]:
     """Verdict by a third route, and a claim of the second."""
-    if _rubs(given):
+    if _has_friction(given):
         return "silent", far, "time stepping by two backends"
     third = _route(given, "dopri5", "kkt", MIDDLE, verify=True)
     if third.outcome != "moved":
@@ -128,6 +128,7 @@ def _third_route(given: MovedScene, moved: list[Route], far: float) -> tuple[str
 
 def _far(given: MovedScene, one: Route, other: Route, alone: bool = False) -> float:
     """How far two motions are apart, over what they may be."""
+    assert one.q is not None and one.v is not None and other.q is not None and other.v is not None  # both moved
     system = gauss.compile_scene(given.scene)
     shares = []
     pairs = ((differences(system, one.q, other.q), one.q), (one.v - other.v, one.v))

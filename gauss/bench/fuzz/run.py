@@ -10,11 +10,10 @@ from threading import Event
 from tqdm import tqdm
 
 from gauss.backends import available
-from gauss.bench.choice import chosen
 from gauss.bench.fuzz.examine import COUNTS, TYPICAL, WORST, examine, lost, together
 from gauss.bench.fuzz.problems import KINDS
 from gauss.bench.measure import AUTO, OURS
-from gauss.bench.measurement import Measurement
+from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.qp import PACKAGES
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Worker
@@ -137,7 +136,7 @@ def _block(call: Callable, seed: int, numbers: list[int], backends: list[str]) -
         raise RuntimeError(reply.reason)
     rows = []
     for backend in backends:
-        cells = []
+        cells: list = []
         for number in numbers:
             reply = call(examine, seed, [number], [backend], timeout=PROBLEM_TIME)
             outcome = {"crashed": "crashed", "timed out": "timed_out"}.get(reply.outcome)

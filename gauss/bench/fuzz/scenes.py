@@ -3,6 +3,7 @@
 A scene is told by a seed and its number, so that each can be made again by itself, also without some of its elements.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +69,7 @@ def moved_scene(seed: int, number: int, without: tuple = ()) -> MovedScene:
         put = len(there.names)
     there.starts(base in ("polygon", "loop"))
     integrator = str(rng.choice(list(INTEGRATORS), p=SHARES))
-    if scene.changing and rng.random() < 0.9:  # the others say that they do not take these
+    if scene.nonsmooth and rng.random() < 0.9:  # the others say that they do not take these
         integrator = "dop853"
     step = float(INTEGRATORS[integrator][1]) or None
     if any(getattr(contact, "friction", 0.0) for contact in scene.contacts.values()):
@@ -81,7 +82,7 @@ def moved_scene(seed: int, number: int, without: tuple = ()) -> MovedScene:
 def reduced(scene: Scene, without: tuple) -> Scene:
     """Scene without some elements, by name; starts are named "start JOINT"."""
     left = Scene(scene.name, scene.gravity)
-    groups = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "grips", "loads")
+    groups = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "set_valued", "loads")
     for element in (element for group in groups for element in getattr(scene, group).values()):
         if element.name not in without:
             left.add(element)
@@ -140,7 +141,8 @@ class _There:
 
     def __init__(self, scene: Scene, rng, size: float, span: float):
         self.scene, self.rng, self.size, self.span = scene, rng, size, span
-        self.names, self.bodies = [], list(scene.bodies)
+        self.names: list[str] = []
+        self.bodies = list(scene.bodies)
         mass = float(np.mean([body.mass for body in scene.bodies.values()]))
         self.force, self.torque = 10.0 * mass * size, 10.0 * mass * size**2
 
@@ -189,7 +191,7 @@ class _There:
         """Law of time for a motion; of a coordinate it begins at zero."""
         rng, span = self.rng, self.span
         begin = span * rng.uniform(0.0, 0.8)
-        laws = [Sine(scale, rng.uniform(0.2, 2.0) / span), Move(0.0, scale, span * rng.uniform(0.1, 1.0), begin)]
+        laws: list = [Sine(scale, rng.uniform(0.2, 2.0) / span), Move(0.0, scale, span * rng.uniform(0.1, 1.0), begin)]
         laws += [float(scale)] if rate else [Ramp(0.0, scale)]
         return laws[rng.integers(0, len(laws))]
 
@@ -204,6 +206,7 @@ class _There:
     def push(self):
         along, law = self.rng.standard_normal(3), self.law(self.force)
         along /= np.linalg.norm(along)
+        whole: Callable | tuple
         if callable(law):
             given = law.__code__.co_argcount if hasattr(law, "__code__") else 1
             whole = (lambda t: along * law(t)) if given == 1 else (lambda t, motion: along * law(t, motion))
@@ -249,7 +252,7 @@ class _There:
         elif (pair := self.pair()) is not None:
             ratio = self.unit(pair[0]) / self.unit(pair[1]) * rng.normal()
             if kind == "couple":
-                self.scene.couple(self.name(kind), *pair, ratio=ratio)
+                self.scene.couple(self.name(kind), pair[0], pair[1], ratio=ratio)
             else:
                 unit, high = self.unit(pair[1]), 0.3 * self.unit(pair[0])
                 self.scene.cam(self.name(kind), pair[1], pair[0], lambda x: high * np.sin(x / unit))
@@ -318,7 +321,8 @@ class _There:
     def link(self):
         if (pair := self.pair()) is not None and self.unit(pair[0]) == self.unit(pair[1]):
             if self.rng.random() < 0.5:
-                self.scene.clutch(self.name("clutch"), *pair, torque=self.effort(pair[0]) * decades(self.rng, -2, 0))
+                torque = self.effort(pair[0]) * decades(self.rng, -2, 0)
+                self.scene.clutch(self.name("clutch"), pair[0], pair[1], torque=torque)
             else:
                 self.scene.freewheel(self.name("freewheel"), *pair)
 
@@ -347,7 +351,8 @@ class _There:
                 self.scene.start(joint.name, position, tuple(rate) if joint.pair.n_v > 1 else rate[0])
 
 
-KINDS = ("drive",) * 4 + ("push",) * 3 + ("spring", "joint_spring", "joint_spring", "relation", "relation", "prescribed")
+KINDS: tuple[str, ...] = ("drive",) * 4 + ("push",) * 3
+KINDS += ("spring", "joint_spring", "joint_spring", "relation", "relation", "prescribed")
 KINDS += ("stop", "one_sided", "rope", "contact", "contact", "friction", "limited", "link")
 INTEGRATORS = {  # their shares, and steps [s]
     "dop853": (0.66, 0.0),

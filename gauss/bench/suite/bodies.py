@@ -89,7 +89,7 @@ class Heap:
         }
 
 
-def pressed(mass, inertia, position, contacts, gravity=(0.0, 0.0, -GRAVITY), push=None) -> Heap:
+def make_heap(mass, inertia, position, contacts, gravity=(0.0, 0.0, -GRAVITY), push=None) -> Heap:
     """Heap of contacts (first, second, point, normal) under gravity, and further loads (k, 6) if given."""
     mass, position = np.asarray(mass, dtype=float), np.asarray(position, dtype=float).reshape(-1, 3)
     inertia = np.broadcast_to(np.asarray(inertia, dtype=float), (mass.size, 3))
@@ -106,7 +106,7 @@ def table(legs: int, height: float = 1.0, **options) -> Heap:
     quarters = [(x / 2, y) for x in (-1, 1) for y in (-1, 1)] + [(x, y / 2) for x in (-1, 1) for y in (-1, 1)]
     feet = (corners + quarters)[:legs]
     contacts = [(0, -1, (x, y, -height), (0, 0, 1)) for x, y in feet]
-    return pressed([4.0], [2.0, 2.0, 4.0], [(0, 0, 0)], contacts, **options)
+    return make_heap([4.0], [2.0, 2.0, 4.0], [(0, 0, 0)], contacts, **options)
 
 
 def stack(count: int, ratio: float = 1.0, **options) -> Heap:
@@ -114,7 +114,7 @@ def stack(count: int, ratio: float = 1.0, **options) -> Heap:
     mass = 2.0 * ratio ** np.arange(count)
     corners = [(x / 2, y / 2) for x in (-1, 1) for y in (-1, 1)]
     contacts = [(k, k - 1, (x, y, k), (0, 0, 1)) for k in range(count) for x, y in corners]
-    return pressed(mass, mass[:, None] / 4, [(0, 0, k + 0.5) for k in range(count)], contacts, **options)
+    return make_heap(mass, mass[:, None] / 4, [(0, 0, k + 0.5) for k in range(count)], contacts, **options)
 
 
 def wall(columns: int, rows: int, **options) -> Heap:
@@ -130,7 +130,7 @@ def wall(columns: int, rows: int, **options) -> Heap:
             low, high = max(x, middle) - 1, min(x, middle) + 1
             contacts += [(number[i, j], other, (u, y, z - 0.5), (0, 0, 1)) for u in (low, high) for y in (-0.5, 0.5)]
     count = len(place)
-    return pressed(np.full(count, 2.0), [0.5, 1.0, 1.0], list(place.values()), contacts, **options)
+    return make_heap(np.full(count, 2.0), [0.5, 1.0, 1.0], list(place.values()), contacts, **options)
 
 
 def balls(count: int, seed: int, spread: float = 0.0, gaps: bool = False) -> Heap:
@@ -140,7 +140,7 @@ def balls(count: int, seed: int, spread: float = 0.0, gaps: bool = False) -> Hea
     position = np.round((grid + 0.5 + 0.03 * rng.standard_normal(grid.shape)) * 2**20) / 2**20
     mass = 2.0 ** np.round(spread * rng.uniform(-1, 1, count))
     contacts = []
-    near = [[] for _ in range(count)]
+    near: list[list[int]] = [[] for _ in range(count)]
     for i, j in sorted(cKDTree(position).query_pairs(1.2)):
         near[j].append(i)
     for i in range(count):
@@ -152,4 +152,4 @@ def balls(count: int, seed: int, spread: float = 0.0, gaps: bool = False) -> Hea
             contacts.append((i, j, (position[i] + position[j]) / 2, away / np.linalg.norm(away)))
     push = np.round(rng.standard_normal((count, 6)) * 2**8) / 2**8 * mass[:, None]
     push[:, :3] *= 0.1
-    return pressed(mass, mass[:, None] / 8, position, contacts, push=push * (4.0 if gaps else 1.0))
+    return make_heap(mass, mass[:, None] / 8, position, contacts, push=push * (4.0 if gaps else 1.0))

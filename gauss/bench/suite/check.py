@@ -27,7 +27,7 @@ def checked(instance: SuiteInstance) -> SuiteInstance:
         if worst > (ROUNDED if reference.contradiction else EXACT):
             raise BackendError(f"{instance.name}: the reference leaves {worst:.1e}.")
         return with_reference(instance, replace(reference, residual=worst))
-    reference = instance.reference
+    reference = instance.proof
     if instance.verdict == INFEASIBLE:
         worst, slope = certificate_residual(instance, reference.y, reference.z, reference.z_box)
     else:

@@ -15,7 +15,7 @@ from gauss.bench.suite.doubled import Doubled, joined, product, taken, wide, zer
 from gauss.bench.suite.guess import guessed
 from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, speeds
-from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS, holding
+from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS, held_rows
 from gauss.errors import BackendError
 
 ROUNDS = 500  # of convex problems, each with the sliding of the one before, until Coulomb's law is met (Acary, Cadoux 2011)
@@ -51,7 +51,7 @@ def refined_with_cones(instance: SuiteInstance) -> SuiteReference:
     plain_z, z_box = instance.multipliers(taken(z, slice(equations.rows.shape[0])))
     z = joined(plain_z, taken(z, slice(equations.rows.shape[0], None)))
     found = residuals(instance, x, y, z, z_box)
-    _, plain_rows, bounds = holding(instance, x)
+    _, plain_rows, bounds = held_rows(instance, x)
     cones = [block.start for block, state in zip(instance.blocks, states, strict=True) if state != INSIDE]
     active = np.concatenate([plain_rows, np.array(cones, dtype=int)])
     unique = bool(np.linalg.matrix_rank(slope / scale[:, None], tol=DEPENDENT) == len(slope))
@@ -94,7 +94,7 @@ def _states(instance: SuiteInstance, x: np.ndarray, z: np.ndarray) -> tuple[list
         a, w = s[own], z[own]
         depth, height = (abs(part[0] - np.linalg.norm(part[1:])) / max(abs(part[0]), TINY) for part in (a, w))
         off = {INSIDE: abs(w[0]) / most, APEX: abs(a[0]) / max(np.abs(s).max(), TINY), BOUNDARY: max(depth, height)}
-        states.append(min(off, key=off.get))
+        states.append(min(off, key=off.__getitem__))
         if states[-1] == BOUNDARY:
             factors.append(w[0] / max(a[0], TINY))
     return states, np.array(factors)

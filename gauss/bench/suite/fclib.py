@@ -28,7 +28,7 @@ def write_fclib(path: Path, instance: SuiteInstance):
         If h5py is not there.
     """
     h5py = _h5py()
-    reference, W = instance.reference, sparse.csc_array(instance.P)
+    reference, W = instance.proof, sparse.csc_array(instance.P)
     u = (product(W, reference.x) + instance.q).rounded()
     with h5py.File(path, "w") as file:
         local = file.create_group("fclib_local")

@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import io, sparse
@@ -130,15 +131,12 @@ def read_npz(path: Path) -> SuiteInstance:
             M: sparse.csc_matrix(tuple(data[f"{M}_{part}"] for part in parts), shape=tuple(data[f"{M}_shape"]))
             for M in MATRICES
         }
-        wide = {name: Doubled(data[name], data[f"{name}_low"]) for name in WIDE}
+        wide: dict[str, Any] = {name: Doubled(data[name], data[f"{name}_low"]) for name in WIDE}
         plain = {name: data[name] if data[name].ndim else data[name].item() for name in PLAIN}
-        return SuiteInstance(
-            **matrices,
-            **{name: data[name] for name in VECTORS},
-            **{name: str(data[name]) for name in TEXTS},
-            **{name: tuple(data[name].tolist()) for name in ("variables", "units", "cones", "stages")},
-            reference=SuiteReference(**wide, **plain),
-        )
+        fields: dict[str, Any] = matrices | {name: data[name] for name in VECTORS}
+        fields |= {name: str(data[name]) for name in TEXTS}
+        fields |= {name: tuple(data[name].tolist()) for name in ("variables", "units", "cones", "stages")}
+        return SuiteInstance(**fields, reference=SuiteReference(**(wide | plain)))
 
 
 def write_mat(path: Path, instance: SuiteInstance):
@@ -153,7 +151,7 @@ def write_mat(path: Path, instance: SuiteInstance):
     found |= {"A": sparse.csc_matrix(rows), "l": np.concatenate([instance.b, below, instance.lb]), "r": 0.0}
     found |= {
         "u": np.concatenate([instance.b, instance.h[: instance.orthant], instance.ub]),
-        "z_box": instance.reference.z_box.hi,
+        "z_box": instance.proof.z_box.hi,
     }
     found |= {"m": float(rows.shape[0]), "n": float(instance.n)}
     io.savemat(path, found, do_compression=True, oned_as="column")
@@ -167,7 +165,7 @@ def _arrays(instance: SuiteInstance) -> dict:
     if reference is None:
         nothing = zeros(0)
         reference = SuiteReference(nothing, nothing, nothing, nothing)
-    found = {}
+    found: dict[str, Any] = {}
     for name in MATRICES:
         M = getattr(instance, name)
         found |= {f"{name}_{part}": getattr(M, part) for part in ("data", "indices", "indptr")}
@@ -182,7 +180,7 @@ def _arrays(instance: SuiteInstance) -> dict:
 
 
 def _entry(path: Path, instance: SuiteInstance) -> dict:
-    reference = instance.reference
+    reference = instance.proof
     sizes = {"n": instance.n, "m": instance.b.size, "s": instance.h.size, "cones": len(instance.cones)}
     known_digits = reference.digits if np.isfinite(reference.digits) else None
     return {

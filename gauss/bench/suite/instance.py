@@ -127,6 +127,19 @@ class SuiteInstance:
         return self.q.size
 
     @property
+    def proof(self) -> SuiteReference:
+        """Its reference.
+
+        Raises
+        ------
+        BackendError
+            If it has none.
+        """
+        if self.reference is None:
+            raise BackendError(f"{self.name}: has no reference.")
+        return self.reference
+
+    @property
     def orthant(self) -> int:
         """Number of rows of G that are plain inequalities; those of cones follow."""
         return self.h.size - sum(self.cones)

@@ -7,6 +7,7 @@ whose sum it is.
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -160,7 +161,7 @@ def read_qps(path: Path) -> SuiteInstance:
     equal = low == high
     up, down = np.isfinite(high) & ~equal, np.isfinite(low) & ~equal
     G, h = sparse.vstack([rows[up], -rows[down]]), np.concatenate([high[up], -low[down]])
-    more = {"lb": lb, "ub": ub, "variables": tuple(found.columns)}
+    more: dict[str, Any] = {"lb": lb, "ub": ub, "variables": tuple(found.columns)}
     about = found.name, "file", f"read from {path.name}"
     return programme(*about, found.hessian(), q, A=rows[equal], b=high[equal], G=G, h=h, **more)
 

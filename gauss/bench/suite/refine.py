@@ -61,7 +61,7 @@ def refined(instance: SuiteInstance) -> SuiteReference:
 def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> Held:
     """Answer whose rows are all kept, and whose multipliers all push."""
     rows, right = instance.plain_rows()
-    best, least = None, np.inf
+    best, least = None, float("inf")
     for changes in range(CHANGES):
         held = hold(instance, equal, active)
         reach = abs(rows) @ sizes(instance, held.x.hi) + np.abs(right)
@@ -80,7 +80,7 @@ def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -
         active = np.setdiff1d(np.union1d(active, entering), leaving)
         if not _is_regular(instance, equal, active):
             active = _kept(instance, equal, rows, active)
-    if least <= ROUNDED:
+    if best is not None and least <= ROUNDED:
         return best
     raise BackendError(f"{instance.name}: no active set is confirmed; the best one is off by {least:.1e}.")
 
@@ -199,7 +199,7 @@ def _pushing(instance: SuiteInstance, equal, rows, candidates, x: np.ndarray) ->
     return _kept(instance, equal, rows, candidates[push > ACTIVE * push.max(initial=0.0)])
 
 
-def holding(instance: SuiteInstance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def held_rows(instance: SuiteInstance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Plain rows that hold with equality at x; those of them that are rows of G, and the variables at a bound."""
     rows, right = instance.plain_rows()
     slack = np.abs((right - product(rows, x)).rounded())
@@ -211,7 +211,7 @@ def holding(instance: SuiteInstance, x: Doubled) -> tuple[np.ndarray, np.ndarray
 def _reference(instance: SuiteInstance, held: Held, equal: np.ndarray) -> SuiteReference:
     z, z_box = instance.multipliers(held.plain)
     found = residuals(instance, held.x, held.y, z, z_box)
-    holds, active, bounds = holding(instance, held.x)
+    holds, active, bounds = held_rows(instance, held.x)
     contradiction = max(found.primal, found.complementarity)
     known = held.digits if contradiction <= STRICT else min(held.digits, -np.log10(contradiction))
     unique = equal.size == instance.b.size and _is_regular(instance, equal, holds)

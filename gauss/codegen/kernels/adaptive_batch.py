@@ -78,7 +78,7 @@ class AdaptiveBatchLoop(BatchLoop):
     """
 
     def __init__(self, method: Adaptive, written: slice):
-        self.method, self.written = method, written
+        self.size, self.written = method.size, written
         writer = Writer()
         _AdaptiveBatchWriter(
             method, LoopCode(writer, "adaptive_batch", POINTERS, MotionQueue, machine.width()), written
@@ -87,7 +87,7 @@ class AdaptiveBatchLoop(BatchLoop):
 
     def lanes(self) -> np.ndarray:
         """Array (size + len(MOTION_RECORD) + 1, width) of empty lanes."""
-        empty = np.zeros((self.method.size + len(MOTION_RECORD) + 1, self.width))
+        empty = np.zeros((self.size + len(MOTION_RECORD) + 1, self.width))
         empty[-1] = -1.0
         return empty
 
@@ -109,7 +109,7 @@ class AdaptiveBatchLoop(BatchLoop):
         budget : int
             Steps.
         """
-        self._function(queue, lanes, motions, grid, out, budget)
+        self._run.call(queue, lanes, motions, grid, out, budget)
 
 
 class _AdaptiveBatchWriter:

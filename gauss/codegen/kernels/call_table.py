@@ -32,11 +32,11 @@ class CallTable:
         lengths = [1 + len(function.inputs) + len(function.outputs) for function in functions]
         _loop(module, codes, lengths)
         self.code = machine.load(str(module))
-        self._run = SIGNATURE(self.code.address("run"))
+        self._run = self.code.entry("run", SIGNATURE)
 
     def run(self, memory: np.ndarray, table: np.ndarray):
         """Execute a table of int32 entries: index of a function, addresses of its inputs, then of its outputs."""
-        self._run(memory.ctypes.data, table.ctypes.data, table.size)
+        self._run.call(memory.ctypes.data, table.ctypes.data, table.size)
 
 
 def _code(module: ir.Module, name: str, function: Function) -> ir.Function:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gauss.codegen import Function, Writer, machine
+from gauss.codegen import Function, NativeFunction, Writer, machine
 from gauss.codegen.kernels.loop_control import Control, Numbers
 
 FLOAT = np.dtype(float)
@@ -26,14 +26,20 @@ class Loop:
         Functions of the loop that can also be called by name, see :meth:`evaluate`.
     """
 
-    def __init__(self, writer: Writer, name: str, functions: Sequence[Function]):
+    def __init__(self, writer: Writer, name: str, functions: Sequence[Function | NativeFunction]):
         for function in functions:
             writer.export(function, function.name)
-        self.code = machine.load(str(writer.module))
+        self.__setstate__((machine.load(str(writer.module)), name, {f.name: f.arity for f in functions}))
+
+    def __getstate__(self) -> tuple:
+        return self.code, self.name, self.arities
+
+    def __setstate__(self, state: tuple):
+        self.code, self.name, self.arities = state
         single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-        self._single = {f.name: (single(self.code.address(f.name)), len(f.inputs), len(f.outputs)) for f in functions}
+        self._single = {name: (self.code.entry(name, single), *arity) for name, arity in self.arities.items()}
         pointers = [ctypes.c_void_p] * len(POINTERS)
-        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address(name))
+        self._run = self.code.entry(self.name, ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64))
 
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
         """Run to the end, or until the budget is used up; it changes ``control`` and all arrays except ``grid``.
@@ -47,7 +53,7 @@ class Loop:
         for array in arrays:
             if array.dtype is not FLOAT or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
-        self._function(ctypes.byref(control), *map(address, arrays), budget)
+        self._run.call(ctypes.byref(control), *map(address, arrays), budget)
 
     def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n_out,) of one of the functions for inputs (n_in,).
@@ -61,7 +67,7 @@ class Loop:
         given, found = np.ascontiguousarray(inputs, dtype=float), np.empty(n_out)
         if given.shape != (n_in,):
             raise ValueError(f"{name}: expected ({n_in},) inputs, got shape {given.shape}.")
-        function(address(given), address(found))
+        function.call(address(given), address(found))
         return found
 
 
@@ -87,9 +93,20 @@ class BatchLoop:
 
     def __init__(self, writer: Writer, name: str, control: type[Numbers], arrays: int):
         self.width, self.code = machine.width(), machine.load(str(writer.module), optimise=2)  # runs for long
+        self.name, self.control, self.arrays = name, control, arrays
+        self._bind()
+
+    def _bind(self):
         array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(control), *[array] * arrays, ctypes.c_int64)
-        self._function = signature(self.code.address(name))
+        signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(self.control), *[array] * self.arrays, ctypes.c_int64)
+        self._run = self.code.entry(self.name, signature)
+
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in vars(self).items() if name != "_run"}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
 
 
 def address(array: np.ndarray) -> int:

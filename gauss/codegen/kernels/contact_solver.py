@@ -211,7 +211,7 @@ class CompiledContactSolver:
         r.call(inner, *r.integers, *r.arrays)
         r.done()
         self.code = machine.load(str(writer.module))
-        self._solve = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8)(self.code.address("solve"))
+        self._solve = self.code.entry("solve", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8))
 
     def __call__(self, W, b, under, friction, limit, start) -> tuple[np.ndarray, float]:
         """Forces (n,) and the residual of the laws, −1 if no solution was found.
@@ -231,5 +231,5 @@ class CompiledContactSolver:
         forces, left, room = np.array(start, dtype=float), np.empty(1), np.empty(self.solver.room(start.size))
         arrays = [np.ascontiguousarray(array, dtype=float) for array in (W, b, friction, limit)]
         arrays.insert(2, np.ascontiguousarray(under, dtype=np.int64))
-        self._solve(*counts, *(array.ctypes.data for array in (*arrays, forces, left, room)))
+        self._solve.call(*counts, *(array.ctypes.data for array in (*arrays, forces, left, room)))
         return forces, float(left[0])

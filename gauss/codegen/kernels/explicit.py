@@ -1,7 +1,8 @@
 """Explicit Runge–Kutta steps: kᵢ = f(t + cᵢ h, y + h Σⱼ aᵢⱼ kⱼ) by calls, sums over stages as loops over the entries of y.
 
-Unrolled sums would grow with the square of the number of stages. A row y of one motion is padded with zeros to ``stride``, a
-multiple of the SIMD width; in a batch every entry is a SIMD vector already, and rows are not padded.
+Unrolled, the code would grow with the square of the number of stages. A row y of one motion is
+padded with zeros to ``stride``, a multiple of the SIMD width; in a batch every entry is a SIMD vector already, and rows are
+not padded.
 """
 
 from dataclasses import dataclass
@@ -9,8 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, NativeFunction, Writer, copy, machine
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer, machine
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS
+from gauss.codegen.kernels.row_code import RowCode
+from gauss.codegen.kernels.slope_sums import SlopeSums
 
 
 def stride(n_y: int) -> int:
@@ -50,10 +53,10 @@ class ExplicitTrial(NativeFunction):
     size: int
     row: int
     indicator: int
-    start: Function
-    slope: Function
-    finish: Function
-    control: Function
+    start: Function | NativeFunction
+    slope: Function | NativeFunction
+    finish: Function | NativeFunction
+    control: Function | NativeFunction
     name = "trial"
 
     @property
@@ -63,15 +66,15 @@ class ExplicitTrial(NativeFunction):
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code for one motion, or for one per SIMD lane."""
-        rows, size, row, s = _RowWriter(writer, self.begin(writer.module), self.row, width), self.size, self.row, len(self.b)
+        rows, size, row, s = RowCode(writer, self.begin(writer.module), width), self.size, self.row, len(self.b)
+        sums = SlopeSums(rows, [*self.A[1:], self.b, *self.errors], row)
         x, out = rows.given, rows.found
-        h, K = rows.number(x, size), rows.at(out, size + TRIAL_RESULTS)
-        y0 = rows.begin(self.start, x, K)
-        rows.stages(self.slope, x, size, h, y0, K, (self.A, self.c), 1)
+        h, K = rows.at(x, size), rows.at(out, size + TRIAL_RESULTS)
+        y0 = _begin(rows, self.start, x, K, row)
+        _stages(rows, self.slope, x, size, h, y0, K, self.c[1:], 1, sums)
         changed, found = rows.room(size + 1 + row), rows.room(size + row)
-        rows.copy(changed, x, size)
-        rows.put(changed, size, h)
-        rows.combine(rows.at(changed, size + 1), None, h, self.b, K)
+        rows.copy(changed, x, size + 1)
+        sums.write(rows.at(changed, size + 1), sums.zeros(), h, INTEGER(s - 1), K)
         rows.call(self.finish, changed, found)
         rows.copy(out, found, size)
         rows.copy(rows.at(K, s * row), rows.at(found, size), row)
@@ -81,8 +84,10 @@ class ExplicitTrial(NativeFunction):
         rows.copy(rows.at(inputs, given), out, size)
         for k in range(s + 1):
             rows.put(inputs, given + size + k, rows.number(K, k * row + self.indicator))
-        for k, weights in enumerate(self.errors):
-            rows.combine(rows.at(inputs, given + size + s + 1 + k * row), None, None, weights, K)
+        one = rows.room(1)
+        rows.put(one, 0, rows.motions.constant(1.0))
+        for k in range(len(self.errors)):
+            sums.write(rows.at(inputs, given + size + s + 1 + k * row), sums.zeros(), one, INTEGER(s + k), K)
         rows.call(self.control, inputs, rows.at(out, size))
         return rows.done()
 
@@ -108,8 +113,8 @@ class Interpolation(NativeFunction):
     weights: np.ndarray
     size: int
     row: int
-    start: Function
-    slope: Function
+    start: Function | NativeFunction
+    slope: Function | NativeFunction
     name = "interpolation"
 
     @property
@@ -120,108 +125,34 @@ class Interpolation(NativeFunction):
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code for one motion, or for one per SIMD lane."""
-        rows, size, row = _RowWriter(writer, self.begin(writer.module), self.row, width), self.size, self.row
-        x, known = rows.given, self.A.shape[1] - len(self.c)
-        h, K = rows.number(x, 2 * size), rows.room(self.A.shape[1] * row)
-        y0 = rows.begin(self.start, x, K)
+        rows, size, row = RowCode(writer, self.begin(writer.module), width), self.size, self.row
+        x, known, m = rows.given, self.A.shape[1] - len(self.c), len(self.c)
+        sums = SlopeSums(rows, [*self.A, *self.weights], row)
+        h, K = rows.at(x, 2 * size), rows.room(self.A.shape[1] * row)
+        y0 = _begin(rows, self.start, x, K, row)
         rows.copy(K, rows.at(x, 2 * size + 1), known * row)
-        rows.stages(self.slope, x, size, h, y0, K, (self.A, self.c), known)
-        for k, weights in enumerate(self.weights):
-            rows.combine(rows.at(rows.found, k * row), None, h, weights, K)
+        _stages(rows, self.slope, x, size, h, y0, K, self.c, known, sums)
+        with rows.each(len(self.weights)) as k:
+            target = rows.at(rows.found, rows.b.mul(k, INTEGER(row)))
+            sums.write(target, sums.zeros(), h, rows.b.add(k, INTEGER(m)), K)
         return rows.done()
 
 
-class _RowWriter:
-    """Emitter of a function on rows y of ``size`` numbers, for ``width`` motions."""
+def _begin(rows: RowCode, start: Function | NativeFunction, x, K, size: int):
+    """Row y of a point; its slope becomes the first of K."""
+    both = rows.room(2 * size)
+    rows.call(start, x, both)
+    rows.copy(K, rows.at(both, size), size)
+    return both
 
-    def __init__(self, writer: Writer, function: ir.Function, size: int, width: int):
-        self.writer, self.function, self.size, self.width = writer, function, size, width
-        self.given, _, self.found, _ = self.function.args
-        self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
-        self.motions = Lanes(writer.module, width, self.b)
-        self.block = Lanes(writer.module, machine.width(), self.b) if width == 1 else self.motions
 
-    def room(self, size: int):
-        """Buffer of ``size`` numbers."""
-        with self.b.goto_entry_block():
-            room = self.b.alloca(DOUBLE, max(size * self.width, 1))
-        room.align = LINE
-        return room
-
-    def at(self, pointer, offset: int):
-        """Pointer to an entry."""
-        return self.b.gep(pointer, [INTEGER(offset * self.width)])
-
-    def number(self, pointer, offset: int):
-        """Read a number."""
-        return self.motions.load(pointer, INTEGER(offset * self.width))
-
-    def put(self, pointer, offset: int, value):
-        """Write a number."""
-        self.motions.store(value, pointer, INTEGER(offset * self.width))
-
-    def copy(self, target, source, size: int):
-        """Copy numbers; the two do not overlap."""
-        copy(self.b, target, source, size * self.width)
-
-    def call(self, function: Function, given, found):
-        """Call a traced function."""
-        apart = INTEGER(self.width)
-        self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])
-
-    def begin(self, start: Function, x, K):
-        """Row y of a point; its slope becomes the first of K."""
-        both = self.room(2 * self.size)
-        self.call(start, x, both)
-        self.copy(K, self.at(both, self.size), self.size)
-        return both
-
-    def stages(self, slope: Function, x, size: int, h, y0, K, method, first: int):
-        """Compute the slopes from stage ``first`` on; earlier ones are known."""
-        A, c = method
-        given = self.room(size + 1 + self.size)
-        self.copy(given, x, size)
-        known = A.shape[1] - len(c)
-        for i in range(first - known, len(c)):
-            self.put(given, size, self.motions.fused("fma", self.motions.constant(float(c[i])), h, self.number(x, 0)))
-            self.combine(self.at(given, size + 1), y0, h, A[i, : known + i], K)
-            self.call(slope, given, self.at(K, (known + i) * self.size))
-
-    def combine(self, target, base, h, weights, K):
-        """Write ``target = base + h · weights @ K``; without base or h where they are None."""
-        terms = [(i, float(weight)) for i, weight in enumerate(weights) if weight]
-        lanes, b = self.block, self.b
-        h = h if h is None or self.width > 1 else lanes.broadcast(h)
-
-        def block(k):
-            total = None
-            for i, weight in terms:
-                slope = lanes.load(K, b.add(k, INTEGER(i * self.size * self.width)))
-                weight = lanes.constant(weight)
-                total = b.fmul(slope, weight) if total is None else lanes.fused("fma", slope, weight, total)
-            if base is not None:
-                total = lanes.fused("fma", total, h, lanes.load(base, k))
-            elif h is not None:
-                total = b.fmul(total, h)
-            lanes.store(total, target, k)
-
-        self._each_block(block)
-
-    def done(self) -> ir.Function:
-        """End the function."""
-        self.b.ret_void()
-        return self.function
-
-    def _each_block(self, body):
-        """Write a loop over the entries of a row, a vector register at a time."""
-        before = self.b.block
-        inside, after = (self.function.append_basic_block(name) for name in ("inside", "after"))
-        self.b.branch(inside)
-        self.b.position_at_end(inside)
-        k = self.b.phi(INTEGER)
-        k.add_incoming(INTEGER(0), before)
-        body(k)
-        following = self.b.add(k, INTEGER(self.block.width))
-        k.add_incoming(following, inside)
-        self.b.cbranch(self.b.icmp_signed("<", following, INTEGER(self.size * self.width)), inside, after)
-        self.b.position_at_end(after)
+def _stages(rows: RowCode, slope: Function | NativeFunction, x, size: int, h, y0, K, nodes: np.ndarray, known: int, sums):
+    """Compute the slopes of stages at t + c h, by a loop over their nodes c; ``known`` slopes precede them."""
+    b, row = rows.b, sums.size
+    given = rows.room(size + 1 + row)
+    rows.copy(given, x, size)
+    with rows.each(len(nodes)) as i:
+        node = rows.motions.broadcast(rows.constant(f"{rows.function.name}_nodes", nodes, i))
+        rows.put(given, size, rows.motions.fused("fma", node, rows.number(h, 0), rows.number(x, 0)))
+        sums.write(rows.at(given, size + 1), y0, h, i, K)
+        rows.call(slope, given, rows.at(K, b.mul(b.add(i, INTEGER(known)), INTEGER(row))))

@@ -60,7 +60,7 @@ class FixedStepBatchLoop(BatchLoop):
     """
 
     def __init__(self, method: Fixed, start: Function, written: slice):
-        self.method, self.written = method, written
+        self.size, self.evaluations, self.written = method.size, method.evaluations, written
         writer = Writer()
         _write(LoopCode(writer, "fixed_step_batch", POINTERS, BatchSpan, machine.width()), method, start, written)
         super().__init__(writer, "fixed_step_batch", BatchSpan, len(POINTERS) - 1)
@@ -80,7 +80,7 @@ class FixedStepBatchLoop(BatchLoop):
         out : ndarray, shape (columns, rows, row)
             Sample k of each motion is that after ``k * keep`` steps.
         """
-        self._function(span, points, worst, out, 0)
+        self._run.call(span, points, worst, out, 0)
 
 
 def _write(code: LoopCode, method: Fixed, start: Function, written: slice):

@@ -45,7 +45,7 @@ class ContactLaws(NamedTuple):
         Normal force of each of these.
     friction : ndarray, shape (k,)
         Coefficients of friction.
-    grip : ndarray of int, shape (g,)
+    set_valued : ndarray of int, shape (g,)
         Forces of set-valued elements.
     limit : ndarray, shape (g,)
         Their limits [N m, N].
@@ -55,7 +55,7 @@ class ContactLaws(NamedTuple):
     across: np.ndarray
     under: np.ndarray
     friction: np.ndarray
-    grip: np.ndarray
+    set_valued: np.ndarray
     limit: np.ndarray
 
 
@@ -112,7 +112,9 @@ class ContactProblem:
             after = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * momentum * momentum))
             ahead = new + (momentum - 1.0) / after * (new - f)
             f, momentum = new, after
-        raise SimulationError("no forces of contacts and grips were found that obey their laws; shorten the step.")
+        raise SimulationError(
+            "no forces of contacts and set-valued elements were found that obey their laws; shorten the step."
+        )
 
     def _allowed(self, f: np.ndarray) -> np.ndarray:
         """Projection of forces on the friction cones and the limits of set-valued elements."""
@@ -125,7 +127,7 @@ class ContactProblem:
                 height = max(0.0, (f[n] + mu * size) / (1.0 + mu * mu))
                 f[t] = mu * height / size * f[t]
                 f[n] = height
-        f[laws.grip] = np.clip(f[laws.grip], -laws.limit, laws.limit)
+        f[laws.set_valued] = np.clip(f[laws.set_valued], -laws.limit, laws.limit)
         return f
 
 
@@ -156,13 +158,13 @@ def contact_solver() -> ContactSolver:
         moved, radius = np.array([f1 - u1 / w, f2 - u2 / w]), friction * unilateral(f - u / v)
         return np.array([f1, f2]) - on_disc(moved, radius)
 
-    def grip(f, u, w, limit):
+    def set_valued(f, u, w, limit):
         return [f - limited(f - u / w, limit)]
 
     return ContactSolver(
         _with_slopes(normal, 3, (0, 1)),
         _with_slopes(rough, 9, (0, 1, 5, 2, 3, 6)),
-        _with_slopes(grip, 4, (0, 1)),
+        _with_slopes(set_valued, 4, (0, 1)),
         write(lambda x: [unilateral(x[0])], 1, name="pushing"),
         write(lambda x: on_disc(x[:2], x[2]), 3, name="rubbing"),
         write(lambda x: [limited(*x)], 2, name="holding"),

@@ -17,6 +17,7 @@ import numpy as np
 
 from gauss.backends import BACKENDS, solve
 from gauss.backends.active_set import active_rows
+from gauss.backends.backend import Backend
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
@@ -99,7 +100,7 @@ def impact(
     rebound = restitution * np.maximum(-found.rate, 0.0)
     rebound[rebound < SLOWEST_REBOUND / system.scale.time * gap_scales(system)] = 0.0
     rate, slopes, _ = set_valued_rows(motion)
-    one_way = np.array([grip.one_way for grip in system.scene.grips.values()], dtype=bool)
+    one_way = np.array([element.one_way for element in system.scene.set_valued.values()], dtype=bool)
     catches = one_way & (rate <= resting(system, state.v) * set_valued_scales(system))
     caught = slopes[catches]
     problem = replace(
@@ -113,7 +114,7 @@ def impact(
         solution = certified(problem, backend, f"impact{of} at t = {state.t:.6g} s")
     except SimulationError:
         names = [sides(system.scene)[i].name for i in touching]
-        names += [name for name, takes in zip(system.scene.grips, catches, strict=True) if takes]
+        names += [name for name, takes in zip(system.scene.set_valued, catches, strict=True) if takes]
         if not driven:
             _refuse_jammed(system, problem, np.concatenate([before, state.v]), names, state)
         raise
@@ -172,7 +173,7 @@ def jammed_error(where: str, names: list[str], speed: float) -> SimulationError:
     )
 
 
-def certified(problem: Compulsion, backend: str, what: str):
+def certified(problem: Compulsion, backend: str | Backend | type, what: str):
     """Solution of a quadratic programme; a SimulationError if it is not certified."""
     solution = solve(problem, "auto" if getattr(backend, "name", backend) in BACKENDS else backend)
     if not solution.status.certified:

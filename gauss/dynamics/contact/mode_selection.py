@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends.backend import Backend
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion, checked_load
 from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
@@ -41,7 +42,7 @@ class ActiveMode(NamedTuple):
     ----------
     gaps : tuple of int
         Gaps that stay closed.
-    told : ContactMode
+    mode : ContactMode
         Mode of all other elements.
     forces : dict of str to float
         Forces of set-valued elements along their coordinates, and of links with losses on the driven ones [N m, N].
@@ -54,7 +55,7 @@ class ActiveMode(NamedTuple):
     """
 
     gaps: tuple[int, ...]
-    told: ContactMode
+    mode: ContactMode
     forces: dict[str, float]
     solution: Solution
     system: System
@@ -63,13 +64,13 @@ class ActiveMode(NamedTuple):
     @property
     def case(self) -> tuple:
         """Key of the phase."""
-        return self.gaps, self.told
+        return self.gaps, self.mode
 
 
 class ModeTrial(NamedTuple):
     """Solution of one mode."""
 
-    told: ContactMode
+    mode: ContactMode
     system: System
     solution: Solution
     forces: dict[str, float]
@@ -88,7 +89,7 @@ class ModeProblem(NamedTuple):
     whole: Kinematics
     gaps: Gaps
     touching: np.ndarray
-    backend: str
+    backend: str | Backend | type
     load: np.ndarray
 
 
@@ -103,37 +104,39 @@ class ModeSelector:
 
     def __init__(self, system: System):
         scene = system.scene
-        self.system, self.names, self.grips = system, tuple(scene.grips), tuple(scene.grips.values())
-        self.one_way = np.array([grip.one_way for grip in self.grips], dtype=bool)
-        self.sticks = np.array([grip.sticks for grip in self.grips], dtype=bool)
-        self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(len(self.grips), system.n_v)
-        self.losses, self.trains, self.plays = scene.losses, gear_trains(scene), scene.plays
+        self.system, self.names, self.set_valued = system, tuple(scene.set_valued), tuple(scene.set_valued.values())
+        self.one_way = np.array([element.one_way for element in self.set_valued], dtype=bool)
+        self.sticks = np.array([element.sticks for element in self.set_valued], dtype=bool)
+        self.slopes = np.array([_slope(system, element) for element in self.set_valued]).reshape(
+            len(self.set_valued), system.n_v
+        )
+        self.losses, self.trains, self.backlashes = scene.losses, gear_trains(scene), scene.backlashes
         units, energy = system.scale.coordinates, system.scale.energy
         self.sizes, self.roots = (
             set_valued_scales(system),
             np.array([units[system.column(train.root)] for train in self.trains]),
         )
         driven = {name: energy / units[system.column(link.driven)] for name, link in self.losses.items()}
-        self.efforts = driven | dict(zip(self.names, (energy / self.sizes).tolist(), strict=True))
+        self.force_units = driven | dict(zip(self.names, (energy / self.sizes).tolist(), strict=True))
         self.rubbing = {  # joint friction in gear trains: root, and direction of the joint relative to it
-            grip.name: (train.root, np.sign(train.rates[grip.joint]))
-            for grip in self.grips
+            element.name: (train.root, np.sign(train.rates[element.joint]))
+            for element in self.set_valued
             for train in self.trains
-            if isinstance(grip, JointFriction) and grip.joint in train.rates
+            if isinstance(element, JointFriction) and element.joint in train.rates
         }
         self.cases: dict[ContactMode, tuple[System, NonIdealRows]] = {}
 
-    def case(self, told: ContactMode) -> tuple[System, NonIdealRows]:
+    def case(self, mode: ContactMode) -> tuple[System, NonIdealRows]:
         """System of a mode without unilateral constraints, and its links with losses."""
-        if told not in self.cases:
-            smooth = not (self.names or self.losses or self.plays)
-            system = self.system if smooth else build(phase_scene(self.system.scene, (), told), self.system.dynamics.anew())
-            self.cases[told] = system, non_ideal_rows(system, self.system, told)
-        return self.cases[told]
+        if mode not in self.cases:
+            smooth = not (self.names or self.losses or self.backlashes)
+            system = self.system if smooth else build(phase_scene(self.system.scene, (), mode), self.system.dynamics.anew())
+            self.cases[mode] = system, non_ideal_rows(system, self.system, mode)
+        return self.cases[mode]
 
     def rates(self, state: State) -> np.ndarray:
         """Slip rates (g,) of the set-valued elements."""
-        return self.slopes @ state.v - np.array([float(grip.rate(state.t)) for grip in self.grips])
+        return self.slopes @ state.v - np.array([float(element.rate(state.t)) for element in self.set_valued])
 
     def turning(self, state: State) -> np.ndarray:
         """Rates of the roots of the gear trains."""
@@ -143,10 +146,10 @@ class ModeSelector:
         """Freewheels whose driven joint is slower than the driver, which needs an impact."""
         return np.flatnonzero(self.one_way & (self.rates(state) < -resting(self.system, state.v) * self.sizes))
 
-    def flanks(self, state: State) -> dict[str, int]:
+    def backlash_sides(self, state: State) -> dict[str, int]:
         """Side of the backlash in contact, −1, 0 or 1, of each elastic link."""
         motion, found = Kinematics(self.system, state), {}
-        for name, play in self.plays.items():
+        for name, play in self.backlashes.items():
             touch = {side: float(play.touch(*play.ends(motion), side)) for side in (-1, 1)}
             best = max(touch, key=touch.get)
             found[name] = best if touch[best] > 0.0 else 0
@@ -157,7 +160,12 @@ class ModeSelector:
         return closed(self.system, gaps(kinematics(self.system, state)), state.v)
 
     def choose(
-        self, state: State, touching: np.ndarray, backend: str, flanks: dict[str, int] | None = None, load=None
+        self,
+        state: State,
+        touching: np.ndarray,
+        backend: str | Backend | type,
+        backlash_sides: dict[str, int] | None = None,
+        load=None,
     ) -> ActiveMode:
         """Mode in a state with the closed gaps ``touching``.
 
@@ -167,9 +175,9 @@ class ModeSelector:
             The state.
         touching : ndarray of int
             Closed gaps.
-        backend : str
+        backend : str or Backend
             Backend of the trials.
-        flanks : dict, optional
+        backlash_sides : dict, optional
             Sides of the backlash in contact; those of the state when not given.
         load : array_like, shape (n_v,), optional
             Generalised forces added to those of the scene [N m, N].
@@ -185,59 +193,59 @@ class ModeSelector:
         signs = (
             np.where(self.sticks, np.where(np.abs(rates) <= small * self.sizes, 0, -np.sign(rates)), 1).astype(int).tolist()
         )
-        ways = np.where(np.abs(turning) <= small * self.roots, FREE, np.sign(turning)).astype(int).tolist()
-        told = self._with_train_friction(
+        directions = np.where(np.abs(turning) <= small * self.roots, FREE, np.sign(turning)).astype(int).tolist()
+        mode = self._with_train_friction(
             ContactMode(
-                grips=dict(zip(self.names, signs, strict=True)),
-                ways=dict.fromkeys(self.losses, 0),
-                trains={train.root: way for train, way in zip(self.trains, ways, strict=True)},
-                flanks=self.flanks(state) if flanks is None else flanks,
+                set_valued=dict(zip(self.names, signs, strict=True)),
+                power_flow=dict.fromkeys(self.losses, 0),
+                trains={train.root: way for train, way in zip(self.trains, directions, strict=True)},
+                backlash_sides=self.backlash_sides(state) if backlash_sides is None else backlash_sides,
             )
         )
-        resting_trains = [train.root for train in self.trains if told.trains[train.root] == FREE]
-        found = self._pivoted(at, told)
+        resting_trains = [train.root for train in self.trains if mode.trains[train.root] == FREE]
+        found = self._pivoted(at, mode)
         for _ in range(MOST_PIVOTS):
-            before = found.told
+            before = found.mode
             for root in resting_trains:
                 found = self._moved_from_rest(at, found, root)
-            if found.told == before:
+            if found.mode == before:
                 break
         slack = at.gaps.J[touching] @ found.x - at.gaps.D[touching]
         stays = slack <= LEAVING * self._scale(at, found) * gap_scales(self.system)[touching]
         return ActiveMode(
-            tuple(touching[stays].tolist()), found.told, found.forces, found.solution, found.system, found.load
+            tuple(touching[stays].tolist()), found.mode, found.forces, found.solution, found.system, found.load
         )
 
     def _moved_from_rest(self, at: ModeProblem, found: ModeTrial, root: str) -> ModeTrial:
         """Trial of a gear train at rest: moving against its losses if it accelerates so, else sticking."""
         column = self.system.column(root)
         for way in (1, -1):
-            moving = self._pivoted(at, self._with_train_friction(found.told.but(trains={root: way})))
+            moving = self._pivoted(at, self._with_train_friction(found.mode.but(trains={root: way})))
             unit = self.system.scale.coordinates[column]
             if moving.solution.qdd[column] * way > LEAVING * self._scale(at, moving) * unit:
                 return moving
-        return self._pivoted(at, self._with_train_friction(found.told.but(trains={root: 0})))
+        return self._pivoted(at, self._with_train_friction(found.mode.but(trains={root: 0})))
 
-    def _with_train_friction(self, told: ContactMode) -> ContactMode:
+    def _with_train_friction(self, mode: ContactMode) -> ContactMode:
         """Mode with joint friction set consistently with each gear train: opposing its motion, or sticking."""
-        grips = {
-            name: int(-told.trains[root] * sign) for name, (root, sign) in self.rubbing.items() if told.trains[root] != FREE
+        set_valued = {
+            name: int(-mode.trains[root] * sign) for name, (root, sign) in self.rubbing.items() if mode.trains[root] != FREE
         }
-        return told.but(grips=grips)
+        return mode.but(set_valued=set_valued)
 
-    def _pivoted(self, at: ModeProblem, told: ContactMode) -> ModeTrial:
+    def _pivoted(self, at: ModeProblem, mode: ContactMode) -> ModeTrial:
         """Trial with the given modes of gear trains in which no set-valued element violates its law."""
         _, J, D = set_valued_rows(at.whole)
-        free = [name not in self.rubbing or told.trains[self.rubbing[name][0]] == FREE for name in self.names]
+        free = [name not in self.rubbing or mode.trains[self.rubbing[name][0]] == FREE for name in self.names]
         rests = self.sticks & (np.abs(self.rates(at.state)) <= resting(self.system, at.state.v) * self.sizes)
         for _ in range(MOST_PIVOTS):
             try:
-                found = self._consistent(at, told)
+                found = self._consistent(at, mode)
             except SimulationError as error:
-                found = self._slipping(at, told, rests & np.array(free, dtype=bool), J, D)
+                found = self._slipping(at, mode, rests & np.array(free, dtype=bool), J, D)
                 if found is None:
                     raise error
-            signs = np.array([found.told.grips[name] for name in self.names], dtype=int)
+            signs = np.array([found.mode.set_valued[name] for name in self.names], dtype=int)
             force = np.array([found.forces[name] for name in self.names])
             over = self.beyond(signs, force, at.state.t)
             returns = rests & (signs * (J @ found.x - D) > LEAVING * self._scale(at, found) * self.sizes)
@@ -245,74 +253,74 @@ class ModeSelector:
             if not wrong.size:
                 return found
             first = wrong[0]
-            told = found.told.but(grips={self.names[first]: 0 if returns[first] else int(np.sign(force[first]))})
+            mode = found.mode.but(set_valued={self.names[first]: 0 if returns[first] else int(np.sign(force[first]))})
         names = ", ".join(repr(self.names[i]) for i in wrong)
         raise SimulationError(f"t = {at.state.t:.6g} s: no forces of {names} within their limits were found.")
 
-    def _slipping(self, at: ModeProblem, told: ContactMode, rests, J, D) -> ModeTrial | None:
+    def _slipping(self, at: ModeProblem, mode: ContactMode, rests, J, D) -> ModeTrial | None:
         """Trial in which an element that cannot stick, because of the constraints, slips; None if it cannot slip either.
 
         Its row depends on theirs, as for a clutch between two driven joints: it reverses its slip at this instant.
         """
-        for i in (i for i in np.flatnonzero(rests) if not told.grips[self.names[i]]):
+        for i in (i for i in np.flatnonzero(rests) if not mode.set_valued[self.names[i]]):
             for sign in (-1, 1):
                 try:
-                    found = self._consistent(at, told.but(grips={self.names[i]: sign}))
+                    found = self._consistent(at, mode.but(set_valued={self.names[i]: sign}))
                 except SimulationError:
                     continue
                 if sign * (J[i] @ found.x - D[i]) < 0.0:
                     return found
         return None
 
-    def _consistent(self, at: ModeProblem, told: ContactMode) -> ModeTrial:
+    def _consistent(self, at: ModeProblem, mode: ContactMode) -> ModeTrial:
         """Trial with consistent directions of power flow."""
         for _ in range(MOST_FLOW_CHANGES):
-            found = self._trial(at, told)
-            ways = self.ways(told, found.forces)
-            if ways == told.ways:
+            found = self._trial(at, mode)
+            power_flow = self.power_flow(mode, found.forces)
+            if power_flow == mode.power_flow:
                 return found
-            told = told.but(ways=ways)
-        names = ", ".join(repr(name) for name in ways if ways[name] != found.told.ways[name])
+            mode = mode.but(power_flow=power_flow)
+        names = ", ".join(repr(name) for name in power_flow if power_flow[name] != found.mode.power_flow[name])
         raise SimulationError(
-            f"t = {at.state.t:.6g} s: no way of the power through {names} was found that fits its forces: what lossy links "
-            "and grips do at once may be open; soften one of them by an elastic link."
+            f"t = {at.state.t:.6g} s: no direction of power flow through {names} fits its forces: what lossy links "
+            "and set-valued elements do at once may be open; soften one of them by an elastic link."
         )
 
-    def ways(self, told: ContactMode, forces: dict[str, float]) -> dict[str, int]:
+    def power_flow(self, mode: ContactMode, forces: dict[str, float]) -> dict[str, int]:
         """Directions of power flow through links with losses, for given forces; those without force as before."""
         largest, found = self.largest(forces), {}
         for name, link in self.losses.items():
-            flow = forces[name] * self.direction(told, link.driver) / link.ratio
-            before = told.ways[name]
-            unclear = before and abs(forces[name]) <= NO_POWER_FLOW * largest * self.efforts[name]
-            found[name] = 0 if not self.direction(told, link.driver) else before if unclear else 1 if flow >= 0.0 else -1
+            flow = forces[name] * self.direction(mode, link.driver) / link.ratio
+            before = mode.power_flow[name]
+            unclear = before and abs(forces[name]) <= NO_POWER_FLOW * largest * self.force_units[name]
+            found[name] = 0 if not self.direction(mode, link.driver) else before if unclear else 1 if flow >= 0.0 else -1
         return found
 
     def largest(self, forces: dict[str, float]) -> float:
         """Largest force, in forces of the scene."""
-        return max((abs(force) / self.efforts[name] for name, force in forces.items()), default=0.0)
+        return max((abs(force) / self.force_units[name] for name, force in forces.items()), default=0.0)
 
     def beyond(self, signs, force: np.ndarray, t: float) -> np.ndarray:
         """Mask (g,) of the sticking elements with a force out of bounds."""
-        low, high = np.array([grip.bounds(t) for grip in self.grips]).reshape(-1, 2).T
-        efforts = np.array([self.efforts[name] for name in self.names])
-        slack = BOUND_TOLERANCE * np.where(np.isfinite(high - low), high - low, UNBOUNDED_WIDTH * efforts)
+        low, high = np.array([element.bounds(t) for element in self.set_valued]).reshape(-1, 2).T
+        force_units = np.array([self.force_units[name] for name in self.names])
+        slack = BOUND_TOLERANCE * np.where(np.isfinite(high - low), high - low, UNBOUNDED_WIDTH * force_units)
         return (np.asarray(signs) == 0) & ((force < low - slack) | (force > high + slack))
 
-    def direction(self, told: ContactMode, joint: str) -> float:
+    def direction(self, mode: ContactMode, joint: str) -> float:
         """Direction of motion of a joint in its gear train; 0 at rest."""
         train = next(train for train in self.trains if joint in train.rates)
-        way = told.trains[train.root]
+        way = mode.trains[train.root]
         return 0.0 if way == FREE else float(way * np.sign(train.rates[joint]))
 
-    def _trial(self, at: ModeProblem, told: ContactMode) -> ModeTrial:
-        system, links = self.case(told)
+    def _trial(self, at: ModeProblem, mode: ContactMode) -> ModeTrial:
+        system, links = self.case(mode)
         motion, extra, what = kinematics(system, at.state), links.W - links.R, f"what holds at t = {at.state.t:.6g} s"
         applied, found = Applied(motion), None
         if links.names and not at.touching.size:
             problem = assemble_motion(motion, applied, at.load)
             Q, found = with_losses(problem, links, lambda problem: certified(problem, at.backend, what))
-            return ModeTrial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
+            return ModeTrial(mode, system, found, forces_of(self.system, system, mode, at.state, found), Q @ extra)
 
         def residual(Q):
             nonlocal found
@@ -321,7 +329,7 @@ class ModeSelector:
             return -found.multipliers[links.rows] - Q
 
         Q = piecewise_affine_root(residual, np.zeros(len(links.names)), links.units)
-        return ModeTrial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
+        return ModeTrial(mode, system, found, forces_of(self.system, system, mode, at.state, found), Q @ extra)
 
     def _scale(self, at: ModeProblem, found: ModeTrial) -> float:
         """Largest acceleration, in coordinates of the scene [1/s²]."""
@@ -346,12 +354,12 @@ def on_boundary(system: System, state: State, held: ActiveMode) -> list[str]:
     """Set-valued elements between sticking and slipping: at a bound of their force, or starting to slip."""
     selector = mode_selector(system)
     rests, found = np.abs(selector.rates(state)) <= resting(system, state.v) * selector.sizes, []
-    for name, grip, at_rest in zip(selector.names, selector.grips, rests, strict=True):
-        low, high = grip.bounds(state.t)
+    for name, element, at_rest in zip(selector.names, selector.set_valued, rests, strict=True):
+        low, high = element.bounds(state.t)
         slack = BOUND_TOLERANCE * (high - low if np.isfinite(high - low) else UNBOUNDED_WIDTH)
-        sticks, force = not held.told.grips[name], held.forces[name]
+        sticks, force = not held.mode.set_valued[name], held.forces[name]
         at_limit = min(force - low, high - force) <= slack
-        if at_limit if sticks else at_rest and grip.sticks:
+        if at_limit if sticks else at_rest and element.sticks:
             found.append(name)
     return found
 
@@ -364,24 +372,24 @@ def mode_selector(system: System) -> ModeSelector:
 def has_joint_modes(system: System) -> bool:
     """Whether a state alone determines the mode: set-valued elements in joints, neither losses nor contact friction."""
     others = system.losses or system.slips.placed
-    return bool(system.grips.placed and not others and system.dynamics is not None)
+    return bool(system.set_valued.placed and not others and system.dynamics is not None)
 
 
-def forces_of(whole: System, system: System, told: ContactMode, state: State, solution: Solution | None) -> dict[str, float]:
+def forces_of(whole: System, system: System, mode: ContactMode, state: State, solution: Solution | None) -> dict[str, float]:
     """Forces of all set-valued elements and links with losses: multipliers if they stick, laws if they slip."""
     rows = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     motion, found = Kinematics(whole, state), {}
-    for name, link in (whole.scene.losses | whole.scene.grips).items():
-        sign = told.grips.get(name, 0)
+    for name, link in (whole.scene.losses | whole.scene.set_valued).items():
+        sign = mode.set_valued.get(name, 0)
         law = as_function(link.effort(sign)) if sign else None
         force = evaluated(law, (state.t, motion), link.what, 1)[0] if sign else 0.0
         found[name] = float(force) if sign else float(-solution.multipliers[rows[name]])
     return found
 
 
-def _slope(system: System, grip) -> np.ndarray:
+def _slope(system: System, element) -> np.ndarray:
     """Gradient (n_v,) of the slip rate of a set-valued element."""
     row = np.zeros(system.n_v)
-    for joint, factor in grip.acts_on.items():
+    for joint, factor in element.acts_on.items():
         row[system.column(joint)] += factor
     return row

@@ -90,7 +90,7 @@ class MoreauStepper:
         self.system, self.smooth = system, smooth_system(system)
         self.backend, self.kernel = backend, ContactTermsKernel(system)
         self.unit, self.deep = system.scale.time / contact_scales(system), START_OVERLAP * system.scale.time
-        gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
+        gaps, rough, set_valued = sides(scene), slips(scene), list(scene.set_valued.values())
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
         self.owners = [side.whole.name for side in gaps]
@@ -102,11 +102,11 @@ class MoreauStepper:
             across=np.arange(m, m + 2 * k).reshape(k, 2),
             under=np.array([self.names.index(slip.name) for slip in rough], dtype=int),
             friction=np.array([slip.whole.friction for slip in rough]),
-            grip=np.arange(m + 2 * k, m + 2 * k + len(grips)),
-            limit=np.array([grip.limit for grip in grips]) / self.unit[m + 2 * k :],
+            set_valued=np.arange(m + 2 * k, m + 2 * k + len(set_valued)),
+            limit=np.array([element.limit for element in set_valued]) / self.unit[m + 2 * k :],
         )
         self.patterns: dict[bytes, tuple[np.ndarray, ContactLaws]] = {}
-        self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [grip.lossy for grip in grips]]).astype(bool)
+        self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [element.lossy for element in set_valued]]).astype(bool)
 
     @cached_property
     def responses(self) -> ForceResponses:
@@ -130,7 +130,7 @@ class MoreauStepper:
         self._refuse_overlap(touch, state)
         if not np.isfinite(touch.J).all():
             row = int(np.flatnonzero(~np.isfinite(touch.J).all(axis=1))[0])
-            name = [*self.names, *self.sliding, *self.system.scene.grips][row]
+            name = [*self.names, *self.sliding, *self.system.scene.set_valued][row]
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
         force, m = np.zeros(touch.rate.size) if start is None else start / self.unit, touch.width.size
         after = self.without_forces(touch, free.acceleration, h, rest, share)
@@ -281,7 +281,9 @@ class MoreauStepper:
         key = active_gaps.tobytes()
         if key not in self.patterns:
             laws = self.laws
-            rows = np.concatenate([np.flatnonzero(active_gaps), laws.across[active_gaps[laws.under]].ravel(), laws.grip])
+            rows = np.concatenate(
+                [np.flatnonzero(active_gaps), laws.across[active_gaps[laws.under]].ravel(), laws.set_valued]
+            )
             self.patterns[key] = rows, laws_of(laws, rows)
         return self.patterns[key]
 
@@ -370,7 +372,7 @@ def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
         across=place(laws.across[kept]),
         under=place(laws.under[kept]),
         friction=laws.friction[kept],
-        grip=place(laws.grip),
+        set_valued=place(laws.set_valued),
         limit=laws.limit,
     )
 

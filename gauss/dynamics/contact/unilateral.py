@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Interface, Kernel, fastcall, write
+from gauss.codegen import Interface, Kernel, entry_code, fastcall, write
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.impact import LEAVING
 from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, moreau_stepper
@@ -23,6 +23,7 @@ from gauss.dynamics.gap_functions import TOUCHING
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import CONTACTS
 from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import FINITE, Program, largest
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
@@ -77,7 +78,10 @@ def unilateral_dynamics(system: System, laws: Laws, certified: Callable, doc: st
         found = _found(system, laws, state, touch, closed, load)
         return found.acceleration, found.errors
 
-    return fastcall(write(flat, *sizes.values(), 1, name=name), Interface(sizes, "t", limits=LIMITS), certified, name, doc)
+    interface = Interface(sizes, "t", limits=LIMITS)
+    make = lambda: entry_code(write(flat, *sizes.values(), 1, name=name), interface)  # noqa: E731
+    entry = cached_on_disk(system, (entry_code, unilateral_dynamics, laws.key), make)
+    return fastcall(entry, interface, certified, name, doc)
 
 
 class ActiveSetKernel:
@@ -119,7 +123,8 @@ class ActiveSetKernel:
             found = _found(system, laws, state, touch, closed, np.zeros(n_v))
             return found.opening - LEAVING * found.scale, found.errors
 
-        return Kernel(write(flat, 1, system.n_q, n_v, self.gaps, name="staying"), batch=False)
+        make = lambda: Kernel(write(flat, 1, system.n_q, n_v, self.gaps, name="staying"), batch=False)  # noqa: E731
+        return cached_on_disk(system, (Kernel, ActiveSetKernel, laws.key), make)
 
 
 def _found(system: System, laws: Laws, state: State, touch: ContactTerms, closed, load) -> UnilateralAccelerations:

@@ -37,7 +37,7 @@ class CallGraphKernels:
         self.system, self.gains, self._lock, recorder = system, gains, Lock(), CallRecorder()
         sizes = {"q": system.n_q, "v": system.n_v, "effort": system.n_v, "rates": system.n_v}
         given = {name: recorder.keep(np.zeros(size)) for name, size in sizes.items()}
-        graphs = [CallGraph(one, recorder, given["q"][one.q], given["v"][one.v]) for one in system.parts]
+        graphs = [CallGraph(one, recorder, given["q"][one.q], given["v"][one.v]) for one in system.subsystems]
         scales = _joined([graph.scales for graph in graphs])
         given |= {name: recorder.keep(np.zeros(scales.size)) for name in ("multipliers", "gap")}
         ends = np.cumsum([graph.scales.size for graph in graphs], dtype=int)

@@ -17,7 +17,7 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.projection import velocity_residual_of
-from gauss.dynamics.store import cached
+from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
@@ -103,7 +103,7 @@ class CertifiedEngine(Engine):
         may_compile = self.evaluations == COMPILE_THRESHOLD and loads is None and self.gains is None
         may_compile = may_compile and not system.contacts.placed
         if may_compile and not (laws := Laws(system)).called:
-            self.assembler = cached(system, (Assembler, laws.key), lambda: Assembler(system))
+            self.assembler = cached_on_disk(system, (Assembler, laws.key), lambda: Assembler(system))
         if self.assembler is not None:
             return self.assembler(state, load), self.assembler.power
         motion = kinematics(system, state)

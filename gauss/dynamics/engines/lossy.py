@@ -22,7 +22,7 @@ from gauss.dynamics.engines.tiering import tiered
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
-from gauss.scene.losses import pushes
+from gauss.scene.losses import joint_factors
 from gauss.system import ContactMode, State, System
 
 CONVERGED_STEP = 1e-14  # Newton step relative to the largest force
@@ -55,13 +55,13 @@ class NonIdealRows(NamedTuple):
     units: np.ndarray
 
 
-def non_ideal_rows(system: System, whole: System, told: ContactMode) -> NonIdealRows:
+def non_ideal_rows(system: System, whole: System, mode: ContactMode) -> NonIdealRows:
     """Links with losses of a phase, with the directions of power flow of its mode."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
-    links = {name: link for name, link in whole.scene.losses.items() if told.ways.get(name) and name in places}
+    links = {name: link for name, link in whole.scene.losses.items() if mode.power_flow.get(name) and name in places}
     R, W = (np.zeros((len(links), system.n_v)) for _ in range(2))
     for k, (name, link) in enumerate(links.items()):
-        for matrix, factors in ((R, link.acts_on), (W, pushes(link, told.ways[name]))):
+        for matrix, factors in ((R, link.acts_on), (W, joint_factors(link, mode.power_flow[name]))):
             for joint, factor in factors.items():
                 matrix[k, system.column(joint)] += factor
     units = np.array([system.scale.energy / system.scale.coordinates[system.column(link.driven)] for link in links.values()])

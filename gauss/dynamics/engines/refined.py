@@ -7,7 +7,7 @@ from gauss.codegen import Kernel, write
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD, CompileThreshold
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.store import cached
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_refinement import refined_rates
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Rates
@@ -39,7 +39,7 @@ class RefinedEngine(CertifiedEngine):
         """As :meth:`gauss.dynamics.engines.certified.CertifiedEngine.rates`; the compiled code evaluates all loads."""
         if self.threshold.passed() and loads is None:
             make = lambda: Kernel(self._written(system), batch=False)  # noqa: E731
-            kernel = cached(system, (RefinedEngine, self.laws.key), make)
+            kernel = cached_on_disk(system, (RefinedEngine, self.laws.key), make)
             given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
             acceleration, power, (error,) = np.split(kernel(given), np.cumsum([system.n_v, 3]))
             if error <= TOLERANCE:
@@ -51,4 +51,4 @@ class RefinedEngine(CertifiedEngine):
     def _written(self, system: System):
         program = Program(system, self.laws)
         sizes = 1, system.n_q, system.n_v, system.n_v
-        return write(lambda *given: refined_rates(program, *given), *sizes, name="careful")
+        return write(lambda *given: refined_rates(program, *given), *sizes, name="refined")

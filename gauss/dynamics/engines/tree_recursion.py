@@ -7,7 +7,7 @@ from gauss.codegen.kernels import CorrectedRecursion, Correction
 from gauss.dynamics.error_scale import acceleration_scale
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
-from gauss.dynamics.store import cached
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import off_unit
 from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
 from gauss.system import State, System
@@ -44,7 +44,7 @@ class TreeRecursionKernels:
 
 def tree_recursion_kernels(system: System) -> TreeRecursionKernels:
     """Machine code of a large tree, made on first request."""
-    return cached(system, (TreeRecursionKernels,), lambda: TreeRecursionKernels(system))
+    return cached_on_disk(system, (TreeRecursionKernels,), lambda: TreeRecursionKernels(system))
 
 
 def corrected_recursion(system: System, loads) -> CorrectedRecursion:

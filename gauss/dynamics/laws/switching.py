@@ -1,10 +1,11 @@
 """Switching of laws along one motion: switching times, switching functions of the state, jumps of prescribed velocities."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Expression, Kernel
+from gauss.codegen import Expression
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.laws.sampled_laws import sampled_times
@@ -25,7 +26,7 @@ class Switching(NamedTuple):
     ----------
     times : Timetable
         Switching times of laws of time, and a mesh that resolves these laws.
-    watch : Kernel or None
+    watch : callable or None
         :attr:`SwitchingFunctions.machine_code`; None where no law has a switching function of the state.
     called : tuple of str
         Loads with opaque callbacks of the state.
@@ -36,7 +37,7 @@ class Switching(NamedTuple):
     """
 
     times: Timetable = NO_TIMES
-    watch: Kernel | None = None
+    watch: Callable[[np.ndarray], np.ndarray] | None = None
     called: tuple[str, ...] = ()
     conditional: tuple[str, ...] = ()
     jumps: Jumps = NO_JUMPS
@@ -66,12 +67,12 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     breaks : sequence of float
         Further switching times [s].
     """
-    begin, monotone = start.t, bool(system.scene.changing)  # release of contacts is checked at few times of a step
+    begin, monotone = start.t, bool(system.scene.nonsmooth)  # release of contacts is checked at few times of a step
     times = _given_times(system, breaks, begin, end)
     if laws.outputs:
         times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
     prescribed = prescribed_times(system.relations, begin, end, monotone)
-    unilateral = [prescribed_times(found, begin, end, monotone) for found in (system.contacts, system.grips)]
+    unilateral = [prescribed_times(found, begin, end, monotone) for found in (system.contacts, system.set_valued)]
     times = times.join(prescribed, *unilateral)
     last = prescribed.last_end(begin, end)
     jumps = prescribed_jumps(system, start, end, [*prescribed.stops(begin, end), (last, end)])
@@ -107,7 +108,7 @@ def prescribed_times(relations: Relations, begin: float, end: float, monotone: b
 
 def _limits(system: System, start: State, end: float) -> list[Timetable]:
     """Switching times of the limits of set-valued elements, which are no loads while they stick."""
-    given = [getattr(grip, name, None) for grip in system.scene.grips.values() for name in LIMITS]
+    given = [getattr(element, name, None) for element in system.scene.set_valued.values() for name in LIMITS]
     found = []
     for law in [value for value in given if callable(value)]:
         motion = symbols(system)

@@ -9,11 +9,13 @@ switching function, since the last stages lie beyond it; it may miss two, as whe
 from functools import cached_property, partial, reduce
 from itertools import chain, islice, starmap
 from operator import sub
+from typing import Protocol
 
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Expression, Kernel, Scalar, forward, reachable, write
+from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
 from gauss.dynamics.laws.traced_laws import Laws
@@ -29,6 +31,22 @@ SHORT, ONWARD = 6.0, 1e6  # smallest steps that may cross a surface undivided, a
 TRIES = 40.0  # consecutive rejections, after which the crossing is shorter than the resolution of time
 
 
+class TracedFunctions(Protocol):
+    """Traced functions over the symbols of a motion, each with a name."""
+
+    @property
+    def motion(self) -> Kinematics | None:
+        """The system in symbols."""
+
+    @property
+    def outputs(self) -> list[Expression]:
+        """Outputs of all functions."""
+
+    @property
+    def functions(self) -> list[tuple[str, Function]]:
+        """The functions with their names."""
+
+
 class SwitchingFunctions:
     """Switching functions of the traced laws of a system, other than those of time.
 
@@ -36,8 +54,8 @@ class SwitchingFunctions:
     ----------
     system : System
         The system.
-    laws : Laws
-        Its loads.
+    laws : TracedFunctions
+        Its loads, or other functions of its motion.
 
     Attributes
     ----------
@@ -45,7 +63,7 @@ class SwitchingFunctions:
         The two sides of every comparison; a switching function is their difference.
     """
 
-    def __init__(self, system: System, laws: Laws):
+    def __init__(self, system: System, laws: TracedFunctions):
         self.system, self.laws, outputs = system, laws, laws.outputs
         timed = {node.index for node in of_time(outputs, self._clock)} if outputs else set()
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]

@@ -40,13 +40,13 @@ class Timetable:
         condition is another there than just before.
     mesh : ndarray, shape (m,)
         Ends of cells [s], ascending: steps end at each.
-    lacks : tuple of str
+    limitations : tuple of str
         Warnings about features that are not resolved.
     """
 
     switches: np.ndarray
     mesh: np.ndarray
-    lacks: tuple[str, ...] = ()
+    limitations: tuple[str, ...] = ()
 
     def __bool__(self):
         return bool(self.switches.size or self.mesh.size)
@@ -54,14 +54,14 @@ class Timetable:
     def join(self, *others: "Timetable") -> "Timetable":
         """Timetable of several laws together."""
         every = (self, *others)
-        switches, mesh = (np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
-        return Timetable(switches, mesh, tuple(dict.fromkeys(text for one in every for text in one.lacks)))
+        switches, mesh = (distinct(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
+        return Timetable(switches, mesh, tuple(dict.fromkeys(text for one in every for text in one.limitations)))
 
     def unresolved(self, begin: float, end: float, step: float) -> int:
         """Number of cells of the mesh that fixed steps [s] do not resolve."""
         if not self.mesh.size:
             return 0
-        every = np.unique(np.clip(np.concatenate([[begin, end], self.switches, self.mesh]), begin, end))
+        every = distinct(np.clip(np.concatenate([[begin, end], self.switches, self.mesh]), begin, end))
         inner = np.isin(every, self.mesh)
         return int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())
 
@@ -92,6 +92,12 @@ class Timetable:
 NO_TIMES = Timetable(np.zeros(0), np.zeros(0))
 
 
+def distinct(values: np.ndarray) -> np.ndarray:
+    """Distinct values (m,), ascending: :func:`numpy.unique`, which imports masked arrays for 10 ms."""
+    values = np.sort(values)
+    return values[np.concatenate([np.ones(min(values.size, 1), bool), values[1:] != values[:-1]])]
+
+
 def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bool = False) -> Timetable:
     """Switching times and mesh of traced laws.
 
@@ -108,13 +114,13 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
     """
     nodes = of_time(outputs, clock)
     conditions = [_condition(node) for node in nodes if node.op in CONDITIONS]
-    lacks: list[str] = []
-    switches = _changes(conditions, clock, begin, end, lacks) if conditions else np.zeros(0)
+    limitations: list[str] = []
+    switches = _changes(conditions, clock, begin, end, limitations) if conditions else np.zeros(0)
     degree = _degrees(nodes, clock)
     curved = [node for node in nodes if node.op in CURVED and degree[node.index] > STEEPEST]
     edges = np.array([begin, *switches[switches < end], end])
-    mesh = _mesh(curved, conditions, clock, edges, lacks, monotone) if curved else np.zeros(0)
-    return Timetable(switches, mesh, tuple(lacks))
+    mesh = _mesh(curved, conditions, clock, edges, limitations, monotone) if curved else np.zeros(0)
+    return Timetable(switches, mesh, tuple(limitations))
 
 
 def of_time(outputs, clock: Expression) -> list[Expression]:
@@ -151,14 +157,14 @@ def _condition(node: Expression) -> Expression:
     return x < y if node.op == "min" else y < x if node.op == "max" else node  # as in the derivatives of min and max
 
 
-def _changes(conditions, clock: Expression, begin: float, end: float, lacks: list[str]) -> np.ndarray:
-    """Times in an interval at which a condition changes, to rounding; if they are too many, ``lacks`` says so."""
+def _changes(conditions, clock: Expression, begin: float, end: float, limitations: list[str]) -> np.ndarray:
+    """Times in an interval at which a condition changes, to rounding; if they are too many, ``limitations`` says so."""
     ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
     low, high = ends[:-1], ends[1:]
     while low.size <= MOST_CELLS:
         values = enclose(conditions, {clock.index: Interval(low, high)})
-        changing = np.any([np.broadcast_to(value.low != value.high, low.shape) for value in values], axis=0)
-        low, high = low[changing], high[changing]
+        jumping = np.any([np.broadcast_to(value.low != value.high, low.shape) for value in values], axis=0)
+        low, high = low[jumping], high[jumping]
         if not (high - low > close).any():
             break
         inner = low + np.arange(PARTS + 1)[:, None] / PARTS * (high - low)
@@ -168,7 +174,7 @@ def _changes(conditions, clock: Expression, begin: float, end: float, lacks: lis
         low, high = low[moves], high[moves]
     if low.size > MOST_CELLS:
         often = f"a law switches more than {MOST_CELLS // 4} times between t = {begin:.6g} s and {end:.6g} s"
-        lacks.append(f"{often}: steps do not end at each of these times; simulate a shorter time.")
+        limitations.append(f"{often}: steps do not end at each of these times; simulate a shorter time.")
         return np.zeros(0)
     if not low.size:
         return np.zeros(0)
@@ -179,7 +185,7 @@ def _changes(conditions, clock: Expression, begin: float, end: float, lacks: lis
     return np.append(inside, end) if times[-1] >= end - 4.0 * close else inside
 
 
-def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, lacks: list[str], monotone: bool) -> np.ndarray:
+def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, limitations: list[str], monotone: bool) -> np.ndarray:
     """Ends of cells in which samples resolve every node.
 
     Conditions are constant between two edges.
@@ -204,7 +210,7 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, lacks: list[s
             break
         if cells.shape[1] + unseen.sum() > MOST_STEPS:
             often = f"a law has more than {MOST_STEPS // 16} narrow peaks between t = {edges[0]:.6g} s and {edges[-1]:.6g} s"
-            lacks.append(f"{often}: steps may miss some; simulate a shorter time, or limit the step with step= [s].")
+            limitations.append(f"{often}: steps may miss some; simulate a shorter time, or limit the step with step= [s].")
             break
         middle = cells[:, unseen].mean(axis=0)
         new = np.hstack([[cells[0, unseen], middle], [middle, cells[1, unseen]]])

@@ -34,7 +34,7 @@ def write_contacts(document):
                 f"{element.what}: MuJoCo has no restitution; set it to 0, or leave it out of the scene that is exported."
             )
         write(element, document)
-    for element in scene.grips.values():
+    for element in scene.set_valued.values():
         write(element, document)
 
 
@@ -64,8 +64,8 @@ def _(rope: Rope, document):
 def _(contact: Contact, document):
     shapes = (document.scene.shapes[name] for name in (contact.shape, contact.other))
     first, second = (_geoms(shape, document) for shape in shapes)
-    friction = {"condim": 3, "friction": [contact.friction] * 2 + [0.0] * 3} if contact.friction else {"condim": 1}
-    friction["condim"] = str(friction["condim"])
+    rough = {"condim": "3", "friction": [contact.friction] * 2 + [0.0] * 3}
+    friction: dict = rough if contact.friction else {"condim": "1"}
     for one in first:
         for other in second:
             name = contact.name if len(first) * len(second) == 1 else f"{contact.name}: {one}, {other}"
@@ -75,6 +75,8 @@ def _(contact: Contact, document):
 
 @write.register
 def _(friction: JointFriction, document):
+    if callable(friction.limit):
+        raise FileError(f"{friction.what}: its limit is a Python function, which a file cannot hold; give a number.")
     joint = _joint(document, friction.joint, friction.what)
     _set(joint, {"frictionloss": float(joint.get("frictionloss", 0.0)) + friction.limit})
 

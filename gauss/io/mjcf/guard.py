@@ -40,7 +40,7 @@ def guarded(path: Path) -> Source:
     """
     source, home = read_xml(path, ROOTS), path.resolve().parent
     _include(source, source, home, (path.resolve(),))
-    folders = ["", *(element.get(key) for element in source.root.iter("compiler") for key in FOLDERS if element.get(key))]
+    folders = ["", *(element.get(key, "") for element in source.root.iter("compiler") for key in FOLDERS)]
     for element in source.root.iter():
         _require_numbers(source, element)
         if element.tag in FORBIDDEN:
@@ -54,7 +54,7 @@ def guarded(path: Path) -> Source:
 
 def _require_numbers(source: Source, element: Element):
     for key in NUMERIC & set(element.keys()):
-        words = element.get(key).lower().split()
+        words = element.get(key, "").lower().split()
         undefined = [
             word for word in words if word.lstrip("+-") in (("nan",) if key in RANGES else ("nan", "inf", "infinity"))
         ]

@@ -7,6 +7,7 @@ warning: contacts of geoms, and limits, which are always kept for the assembly o
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -111,7 +112,7 @@ class _MjcfReader:
         """A body with its joints; those before the last move bodies without mass."""
         model, name = self.model, self.bodies[i]
         parent = on = self.bodies[int(model.body_parentid[i])]
-        pose = {"position": tuple(model.body_pos[i]), "rotation": _matrix(model.body_quat[i])}
+        pose: dict[str, Any] = {"position": tuple(model.body_pos[i]), "rotation": _matrix(model.body_quat[i])}
         joints = range(model.body_jntadr[i], model.body_jntadr[i] + model.body_jntnum[i])
         for number, j in enumerate(joints):
             last = number == len(joints) - 1
@@ -132,14 +133,14 @@ class _MjcfReader:
         mass, com = float(model.body_mass[i]), tuple(model.body_ipos[i])
         axes = _matrix(model.body_iquat[i])
         inertia = tuple(model.body_inertia[i]) if mass else (0.0, 0.0, 0.0)
-        return Body(self.bodies[i], mass, inertia, com, inertia_axes=axes, on=on, **pose)
+        return Body(self.bodies[i], mass, inertia, com, **{"inertia_axes": axes, "on": on, **pose})
 
     def _joint(self, scene: Scene, j: int, parent: str, child: str):
         model, name, kind = self.model, self.joints[j], self.kinds[j]
         if kind == "free":
             scene.free(name, parent, child, at=tuple(model.body_pos[model.jnt_bodyid[j]]))
             return
-        options = {"at": tuple(model.jnt_pos[j]), "frame": child}
+        options: dict[str, Any] = {"at": tuple(model.jnt_pos[j]), "frame": child}
         if kind == "ball":
             scene.joint(name, kind, parent, child, **options)
             return
@@ -207,7 +208,7 @@ class _MjcfReader:
         if kind == CONNECT:
             scene.coincident(name, *bodies, *points)
         else:
-            scene.fixed(name, *bodies, at=points[0], frame=bodies[0])
+            scene.fixed(name, bodies[0], bodies[1], points[0], frame=bodies[0])
 
 
 def _matrix(quaternion) -> np.ndarray:

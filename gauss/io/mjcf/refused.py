@@ -25,7 +25,7 @@ CURVES = {  # what may depend on deflections and speeds by a polynomial, and of 
     "actuator_damping": ("damping", "actuator"),
     "actuator_armature": ("armature", "actuator"),
 }
-Part = tuple[str, str, int]  # what is refused, kind and number of the element that has it
+Finding = tuple[str, str, int]  # what is refused, kind and number of the element that has it
 WELD_TOLERANCE = 1e-9  # rad, and of the extent of the model: poses of a weld that are those of the file
 
 
@@ -37,18 +37,18 @@ def refused(named: Named) -> list[str]:
     if is_off(model, "ACTUATION"):
         found.append(f"flag actuation that is switched off{named.mark('flag', 'actuation')}")
     found += [f"flexible body {i}" for i in range(model.nflex)]
-    parts = [(f"gravcomp of body {named.bodies[i]!r}", "body", int(i)) for i in np.flatnonzero(model.body_gravcomp)]
+    parts = [(f"gravcomp of body {named.bodies[i]!r}", "body", i) for i in np.flatnonzero(model.body_gravcomp).tolist()]
     parts += [*_of_joints(named), *_curved(named), *_without_counterpart(named)]
     return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
 
 
-def _of_joints(named: Named) -> Iterator[Part]:
+def _of_joints(named: Named) -> Iterator[Finding]:
     for i in range(named.model.njnt):
         for what in _of_joint(named, i):
             yield f"{what} of {named.kinds[i]} joint {named.joints[i]!r}", "joint", i
 
 
-def _curved(named: Named) -> Iterator[Part]:
+def _curved(named: Named) -> Iterator[Finding]:
     """Springs, dampers and masses that are no constants."""
     model = named.model
     for field, (what, kind) in CURVES.items():
@@ -60,7 +60,7 @@ def _curved(named: Named) -> Iterator[Part]:
             yield f"damping of joint {named.joints[i]!r} beyond a constant one", "joint", i
 
 
-def _without_counterpart(named: Named) -> Iterator[Part]:
+def _without_counterpart(named: Named) -> Iterator[Finding]:
     model = named.model
     for kind, count, against in (
         ("tendon", model.ntendon, _against_tendon),
@@ -76,8 +76,8 @@ def _without_counterpart(named: Named) -> Iterator[Part]:
 def left_out(named: Named, stops: bool = False, contacts: bool = False) -> list[str]:
     """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
     model, kept = named.model, _inactive(named)
-    touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity)]
-    limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited)]
+    touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity).tolist()]
+    limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited).tolist()]
     pairs = [named.name("pair", i) for i in range(model.npair)]
     parts = [] if contacts else [("contacts of geoms", touching), ("contacts of pairs", pairs)]
     parts += [("surface velocity and adhesion of geoms", _sticky(named))] if contacts else []
@@ -90,7 +90,7 @@ def _inactive(named: Named) -> list[tuple[str, list[str]]]:
     model = named.model
     inactive = [named.name("equality", i) for i in range(model.neq) if not model.eq_active0[i]]
     off = [named.name("actuator", i) for i in actuators(model) if is_switched_off(model, i)]
-    standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0)]
+    standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0).tolist()]
     keys = [named.name("key", i) for i in range(model.nkey) if model.key(i).name != START]
     return [
         ("equalities that are not active:", inactive),

@@ -37,7 +37,8 @@ def span(model, i: int) -> tuple[int, int] | None:
     """Sites at the ends of a straight tendon; None of another."""
     if kind_of(model, i) != STRAIGHT:
         return None
-    return tuple(int(model.wrap_objid[w]) for w in _wraps(model, i))
+    first, last = (int(model.wrap_objid[w]) for w in _wraps(model, i))
+    return first, last
 
 
 def terms(named: Named, i: int) -> list[tuple[str, float]]:
@@ -48,9 +49,10 @@ def terms(named: Named, i: int) -> list[tuple[str, float]]:
 
 def ends(named: Named, i: int) -> TendonSpan:
     """Ends of a straight tendon, in the frames of their bodies."""
-    model, sites = named.model, span(named.model, i)
-    bodies = (named.bodies[int(model.site_bodyid[site])] for site in sites)
-    return TendonSpan(*bodies, *(tuple(model.site_pos[site]) for site in sites))
+    model = named.model
+    one, other = (int(model.wrap_objid[w]) for w in _wraps(model, i))
+    body = lambda site: named.bodies[int(model.site_bodyid[site])]  # noqa: E731
+    return TendonSpan(body(one), body(other), tuple(model.site_pos[one]), tuple(model.site_pos[other]))
 
 
 def add_tendon(scene: Scene, named: Named, i: int):

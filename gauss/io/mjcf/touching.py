@@ -36,12 +36,13 @@ def add_contacts(scene: Scene, named: Named) -> list[str]:
     for first, second, dimension, friction in pairs:
         shapes = [_shape(scene, named, geom) for geom in (first, second)]
         unlike |= {named.name("geom", geom) for geom, shape in zip((first, second), shapes, strict=True) if shape is None}
-        if None in shapes:
+        one, other = shapes
+        if one is None or other is None:
             continue
-        name = f"{shapes[0].name} on {shapes[1].name}"
+        name = f"{one.name} on {other.name}"
         if dimension > 3:
             unlike.add(f"friction of turning and rolling of {name}")
-        scene.contact(name, *shapes, friction=friction if dimension >= 3 else 0.0)
+        scene.contact(name, one, other, friction=friction if dimension >= 3 else 0.0)
     return sorted(unlike)
 
 

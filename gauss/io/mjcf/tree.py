@@ -148,8 +148,8 @@ def joint_frame(system: System, joint: Joint, body: str) -> Pose:
 def mujoco_state(system: System, limbs: list[Limb], motion: Kinematics) -> tuple[np.ndarray, np.ndarray]:
     """Vectors qpos and qvel of MuJoCo for a state of the system."""
     steps = [step for one in depth_first(limbs) for step in one.steps]
-    parts = [(step.position(motion), step.rate(motion)) for step in steps]
-    return tuple(np.concatenate([np.zeros(0), *(np.atleast_1d(part[k]) for part in parts)]) for k in (0, 1))
+    joined = lambda found: np.concatenate([np.zeros(0), *map(np.atleast_1d, found)])  # noqa: E731
+    return joined(step.position(motion) for step in steps), joined(step.rate(motion) for step in steps)
 
 
 def depth_first(limbs: list[Limb]) -> list[Limb]:

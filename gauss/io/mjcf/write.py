@@ -192,7 +192,7 @@ def _write_step(document: MjcfDocument, body: Element, step: ElementaryJoint):
     if step.kind == "free":
         document.add(body, "freejoint", "joint", name=step.name)
         return
-    axis = {} if step.axis is None else {"axis": step.axis}
+    axis: dict = {} if step.axis is None else {"axis": step.axis}
     document.add(body, "joint", name=step.name, type=step.kind, pos=step.pos, **axis)
 
 

@@ -28,7 +28,8 @@ class Poses:
     """
 
     def __init__(self, source: Source, model: Element):
-        self.source, self.model, self.elements = source, model, {}
+        self.source, self.model = source, model
+        self.elements: dict[str, Element] = {}
         for element in model:
             if element.tag in ("link", "joint", "frame"):
                 name = element.get("name", "")
@@ -37,7 +38,7 @@ class Poses:
                         f"{source.place(element)}: the name {name!r} is missing, reserved or taken; give another."
                     )
                 self.elements[name] = element
-        self._found: dict[str, Pose] = {MODEL: IDENTITY}
+        self._found: dict[str, Pose | None] = {MODEL: IDENTITY}
 
     def of(self, name: str, asked: Element | None = None) -> Pose:
         """Pose (R, p) of a link, joint or frame in the model frame.
@@ -48,13 +49,14 @@ class Poses:
             If it does not exist, or refers to itself.
         """
         if name in self._found:
-            if self._found[name] is None:
+            known = self._found[name]
+            if known is None:
                 raise FileError(f"{self.source.place(asked)}: the pose of {name!r} is given relative to itself.")
-            return self._found[name]
+            return known
         self._found[name] = None  # while it is looked for
         element = self.element(name, asked)
-        self._found[name] = compose(self.of(self._base(element), element), pose(self.source, element.find("pose")))
-        return self._found[name]
+        found = self._found[name] = compose(self.of(self._base(element), element), pose(self.source, element.find("pose")))
+        return found
 
     def element(self, name: str, asked: Element | None = None) -> Element:
         """Element of a name.

@@ -14,7 +14,7 @@ from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
 from gauss.io.guard import Source, read_xml
 from gauss.io.numbers import add_stop, bounds, number
 from gauss.io.sdf.poses import MODEL, Poses, numbers, pose, text
-from gauss.scene import GROUND, Body, Frame, Scene
+from gauss.scene import GROUND, Scene
 from gauss.system.frames import IDENTITY, Pose, compose, invert
 
 WORLD = "world"  # SDFormat's name of the ground
@@ -110,7 +110,8 @@ class _SdfReader:
     """One model while it becomes a scene."""
 
     def __init__(self, source: Source, model: Element, gravity: tuple):
-        self.source, self.model, self.poses, self.left = source, model, Poses(source, model), set()
+        self.source, self.model, self.poses = source, model, Poses(source, model)
+        self.left: set[str] = set()
         self.result = Scene(model.get("name") or Path(source.path).stem, gravity=gravity)
         self.placed: Pose = IDENTITY
 
@@ -127,9 +128,10 @@ class _SdfReader:
         for element in self.model.findall("link"):
             self._link(element)
         for element in self.model.findall("frame"):
-            carrier = self.poses.link(element.get("name"), element)
-            R, p = compose(invert(self.poses.of(carrier)), self.poses.of(element.get("name")))
-            self.result.add(Frame(element.get("name"), self._body(carrier), p, R))
+            name = element.get("name", "")
+            carrier = self.poses.link(name, element)
+            R, p = compose(invert(self.poses.of(carrier)), self.poses.of(name))
+            self.result.frame(name, self._body(carrier), p, R)
         for element in self.model.findall("joint"):
             self._joint(element)
         for element in self.model.findall("joint"):
@@ -172,13 +174,13 @@ class _SdfReader:
         R_com, com = pose(self.source, None if inertial is None else inertial.find("pose"))
         moments = None if inertial is None else inertial.find("inertia")
         inertia = [self._value(moments, tag, float(tag in MOMENTS[:3])) for tag in MOMENTS]  # of 1 where nothing is said
-        R, p = compose(self.placed, self.poses.of(element.get("name")))
+        name = element.get("name", "")
+        R, p = compose(self.placed, self.poses.of(name))
         mass = self._value(inertial, "mass", 1.0)
-        body = Body(self._body(element.get("name")), mass, tuple(inertia), com, inertia_axes=R_com, position=p, rotation=R)
-        self.result.add(body)
+        self.result.body(self._body(name), mass, tuple(inertia), com, inertia_axes=R_com, position=p, rotation=R)
 
     def _joint(self, element: Element):
-        name, kind = element.get("name"), element.get("type", "")
+        name, kind = element.get("name", ""), element.get("type", "")
         if kind not in KINDS:
             self._refuse(element, f"joint {name!r}: a joint of type {kind!r} is not modelled.")
         parent, child = (self._end(element, end) for end in ("parent", "child"))
@@ -228,7 +230,7 @@ class _SdfReader:
 
     def _axis(self, element: Element, tag: str) -> tuple:
         """Axis of a joint in the world."""
-        axis, name = element.find(tag), element.get("name")
+        axis, name = element.find(tag), element.get("name", "")
         if axis is None:
             self._refuse(element, f"joint {name!r}: <{tag}> is missing.")
         xyz = axis.find("xyz")
@@ -238,8 +240,8 @@ class _SdfReader:
             named = MODEL
         return tuple(compose(self.placed, self.poses.of(named, axis))[0] @ direction)
 
-    def _limits(self, element: Element, axis: Element) -> tuple[float, float] | None:
-        given = axis.find("limit")
+    def _limits(self, element: Element, axis: Element | None) -> tuple[float, float] | None:
+        given = None if axis is None else axis.find("limit")
         low, high = self._limit(given, "lower", -inf), self._limit(given, "upper", inf)
         if low >= high:
             self._refuse(given, f"joint {element.get('name')!r}: its limits leave no motion; make it a fixed joint.")

@@ -1,6 +1,7 @@
 """What a URDF file says beyond masses and joints, where it is asked for: limits, damping and friction, collision shapes."""
 
 import warnings
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -64,7 +65,7 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
     return scene
 
 
-def _named(text: str, names: list[str | None]) -> list[str]:
+def _named(text: str, names: Iterable[str | None]) -> list[str]:
     """The text with the names in it; nothing if there are none."""
     found = [name for name in names if name]
     return [text.format(_some(found))] if found else []
@@ -72,7 +73,7 @@ def _named(text: str, names: list[str | None]) -> list[str]:
 
 def _limit(scene: Scene, source: Source, element: Element, stops: bool) -> str | None:
     """Name of a joint whose limits leave no motion, as files write that do not mean them; others are added."""
-    given, joint = element.find("limit"), scene.joints[element.get("name")]
+    given, joint = element.find("limit"), scene.joints[element.get("name", "")]
     if given is None or element.get("type") == "continuous" or joint.pair.n_v != 1:
         return None
     lowest, highest = (value(source, given, key, 0.0) for key in ("lower", "upper"))
@@ -87,7 +88,7 @@ def _limit(scene: Scene, source: Source, element: Element, stops: bool) -> str |
 
 def _resist(scene: Scene, source: Source, element: Element, read: bool) -> str | None:
     """Name of a joint that has damping or friction, which become elements of the scene if they are read."""
-    given, name = element.find("dynamics"), element.get("name")
+    given, name = element.find("dynamics"), element.get("name", "")
     if given is None or scene.joints[name].pair.n_v != 1:
         return None
     damping, friction = (value(source, given, key, 0.0) for key in ("damping", "friction"))
@@ -105,10 +106,11 @@ def _shapes(scene: Scene, source: Source, link: Element) -> list[str]:
     with placed(source, link):
         frame = _frame(scene, link.get("name", ""))
     for number, collision in enumerate(link.findall("collision"), start=1):
-        shape = next(iter(collision.find("geometry") if collision.find("geometry") is not None else ()), None)
+        geometry = collision.find("geometry")
+        shape = None if geometry is None else next(iter(geometry), None)
         if shape is None:
             continue
-        name = link.get("name") if number == 1 else f"{link.get('name')}.{number}"
+        name = link.get("name", "") if number == 1 else f"{link.get('name')}.{number}"
         with placed(source, collision):
             made = _shape(source, name, frame, shape, collision.find("origin"))
             if made is not None:

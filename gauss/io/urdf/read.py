@@ -14,7 +14,7 @@ from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.numbers import for_parser, value, values
 from gauss.io.urdf.unknown import refuse_couplings
-from gauss.scene import GROUND, Body, Frame, Scene
+from gauss.scene import GROUND, Scene
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 ROOTS = ("fixed", "free")
@@ -91,24 +91,19 @@ def _scene(model) -> Scene:
     names = body_names(model)
     for index in range(1, model.njoints):
         placement, inertia = model.jointPlacements[index], model.inertias[index]
-        scene.add(
-            Body(
-                names[index],
-                inertia.mass,
-                _tensor(inertia),
-                inertia.lever,
-                position=placement.translation,
-                rotation=_matrix(placement.rotation),
-                on=names[model.parents[index]],
-            )
-        )
+        pose = {
+            "position": placement.translation,
+            "rotation": _matrix(placement.rotation),
+            "on": names[model.parents[index]],
+        }
+        scene.body(names[index], inertia.mass, _tensor(inertia), inertia.lever, **pose)
         kind, options = _kind(model.joints[index], model.names[index])
         scene.joint(model.names[index], kind, names[model.parents[index]], names[index], frame=names[index], **options)
     for frame in _links(model):
         name = _link_name(frame.name)
         if name not in scene.bodies and name not in scene.frames:
             pose = frame.placement
-            scene.add(Frame(name, names[frame.parentJoint], pose.translation, _matrix(pose.rotation)))
+            scene.frame(name, names[frame.parentJoint], pose.translation, _matrix(pose.rotation))
     return scene
 
 
@@ -179,7 +174,7 @@ def _couple(scene: Scene, source: Source):
         tag = joint.find("mimic")
         if tag is None or joint.get("name") not in scene.joints:
             continue
-        driven, driver = joint.get("name"), tag.get("joint")
+        driven, driver = joint.get("name", ""), tag.get("joint", "")
         if driver not in scene.joints:
             exists = any(other.get("name") == driver for other in source.root.findall("joint"))
             lack = "which does not move" if exists else "a joint that does not exist"

@@ -5,6 +5,7 @@ Loop closures are joints, mimic joints are couplings; loads, contacts, starts an
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -49,24 +50,30 @@ def with_side(scene: Scene, path: Path) -> Scene:
 def _on_bodies(element, scene: Scene):
     """Element that names bodies where it named links that are welded to them."""
     if isinstance(element, Joint):
-        ends = {end: _carrier(scene, getattr(element, end))[0] for end in ("parent", "child")}
+        ends: dict[str, Any] = {end: _carrier(scene, getattr(element, end))[0] for end in ("parent", "child")}
         frame = scene.frames.get(element.frame)
         if frame is None:
             return replace(element, **ends)
         R, p = rotation_matrix(frame.rotation), np.array(frame.position)
-        turned = {"at": p + R @ element.at, "axis": R @ element.axis, "rotation": R @ rotation_matrix(element.rotation)}
+        turned: dict[str, Any] = {
+            "at": p + R @ element.at,
+            "axis": R @ element.axis,
+            "rotation": R @ rotation_matrix(element.rotation),
+        }
         if element.second_axis is not None:
             turned["second_axis"] = R @ element.second_axis
         if element.kind not in ("ball", "free", "fixed"):
             del turned["rotation"]
-        return replace(element, **ends, frame=frame.body, **{key: _plain(value) for key, value in turned.items()})
+        plain = {key: _plain(value) for key, value in turned.items()}
+        return replace(element, **(ends | plain), frame=frame.body)
     if isinstance(element, Spring | Force):
+        moved: dict[str, Any] = {}
         for end, at in ENDS[: 2 if isinstance(element, Spring) else 1]:
-            body, frame = _carrier(scene, getattr(element, end))
+            moved[end], frame = _carrier(scene, getattr(element, end))
             if frame is not None and getattr(element, at) is not None:
                 place = np.array(frame.position) + rotation_matrix(frame.rotation) @ getattr(element, at)
-                element = replace(element, **{at: _plain(place)})
-            element = replace(element, **{end: body})
+                moved[at] = _plain(place)
+        return replace(element, **moved)
     return element
 
 

@@ -56,7 +56,7 @@ def refuse_couplings(source: Source):
         _require_known_children(source, element)
     places = {part.get("name") for part in parts}
     unknown = [child for child in source.root if child.tag not in KNOWN["robot"]]
-    found = [_told(source, child) for child in unknown if _is_coupling(child, places)]
+    found = [_located(source, child) for child in unknown if _is_coupling(child, places)]
     if found:
         beside = source.path.with_suffix(".loops.toml").name
         raise FileError(
@@ -90,7 +90,7 @@ def warn_of_rest(source: Source):
         ("no URDF, and not read", strange),
         ("of <gazebo>, not read, though it moves the robot there", _moving_in_gazebo(source.root)),
     ]
-    left = [f"{what}: {_some([_told(source, element) for element in elements])}" for what, elements in found if elements]
+    left = [f"{what}: {_some([_located(source, element) for element in elements])}" for what, elements in found if elements]
     if left:
         warnings.warn(f"{source.path}: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
 
@@ -126,7 +126,7 @@ def _is_forced(element: Element) -> bool:
     return given in FORCED.get(element.tag, ())
 
 
-def _told(source: Source, element: Element) -> str:
+def _located(source: Source, element: Element) -> str:
     named = element.get("filename") or element.get("name")
     return f"<{element.tag}>{f' {named!r}' if named else ''} ({source.place(element)})"
 

@@ -5,6 +5,7 @@ rates of :attr:`gauss.System.coordinates`; ball and free joints leave a link flo
 A link's frame is moved to the joint that moves it, as URDF has it.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -87,8 +88,8 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
     system = compile_scene(scene)
     tree, cut = spanning_tree(scene)
     limbs = [limb(system, *edge) for edge in tree]
-    head = {"gravity": scene.gravity} if scene.gravity != Scene().gravity else {}
-    document = UrdfDocument(scene, limbs, Element("robot", name=scene.name), Scene(scene.name, **head))
+    rest = Scene(scene.name, scene.gravity)
+    document = UrdfDocument(scene, limbs, Element("robot", name=scene.name), rest)
     SubElement(document.root, "link", name=_ground(scene))
     for one in limbs:
         _write_limb(document, one)
@@ -98,7 +99,7 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
         document.rest.joints[joint.name] = _moved(joint, document.shifts)
     _keep_rest(document)
     said = [f"{kind} {name!r}" for kind, name in _listed(document.rest)]
-    beside = "" if not (said or head) else toml_text(document.rest)
+    beside = "" if not said and rest.gravity == Scene().gravity else toml_text(document.rest)
     if said:
         listed = f" Not in this file, but in the one beside it: {', '.join(said)}. ".replace("--", "- -")
         document.root.insert(0, Comment(listed))
@@ -146,7 +147,7 @@ def _write_limb(document: UrdfDocument, one: Limb):
 
 def _floats(scene: Scene, one: Limb) -> bool:
     """Whether a link floats; quadratic programmes, which contacts need, have no form for links without mass."""
-    with_contacts = bool(scene.contacts or scene.grips)
+    with_contacts = bool(scene.contacts or scene.set_valued)
     return any(step.kind in ("ball", "free") for step in one.steps) or (len(one.steps) > 1 and with_contacts)
 
 
@@ -177,7 +178,7 @@ def _is_plain(scene: Scene, one: Limb) -> bool:
     if joint.kind != "free" or joint.child != one.body or joint.frame != "world":
         return False
     R, p = relative(scene, GROUND, one.body)
-    return bool((joint.axes() == R).all() and (joint.at == p).all())
+    return bool(np.array_equal(joint.axes(), R) and np.array_equal(joint.at, p))
 
 
 def _joint(document: UrdfDocument, name: str, kind: str, parent: str, child: str, R, p) -> Element:
@@ -225,7 +226,7 @@ def _keep_rest(document: UrdfDocument):
             _mimic(document, coupling.driven, coupling.driver, coupling.ratio, coupling.offset)
         else:
             rest.couplings[coupling.name] = coupling
-    for group in ("relations", "shapes", "contacts", "grips"):
+    for group in ("relations", "shapes", "contacts", "set_valued"):
         for name, element in getattr(scene, group).items():
             getattr(rest, group)[name] = _moved(element, document.shifts)
     for name, load in scene.loads.items():
@@ -248,7 +249,7 @@ def _split(document: UrdfDocument, element: Drive | Start) -> list:
     if joint.pair.n_v < 2 or names[0] not in _names(document.root):
         return [element]
     if isinstance(element, Start):
-        position = element.position if element.position is not None else (None,) * len(names)
+        position: Iterable = (None,) * len(names) if element.position is None else np.atleast_1d(element.position).tolist()
         rate = np.broadcast_to(element.rate, len(names))
         return [Start(name, p, float(v)) for name, p, v in zip(names, position, rate, strict=True)]
     if callable(element.effort):
@@ -270,7 +271,7 @@ def _moved(element, shifts: dict[str, np.ndarray]):
 
 
 def _listed(rest: Scene):
-    kinds = ("joints", "couplings", "relations", "shapes", "contacts", "grips", "loads", "starts")
+    kinds = ("joints", "couplings", "relations", "shapes", "contacts", "set_valued", "loads", "starts")
     return [(kind.removesuffix("s"), name) for kind in kinds for name in getattr(rest, kind)]
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss.codegen import one_tier
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
@@ -69,6 +70,7 @@ class Ensemble:
         same[self.family.varied] = False
         return bool((members[:, same] == self.known[0, same]).all())
 
+    @one_tier()
     def move(self, starts, members, times, threads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Trajectories of members.
 

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from threading import Event
 
 import numpy as np
@@ -31,10 +32,10 @@ class FixedStepBatch:
         self.loop, self.size = loop, starts.shape[1]
         filled = self._filled(starts)
         self.columns = filled.shape[1]
-        self.points = np.zeros((loop.method.size, self.columns))
+        self.points = np.zeros((loop.size, self.columns))
         self.points[1 : 1 + len(filled)] = filled
         if parameters is not None:
-            self.points[loop.method.size - len(parameters) :] = self._filled(parameters)
+            self.points[loop.size - len(parameters) :] = self._filled(parameters)
         self.worst = np.zeros((len(WORST_RECORD), self.columns))
         loop(
             BatchSpan(columns=self.columns, rows=0, begin=0, end=self.columns), self.points, self.worst, np.zeros((0, 0, 0))
@@ -74,7 +75,7 @@ class FixedStepBatch:
         rows[:, 0] = self.points[self.loop.written].T
         strips = self.columns // self.loop.width
         share = max(1, min(BUDGET // steps, strips // (CHUNKS_PER_THREAD * threads))) * self.loop.width
-        every, stopped = steps_per_check(self.loop.method.evaluations), Event()
+        every, stopped = steps_per_check(self.loop.evaluations), Event()
 
         def work(begin: int):
             end = min(begin + share, self.columns)
@@ -96,16 +97,17 @@ def in_threads(work: Callable, items: Iterable, threads: int, stopped: Event):
             work(item)
         return
 
-    def watched(item):
+    def watched(item, run):
         try:
-            work(item)
+            run(work, item)
         except BaseException:
             stopped.set()
             raise
 
     with ThreadPoolExecutor(threads) as pool:
         try:
-            list(pool.map(watched, items))
+            every = list(items)
+            list(pool.map(watched, every, [copy_context().run for _ in every]))  # the threads belong to the run
         finally:
             stopped.set()
 

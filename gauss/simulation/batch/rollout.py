@@ -6,14 +6,18 @@ from numbers import Integral
 
 import numpy as np
 
+from gauss.arguments import named_arguments
+from gauss.codegen import one_tier
+from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
-from gauss.errors import SimulationError, did_you_mean, named_arguments, require
+from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep, Integrator
 from gauss.shapes import Shaped
 from gauss.simulation.arguments import sample_times
@@ -30,6 +34,8 @@ from gauss.system import State, System, refuse_changed
 
 FIXED = {method.name: method for method in EXPLICIT_FIXED}
 ADAPTIVE = {method.name: method for method in EXPLICIT}
+LARGE_BATCH = 1_000_000  # steps of all motions that take about as long as optimising the code of a robot arm
+ADAPTIVE_STEPS = 100  # number of steps that an adaptive motion is taken to make
 
 
 @dataclass(frozen=True)
@@ -128,11 +134,19 @@ def rollout(
     _check_counts({"threads": threads})
     if integrator in ADAPTIVE:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
-        return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores())
+        with one_tier(_tier(q0, ADAPTIVE_STEPS)):
+            return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores())
     if integrator not in FIXED:
         raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, FIXED | ADAPTIVE)}")
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
-    return _fixed(system, q0, v0, FIXED[integrator], steps, step, 1 if every is None else every, threads or cores())
+    with one_tier(_tier(q0, steps)):
+        return _fixed(system, q0, v0, FIXED[integrator], steps, step, 1 if every is None else every, threads or cores())
+
+
+def _tier(q0, steps) -> str:
+    """Tier of the code of a batch: large ones wait for optimised code. The arguments are not checked yet."""
+    motions = len(q0) if hasattr(q0, "__len__") else 1
+    return OPTIMISED if isinstance(steps, Integral) and motions * int(steps) > LARGE_BATCH else AUTO
 
 
 def _fixed(
@@ -275,4 +289,4 @@ def _machine_code(system: System, kind: Hashable, make):
     """
     laws = Laws(system)
     BATCHES.plan(Question(system, laws))
-    return system.dynamics.on_demand((_machine_code, kind, laws.key), lambda: make(laws))
+    return cached_on_disk(system, (_machine_code, kind, laws.key), lambda: make(laws))

@@ -158,7 +158,7 @@ class MomentumForm:
 
         def transported(t, q0, theta, rate):
             q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
-            force, momentum = (condensed(system, part) for part in np.split(self._gradient.inlined(q, v), [n]))
+            force, momentum = (condensed(system, half) for half in np.split(self._gradient.inlined(q, v), [n]))
             applied, power = self._applied(t[0], q, v)
             force, B = force + applied, self._chart(chart_velocity, theta, rate)
             turning = jacobian(v, theta).T @ momentum
@@ -192,18 +192,18 @@ class MomentumForm:
     def spread(self) -> np.ndarray:
         """Matrix S (n_v, n) of v = S u, u being the rates along the free coordinates; without joints that close loops."""
         columns = []
-        for part in self.system.parts:
+        for subsystem in self.system.subsystems:
             ratios = {}
-            for train in part.trains:
-                first, *others = (part.joints[joint].v.start for joint in train.joints)
+            for train in subsystem.trains:
+                first, *others = (subsystem.joints[joint].v.start for joint in train.joints)
                 ratios[first] = dict(zip([first, *others], train.ratios, strict=True))
                 ratios |= dict.fromkeys(others, {})
-            closing = {k for index in part.closing for k in range(part.n_v)[part.joints[index].v]}
-            for k in range(part.n_v):
+            loop_rates = {k for index in subsystem.loop_joints for k in range(subsystem.n_v)[subsystem.joints[index].v]}
+            for k in range(subsystem.n_v):
                 column = np.zeros(self.system.n_v)
                 for place, ratio in ratios.get(k, {k: 1.0}).items():
-                    column[part.v[place]] = ratio
-                if column.any() and k not in closing:
+                    column[subsystem.v[place]] = ratio
+                if column.any() and k not in loop_rates:
                     columns.append(column)
         return np.array(columns).reshape(-1, self.system.n_v).T
 
@@ -314,5 +314,5 @@ class MomentumForm:
         """End of a step at θ in the chart around q, up to a reaction; momentum and push are in axes of parents."""
         n_q, n = self.system.n_q, self.system.n_v
         found = self._reached([t], q, theta, momentum, push)
-        q, v, momentum, lost, work = np.split(found, np.cumsum([n_q, n, n, n]))
-        return Reached(State(t, q, v), momentum, lost, work[0])
+        q, v, momentum, compensation, work = np.split(found, np.cumsum([n_q, n, n, n]))
+        return Reached(State(t, q, v), momentum, compensation, work[0])

@@ -53,9 +53,9 @@ class PivotMonitor:
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a state."""
-        n, found = self.system.n_v, self.program.monitored_rates([state.t], state.q, state.v)
-        self.pivots.append(found[-2])
-        return Rates(found[:n], found[n : n + 3])
+        rates, (smallest, _) = self.program.split_rates(self.program.monitored_rates([state.t], state.q, state.v))
+        self.pivots.append(smallest)
+        return rates
 
 
 class ProjectedEquations:

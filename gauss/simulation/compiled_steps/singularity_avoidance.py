@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
+from gauss.dynamics.laws.switching_times import distinct
 
 NEAR_MIDDLE = 0.65  # of half the widest interval between stages: a zero this near to its middle needs no other step
 EARLY = 0.05  # relative to the step: a zero this near to its begin is not avoided by a shorter step
@@ -34,11 +35,11 @@ class StageNodes:
     """
 
     def __init__(self, c: np.ndarray, others: np.ndarray):
-        times = np.unique(np.concatenate([c, others]))
+        times = distinct(np.concatenate([c, others]))
         widest = int(np.argmax(np.diff(times)))
         self.middle, self.half = times[widest : widest + 2].mean(), np.diff(times)[widest] / 2
-        self.times, first = np.unique(c[::-1], return_index=True)
-        self.stages = len(c) - 1 - first  # of stages at one node the last, the most accurate one
+        self.times = distinct(c)
+        self.stages = np.array([np.flatnonzero(c == t)[-1] for t in self.times])  # at one node the last, most accurate one
 
     def place(self, sigma: np.ndarray) -> Scalar:
         """Time of the zero of σ next to the stage with the smallest one, relative to the step.

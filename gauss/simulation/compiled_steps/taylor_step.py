@@ -84,8 +84,7 @@ def _rates(program: Program) -> Function:
     system, n = program.system, program.system.n_v
 
     def rates(t, q, v, work):
-        found = program.rates.inlined(t, q, v)
-        return coordinate_rates(system, q, v), found
+        return coordinate_rates(system, q, v), *program.instant(State(t[0], q, v))[1]
 
     written = write(rates, 1, system.n_q, n, 3, name="taylor_rates")
     if without_series(written):
@@ -120,8 +119,8 @@ def _moved(program: Program, x, h, change):
     Compensated summation (Kahan 1965; Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5).
     """
     point, system = program.layout.point(x), program.system
-    state, (*lost, late) = point.state, method_state_of(point)
-    before, change, h = np.concatenate([state.q, state.v, point.work]), change + np.array(lost), h + late
+    state, (*compensation, late) = point.state, method_state_of(point)
+    before, change, h = np.concatenate([state.q, state.v, point.work]), change + np.array(compensation), h + late
     after, t = before + change, state.t + h
     compensation = np.concatenate([change - (after - before), [h - (t - state.t)]])
     q, v, work = after[: system.n_q].copy(), after[system.n_q : -3], after[-3:]

@@ -40,6 +40,9 @@ class CompiledMoreauRun(CompiledFixedRun):
         self.stepper.refuse_penetration(problem.start)
         super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()))
 
+    def _beside(self) -> tuple:
+        return (self.whole.system,)  # with the elements that the stepper adds
+
     def collect(self) -> Trajectory:
         """Trajectory to the end.
 

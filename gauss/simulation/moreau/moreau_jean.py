@@ -108,7 +108,7 @@ class MoreauRun(PythonRun):
 def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str:
     """Description: step, residual of the laws, steps of the convex relaxation, source of the accelerations."""
     by = f"; {relaxed} steps by the convex relaxation of Coulomb's law" if relaxed else ""
-    return f"time stepping of {step:g} s, laws of contacts and grips met to {error:.0e} relative{by}; {accelerations}"
+    return f"time stepping of {step:g} s, laws of contact and friction met to {error:.0e} relative{by}; {accelerations}"
 
 
 def time_step(run: MoreauRun, point: Point, h: float) -> tuple[Point, Cost]:
@@ -128,6 +128,7 @@ TIME_STEPPING = FixedStep(
     time_step,
     nonsmooth=True,
 )
+NONSMOOTH = (TIME_STEPPING,)
 
 
 def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> MoreauStep:
@@ -153,8 +154,8 @@ def with_forces(motion: Kinematics, force: np.ndarray, backend: str = "auto") ->
         If it is not certified.
     """
     problem = assemble_motion(motion, Applied(motion))
-    _, grips, _ = set_valued_rows(motion)
-    pushed = np.concatenate([gaps(motion).J, slips(motion).J.reshape(-1, grips.shape[1]), grips]).T @ force
+    _, set_valued, _ = set_valued_rows(motion)
+    pushed = np.concatenate([gaps(motion).J, slips(motion).J.reshape(-1, set_valued.shape[1]), set_valued]).T @ force
     n = problem.Phi.size
     solution = solve(replace(problem, impressed=problem.impressed + pushed[:n], P=problem.P + pushed[n:]), backend)
     if not solution.status.certified:

@@ -4,9 +4,9 @@ A phase is the scene of one contact mode: active unilateral constraints and stic
 sliding ones are loads, inactive ones are dropped. It ends when an open gap closes (an impact, by least compulsion of
 velocities), when the multiplier of a closed one changes sign (it opens), when features in contact separate, as a corner and
 a face at its rim, when the force of a sticking element exceeds its limit (it slips), when a sliding one comes to rest, when
-flanks of an elastic link touch or separate, and when the power flow through a link with losses reverses, or its drive stops.
-All events are located on the dense output of the step. The next mode is that of the compulsion with rows G x ≤ h and limited
-forces (Brogliato, Nonsmooth Mechanics, 3rd ed., 7.1: event-driven schemes).
+backlash sides of an elastic link touch or separate, and when the power flow through a link with losses reverses, or its
+drive stops. All events are located on the dense output of the step. The next mode is that of the compulsion with rows
+G x ≤ h and limited forces (Brogliato, Nonsmooth Mechanics, 3rd ed., 7.1: event-driven schemes).
 """
 
 from collections.abc import Callable, Iterator
@@ -24,6 +24,7 @@ from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, crossed_time
 from gauss.simulation.phases.event_location import first_hit, first_negative, first_true
@@ -42,10 +43,10 @@ DEEPEST = 1e-6  # penetration of a start, relative to the size of the gap, above
 
 # Changes of the contact mode by field: kind of event, and its condition on the values (before, after).
 CHANGES = {
-    "grips": {"slips": lambda old, new: new and new != old, "holds": lambda old, new: old and not new},
-    "ways": {"power reversal": lambda old, new: old * new < 0},
+    "set_valued": {"slips": lambda old, new: new and new != old, "holds": lambda old, new: old and not new},
+    "power_flow": {"power reversal": lambda old, new: old * new < 0},
     "trains": {"starts": lambda old, new: not old and new, "stuck": lambda old, new: old and not new},
-    "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
+    "backlash_sides": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
 }
 
 REVERSED_RATE = 1e-5  # relative to the rate at rest: a smaller reversed rate is rounding
@@ -64,17 +65,17 @@ class EventDrivenRun(PythonRun):
     def __init__(self, problem: Problem):
         system, p = problem.system, problem
         super().__init__(system, p.method, CertifiedEngine(p.backend), p.tolerance, p.step, p.end, switching=p.switching)
-        self.backend, self.holder = p.backend, mode_selector(system)
+        self.backend, self.selector = p.backend, mode_selector(system)
         self.sides = sides(system.scene)
         self.names = [side.name for side in self.sides]
         self.guarded = [guard.name for guard in guards(system.scene)]
         self.restitution = np.array([side.whole.restitution for side in self.sides])
         self.sizes = np.concatenate([gap_scales(system), np.full(len(self.guarded), system.scale.length)])
-        self.kernel = system.dynamics.on_demand((gap_kernel,), lambda: gap_kernel(system)) if self.names else None
+        self.kernel = cached_on_disk(system, (gap_kernel,), lambda: gap_kernel(system)) if self.names else None
         self.active_set = self._active_set()
         self.phases: dict[tuple, Phase] = {}
         self.started: Phase | None = None
-        self.flanks: dict[str, int] = {}
+        self.backlash_sides: dict[str, int] = {}
 
     def evaluate(self, state: State) -> Rates:
         """Zero rates: the engines of the phases compute them."""
@@ -92,7 +93,7 @@ class EventDrivenRun(PythonRun):
 
     def _active_set(self) -> ActiveSetKernel | None:
         """Compiled active-set kernel of the contacts, where these are the only non-smooth elements."""
-        others = self.holder.names or self.holder.losses or self.holder.trains
+        others = self.selector.names or self.selector.losses or self.selector.trains
         if self.backend != "auto" or others or not self.names:
             return None
         return self.system.dynamics.on_demand((ActiveSetKernel, Laws(self.system).key), lambda: ActiveSetKernel(self.system))
@@ -108,7 +109,7 @@ class EventDrivenRun(PythonRun):
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted points of all phases; at an impact two of the same time, before and after."""
         self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
-        self.flanks = self.holder.flanks(point.state)
+        self.backlash_sides = self.selector.backlash_sides(point.state)
         self.latest, self.at_once = point.state.t, 0
         switches = Timetable(self.switching.times.switches, NO_TIMES.mesh)
         after, jumped = self._next_phase(point, ())
@@ -155,7 +156,7 @@ class EventDrivenRun(PythonRun):
         self.at_once = self.at_once + 1 if event and t - self.latest <= ZENO_TIME * self.end else 0
         self.latest = self.latest if self.at_once else t
         if self.at_once > ZENO_EVENTS:
-            names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
+            names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.nonsmooth)
             raise SimulationError(
                 f"t = {self.latest:.6g} s: impacts and contacts of {names} do not come to an end: more than {ZENO_EVENTS} "
                 f"events within {ZENO_TIME:g} of the duration. Try integrator='time_stepping'."
@@ -179,7 +180,7 @@ class EventDrivenRun(PythonRun):
         """Point at the first event of a step, and the gap that closes; None without an event.
 
         Events of each kind are looked for up to the first one of the kinds before: closing gaps; sliding elements that come
-        to rest and features that separate; flanks; released constraints.
+        to rest and features that separate; backlash sides; released constraints.
         """
         t0, last, first = begin.state.t, reached.state.t, ""
         hit = first_hit(lambda t: self._gaps_and_guards(dense(t)[0]) / self.sizes, t0, last, self._open())
@@ -188,9 +189,9 @@ class EventDrivenRun(PythonRun):
         change = self._change(dense, t0, last)
         if change is not None:
             last, first = change, "change"
-        flank = self._flank_change(dense, t0, last)
-        if flank:
-            last, first = flank[0], "flank"
+        side_change = self._backlash_change(dense, t0, last)
+        if side_change:
+            last, first = side_change[0], "backlash side"
         release = self._release(dense, t0, last) if self.phase.may_end else None
         if release is not None:
             last, first = release, "release"
@@ -198,8 +199,8 @@ class EventDrivenRun(PythonRun):
             return None
         state, work = dense(last)
         state = self.project(state)
-        if flank and first == "flank":
-            self._switch_flank(flank[1], state)
+        if side_change and first == "backlash side":
+            self._switch_backlash_side(side_change[1], state)
         return Point(state, work, reached.rates), (hit[1],) if hit and first == "hit" else ()
 
     def _change(self, dense: Callable, begin: float, end: float) -> float | None:
@@ -207,9 +208,10 @@ class EventDrivenRun(PythonRun):
         times = self._standstill(dense, begin, end), self._separation(dense, begin, end)
         return min((t for t in times if t is not None), default=None)
 
-    def _flank_change(self, dense: Callable, begin: float, end: float) -> tuple[float, int] | None:
-        """First time in a step at which a flank touches or separates, and the index of its link."""
-        return first_negative(lambda t: self._flank_margins(dense(t)[0]), begin, end) if self.holder.plays else None
+    def _backlash_change(self, dense: Callable, begin: float, end: float) -> tuple[float, int] | None:
+        """First time in a step at which a backlash side touches or separates, and the index of its link."""
+        margins = lambda t: self._backlash_margins(dense(t)[0])  # noqa: E731
+        return first_negative(margins, begin, end) if self.selector.backlashes else None
 
     def _open(self) -> np.ndarray:
         """Indices of the open gaps, and of the guards of contacts without a closed one."""
@@ -222,39 +224,41 @@ class EventDrivenRun(PythonRun):
 
         A sliding element that a drive keeps at rest beyond its limit has rates of rounding.
         """
-        holder, mode = self.holder, self.phase.mode
-        led = np.array([name in holder.rubbing for name in holder.names], dtype=bool)
-        slipping = np.flatnonzero((self.phase.signs != 0) & holder.sticks & ~led)
-        ways = np.array([mode.trains[train.root] for train in holder.trains], dtype=int)
-        turning = np.flatnonzero(ways)
+        selector, mode = self.selector, self.phase.mode
+        led = np.array([name in selector.rubbing for name in selector.names], dtype=bool)
+        slipping = np.flatnonzero((self.phase.signs != 0) & selector.sticks & ~led)
+        directions = np.array([mode.trains[train.root] for train in selector.trains], dtype=int)
+        turning = np.flatnonzero(directions)
         if not slipping.size and not turning.size:
             return None
 
         def onward(t: float) -> np.ndarray:
             state = dense(t)[0]
-            slides, turns = holder.rates(state)[slipping], holder.turning(state)[turning]
-            return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
+            slides, turns = selector.rates(state)[slipping], selector.turning(state)[turning]
+            return np.concatenate([-self.phase.signs[slipping] * slides, directions[turning] * turns])
 
         def rounding(t: float) -> np.ndarray:
-            sizes = REVERSED_RATE * resting(self.system, dense(t)[0].v) * holder.sizes[slipping]
+            sizes = REVERSED_RATE * resting(self.system, dense(t)[0].v) * selector.sizes[slipping]
             return np.concatenate([sizes, np.zeros(turning.size)])
 
         found = first_negative(onward, begin, end, rounding)
         return None if found is None else found[0]
 
-    def _flank_margins(self, state: State) -> np.ndarray:
-        """Distance of elastic links with backlash from contact or separation of flanks, relative to a radian of strain."""
+    def _backlash_margins(self, state: State) -> np.ndarray:
+        """Distance of links with backlash from contact or separation of their sides, relative to a radian of strain."""
         motion, margins = Kinematics(self.system, state), []
-        for name, play in self.holder.plays.items():
-            touch, side = _contact_margins(play, motion), self.flanks[name]
+        for name, play in self.selector.backlashes.items():
+            touch, side = _contact_margins(play, motion), self.backlash_sides[name]
             margins.append(touch[side] if side else -max(touch.values()))
         return np.array(margins)
 
-    def _switch_flank(self, link: int, state: State):
-        """Change the flank in contact of an elastic link with backlash."""
-        name = list(self.holder.plays)[link]
-        touch = _contact_margins(self.holder.plays[name], Kinematics(self.system, state))
-        self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=lambda side: touch[side])}
+    def _switch_backlash_side(self, link: int, state: State):
+        """Change the backlash side in contact of an elastic link with backlash."""
+        name = list(self.selector.backlashes)[link]
+        touch = _contact_margins(self.selector.backlashes[name], Kinematics(self.system, state))
+        self.backlash_sides = self.backlash_sides | {
+            name: 0 if self.backlash_sides[name] else max(touch, key=lambda side: touch[side])
+        }
 
     def _separation(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step at which features in contact separate, as a corner and a face at its rim."""
@@ -290,12 +294,12 @@ class EventDrivenRun(PythonRun):
 
     def _choose(self, state: State, touching: np.ndarray) -> tuple:
         """Contact mode: gaps that stay closed, and the state of all other elements."""
-        if not touching.size and not self.holder.names and not self.holder.losses:
-            return (), ContactMode(flanks=self.flanks)
+        if not touching.size and not self.selector.names and not self.selector.losses:
+            return (), ContactMode(backlash_sides=self.backlash_sides)
         stay = None if self.active_set is None else self.active_set(state, touching)
         if stay is not None:
-            return tuple(stay.tolist()), ContactMode(flanks=self.flanks)
-        return self.holder.choose(state, touching, self.backend, self.flanks).case
+            return tuple(stay.tolist()), ContactMode(backlash_sides=self.backlash_sides)
+        return self.selector.choose(state, touching, self.backend, self.backlash_sides).case
 
     def _next_phase(self, point: Point, hits: tuple[int, ...], since: float | None = None) -> tuple[Point, bool]:
         """Initial point of the next phase, and whether an impact precedes it.
@@ -313,21 +317,21 @@ class EventDrivenRun(PythonRun):
             np.flatnonzero(width <= TOUCHING * sizes), np.array([i for i in hits if i < len(self.names)], dtype=int)
         )
         closing = touching[rate[touching] < -slow * sizes[touching]]
-        caught = self.holder.overtaken(state)
+        caught = self.selector.overtaken(state)
         jumps = bool(closing.size or caught.size or driven)
         if jumps:
             happened = impact(self.system, state, touching, self.restitution, self.backend, since, driven)
             state, work = happened.state, booked(work, happened)
-            hit = [self.names[i] for i in closing] + [self.holder.names[i] for i in caught]
+            hit = [self.names[i] for i in closing] + [self.selector.names[i] for i in caught]
             self.events.append(of_impact(state.t, [*hit, *driven], happened))
             rate, slow = self._gaps(state)[1], resting(self.system, state.v)
         case = self._choose(state, touching[rate[touching] <= slow * sizes[touching]])
         self._note_changes(state.t, case)
-        work = work + np.array([0.0, 0.0, self._lost_flank_energy(state, case[1])])
+        work = work + np.array([0.0, 0.0, self._lost_backlash_energy(state, case[1])])
         places = self._places(state, case[0])
         key = case, tuple(places.items())
         if key not in self.phases:
-            self.phases[key] = Phase(self.holder, *case, places, self.backend)
+            self.phases[key] = Phase(self.selector, *case, places, self.backend)
         self.started = self.phases[key]
         state = self.project(state)
         return Point(state, work, self.phase.solver.rates(self.phase.system, state)), jumps
@@ -348,12 +352,12 @@ class EventDrivenRun(PythonRun):
             for kind, happens in kinds.items():
                 self._note(t, kind, [name for name, now in new.items() if happens(old[name], now)])
 
-    def _lost_flank_energy(self, state: State, mode: ContactMode) -> float:
-        """Elastic energy of flanks that separate [J], which is dissipated."""
-        before, motion = self.phase.mode.flanks if self.started else {}, Kinematics(self.system, state)
-        parted = [name for name, side in before.items() if side and not mode.flanks[name]]
-        plays = self.holder.plays
-        return sum(float(plays[name].stored(plays[name].ends(motion)[0], before[name])) for name in parted)
+    def _lost_backlash_energy(self, state: State, mode: ContactMode) -> float:
+        """Elastic energy of backlash sides that separate [J], which is dissipated."""
+        before, motion = self.phase.mode.backlash_sides if self.started else {}, Kinematics(self.system, state)
+        parted = [name for name, side in before.items() if side and not mode.backlash_sides[name]]
+        backlashes = self.selector.backlashes
+        return sum(float(backlashes[name].stored(backlashes[name].ends(motion)[0], before[name])) for name in parted)
 
     def _note(self, t: float, kind: str, names: list[str]):
         if names:
@@ -373,7 +377,7 @@ class EventDrivenRun(PythonRun):
 
 
 def _contact_margins(play, motion: Kinematics) -> dict[int, float]:
-    """Margin of contact of both flanks of an elastic link with backlash, by side; positive in contact."""
+    """Margin of contact of both backlash sides of an elastic link with backlash, by side; positive in contact."""
     return {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
 
 

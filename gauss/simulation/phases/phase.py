@@ -68,7 +68,7 @@ class Phase:
 
     Parameters
     ----------
-    holder : ModeSelector
+    selector : ModeSelector
         Mode selection of the whole system.
     held : tuple of int
         Indices of the closed gaps.
@@ -80,12 +80,12 @@ class Phase:
         Solver of the accelerations.
     """
 
-    def __init__(self, holder: ModeSelector, held: tuple[int, ...], mode: ContactMode, places: Mapping, backend: str):
-        whole, self.holder = holder.system, holder
+    def __init__(self, selector: ModeSelector, held: tuple[int, ...], mode: ContactMode, places: Mapping, backend: str):
+        whole, self.selector = selector.system, selector
         names = [whole.contacts.placed[i].name for i in held]
         self.case, self.held, self.mode = (held, mode), np.array(held, dtype=int), mode
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
-        self.signs = np.array([mode.grips[name] for name in holder.names], dtype=int)
+        self.signs = np.array([mode.set_valued[name] for name in selector.names], dtype=int)
         self.system, self.links, cut, self.margins = phase_parts(whole, tuple(names), mode, places)
         self.backend, may_compile = backend, MODES.plan(Question(self.system, self.laws, backend)).dynamics == "compiled"
         if self.links.names:
@@ -124,7 +124,7 @@ class Phase:
     @property
     def may_end(self) -> bool:
         """Whether a constraint may be released, or a power flow reverse."""
-        return bool(self.held.size or (self.signs == 0).any() or any(self.mode.ways.values()) or self.rests)
+        return bool(self.held.size or (self.signs == 0).any() or any(self.mode.power_flow.values()) or self.rests)
 
     @property
     def rests(self) -> bool:
@@ -136,7 +136,7 @@ class Phase:
         """Whether its end depends on constraint forces; else on the laws of sliding elements alone."""
         sticking = (self.signs == 0).any()
         return bool(
-            self.held.size or sticking or self.rests or any(name not in self.holder.names for name in self.holder.losses)
+            self.held.size or sticking or self.rests or any(name not in self.selector.names for name in self.selector.losses)
         )
 
     def holds(self, state: State) -> bool:
@@ -144,18 +144,20 @@ class Phase:
         if self.rests:
             return False
         if not self.asks_forces:
-            return self._flows(forces_of(self.holder.system, self.system, self.mode, state, None))
+            return self._flows(forces_of(self.selector.system, self.system, self.mode, state, None))
         if self.links.names:
             solution, _ = self.solvers[0].solution(state)
         else:
             solution = solve(assemble(self.system, state), self.backend)
-        forces = forces_of(self.holder.system, self.system, self.mode, state, solution)
-        grips = np.array([forces[name] for name in self.holder.names])
+        forces = forces_of(self.selector.system, self.system, self.mode, state, solution)
+        set_valued = np.array([forces[name] for name in self.selector.names])
         pushing = (solution.multipliers[self.rows] <= 0.0).all()
-        return bool(pushing and not self.holder.beyond(self.signs, grips, state.t).any()) and self._flows(forces)
+        return bool(pushing and not self.selector.beyond(self.signs, set_valued, state.t).any()) and self._flows(forces)
 
     def _flows(self, forces: dict[str, float]) -> bool:
         """Whether the power flow through links with losses keeps its directions."""
-        mode, ways, efforts = self.mode, self.holder.ways(self.mode, forces), self.holder.efforts
-        least = REVERSED_FORCE * self.holder.largest(forces)
-        return all(ways[name] == way or abs(forces[name]) <= least * efforts[name] for name, way in mode.ways.items())
+        mode, power_flow, units = self.mode, self.selector.power_flow(self.mode, forces), self.selector.force_units
+        least = REVERSED_FORCE * self.selector.largest(forces)
+        return all(
+            power_flow[name] == way or abs(forces[name]) <= least * units[name] for name, way in mode.power_flow.items()
+        )

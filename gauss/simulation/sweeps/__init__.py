@@ -1,6 +1,5 @@
 """Parameter sweeps: motions of one scene for many values of its parameters, as one labelled dataset."""
 
-from gauss.simulation.sweeps.parameters import ranges
-from gauss.simulation.sweeps.sweep import load_sweep, sweep
+from gauss.lazy import attach
 
-__all__ = ["load_sweep", "ranges", "sweep"]
+__all__, __getattr__, __dir__ = attach(__name__, __file__)

@@ -10,7 +10,7 @@ import numpy as np
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import Scene, Start
 
-GROUPS = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "grips", "loads")
+GROUPS = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "set_valued", "loads")
 UNITS = {
     "mass": "kg",
     "inertia": "kg m²",

@@ -8,18 +8,18 @@ from dataclasses import replace
 from gauss.system.subsystem import Subsystem, spanning_tree
 
 
-def cut(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
+def cut(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Choose the spanning tree with the fewest loop constraints."""
-    if not part.closing:
-        return [part], []
-    coupled = {name for coupling in part.couplings for name in (coupling.driver, coupling.driven)}
+    if not subsystem.loop_joints:
+        return [subsystem], []
+    coupled = {name for coupling in subsystem.couplings for name in (coupling.driver, coupling.driven)}
 
     def preference(joint) -> int:
         return joint.pair.n_v - (10 if joint.name in coupled else 0)
 
-    tree = spanning_tree(part.joints, preference)
-    better = replace(part, tree=tree)
-    names = lambda p: ", ".join(repr(p.joints[i].name) for i in p.closing)  # noqa: E731
-    if better.closing == part.closing:
-        return [part], []
-    return [better], [f"loops are closed by {names(better)} instead of {names(part)}"]
+    tree = spanning_tree(subsystem.joints, preference)
+    better = replace(subsystem, tree=tree)
+    names = lambda p: ", ".join(repr(p.joints[i].name) for i in p.loop_joints)  # noqa: E731
+    if better.loop_joints == subsystem.loop_joints:
+        return [subsystem], []
+    return [better], [f"loops are closed by {names(better)} instead of {names(subsystem)}"]

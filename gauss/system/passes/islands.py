@@ -10,17 +10,17 @@ from gauss.system.placed_elements import PlacedFrame
 from gauss.system.subsystem import GROUND, BoundRelation, Subsystem, spanning_tree
 
 
-def islands(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
+def islands(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Split a subsystem into its islands."""
-    groups = _groups(part)
+    groups = _groups(subsystem)
     if len(groups) == 1:
-        return [part], []
-    return [_island(part, group) for group in groups], [f"{len(groups)} islands share nothing but the ground"]
+        return [subsystem], []
+    return [_island(subsystem, group) for group in groups], [f"{len(groups)} islands share nothing but the ground"]
 
 
-def _groups(part: Subsystem) -> list[list[int]]:
+def _groups(subsystem: Subsystem) -> list[list[int]]:
     """Bodies of each island, in order."""
-    stands_for = list(range(part.n_bodies))
+    stands_for = list(range(subsystem.n_bodies))
 
     def find(body: int) -> int:
         while stands_for[body] != body:
@@ -28,26 +28,26 @@ def _groups(part: Subsystem) -> list[list[int]]:
             body = stands_for[body]
         return body
 
-    bound = [[joint.parent, joint.child] for joint in part.joints]
-    bound += [[side for name in (c.driver, c.driven) for side in _sides(part.joint(name))] for c in part.couplings]
-    bound += [_bodies(part, relation) for relation in part.relations]
+    bound = [[joint.parent, joint.child] for joint in subsystem.joints]
+    bound += [[side for name in (c.driver, c.driven) for side in _sides(subsystem.joint(name))] for c in subsystem.couplings]
+    bound += [_bodies(subsystem, relation) for relation in subsystem.relations]
     for bodies in bound:
         roots = [find(body) for body in bodies if body != GROUND]
         for root in roots:
             stands_for[root] = min(roots)
     groups: dict[int, list[int]] = {}
-    for body in range(part.n_bodies):
+    for body in range(subsystem.n_bodies):
         groups.setdefault(find(body), []).append(body)
     return list(groups.values())
 
 
-def _bodies(part: Subsystem, relation: BoundRelation) -> list[int]:
+def _bodies(subsystem: Subsystem, relation: BoundRelation) -> list[int]:
     """Bodies of a subsystem that a relation binds, directly or through joints.
 
     A relation of immovable bodies goes with the first body, which checks its residual.
     """
-    bodies = [side for name in relation.joints if part.has(name) for side in _sides(part.joint(name))]
-    bodies += [part.carried[body].body for body in relation.bodies]
+    bodies = [side for name in relation.joints if subsystem.has(name) for side in _sides(subsystem.joint(name))]
+    bodies += [subsystem.carried[body].body for body in relation.bodies]
     return [body for body in bodies if body != GROUND] or [0]
 
 
@@ -55,17 +55,17 @@ def _sides(joint) -> tuple[int, int]:
     return joint.parent, joint.child
 
 
-def _island(part: Subsystem, bodies: list[int]) -> Subsystem:
+def _island(subsystem: Subsystem, bodies: list[int]) -> Subsystem:
     number = {body: i for i, body in enumerate(bodies)} | {GROUND: GROUND}
-    joints = [j for j in part.joints if j.parent in number and j.child in number]
+    joints = [j for j in subsystem.joints if j.parent in number and j.child in number]
     joints = [replace(j, parent=number[j.parent], child=number[j.child]) for j in joints]
-    carried = {body: PlacedFrame(number[f.body], f.R, f.p) for body, f in part.carried.items() if f.body in bodies}
-    relations = [relation for relation in part.relations if set(_bodies(part, relation)) & set(bodies)]
+    carried = {body: PlacedFrame(number[f.body], f.R, f.p) for body, f in subsystem.carried.items() if f.body in bodies}
+    relations = [relation for relation in subsystem.relations if set(_bodies(subsystem, relation)) & set(bodies)]
     smaller = replace(
-        part,
+        subsystem,
         relations=tuple(relations),
-        names=tuple(part.names[body] for body in bodies),
-        Phi=part.Phi.reshape(-1, 6)[bodies].ravel(),
+        names=tuple(subsystem.names[body] for body in bodies),
+        Phi=subsystem.Phi.reshape(-1, 6)[bodies].ravel(),
         carried=carried,
     )
     smaller = kept_joints(smaller, joints)

@@ -19,38 +19,38 @@ PARALLEL_NORMALS = 1e-12  # sine of the angle between axes that are meant as par
 TRIVIAL_ROWS = {"revolute": (0, 1, 5), "planar": (0, 1, 5), "prismatic": (0, 2, 4)}  # rows 0 = 0, in the axes of this pass
 
 
-def plane(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
+def plane(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Lay a plane mechanism into its plane; leave any other as it is."""
-    normals = _normals(part)
+    normals = _normals(subsystem)
     if normals is None:
-        return [part], []
+        return [subsystem], []
     turns = {body: rotations.along(normal) for body, normal in normals.items() if body != GROUND}
-    Phi = part.Phi.reshape(-1, 6).copy()
+    Phi = subsystem.Phi.reshape(-1, 6).copy()
     for body, normal in normals.items():
         if body != GROUND:
-            Phi[body, :3] = 0.0, 0.0, normal @ (part.Phi[6 * body : 6 * body + 3] * normal)
+            Phi[body, :3] = 0.0, 0.0, normal @ (subsystem.Phi[6 * body : 6 * body + 3] * normal)
     carried = {
         body: frame if frame.body == GROUND else PlacedFrame(frame.body, *_turned(turns[frame.body], frame.R, frame.p))
-        for body, frame in part.carried.items()
+        for body, frame in subsystem.carried.items()
     }
     flat = replace(
-        part,
+        subsystem,
         Phi=Phi.ravel(),
-        joints=tuple(_laid(joint, normals, turns) for joint in part.joints),
+        joints=tuple(_laid(joint, normals, turns) for joint in subsystem.joints),
         carried=carried,
-        redundant=part.redundant
-        | {(i, axis) for i, joint in enumerate(part.joints) for axis in TRIVIAL_ROWS[joint.pair.kind]},
+        redundant=subsystem.redundant
+        | {(i, axis) for i, joint in enumerate(subsystem.joints) for axis in TRIVIAL_ROWS[joint.pair.kind]},
     )
     axis = " ".join(f"{entry:.3g}" for entry in normals[GROUND] + 0.0)
     return [flat], [f"all hinges have the direction ({axis}), all sliders lie across it"]
 
 
-def _normals(part: Subsystem) -> dict[int, np.ndarray] | None:
+def _normals(subsystem: Subsystem) -> dict[int, np.ndarray] | None:
     """Normal of the plane in the central axes of every body and in world; None if there is no such plane."""
-    seed = next((joint for joint in part.joints if joint.pair.kind in ("revolute", "planar")), None)
-    if seed is None or any(joint.pair.kind not in TRIVIAL_ROWS for joint in part.joints):
+    seed = next((joint for joint in subsystem.joints if joint.pair.kind in ("revolute", "planar")), None)
+    if seed is None or any(joint.pair.kind not in TRIVIAL_ROWS for joint in subsystem.joints):
         return None
-    return propagated(part.joints, (seed.parent, seed.R_parent[:, 2]), _normal_beyond, PARALLEL_NORMALS)
+    return propagated(subsystem.joints, (seed.parent, seed.R_parent[:, 2]), _normal_beyond, PARALLEL_NORMALS)
 
 
 def _normal_beyond(joint: PlacedJoint, body: int, normal: np.ndarray) -> np.ndarray | None:

@@ -14,21 +14,21 @@ from gauss.system.subsystem import Subsystem
 SAME_AXIS = 1e-12  # sine of the angle between two axes, and their distance relative to the subsystem, of one axis
 
 
-def repeated(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
+def repeated(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Mark the rows of joints that repeat others as redundant."""
-    in_tree = {edge.constraint for edge in part.tree}
-    order = sorted(range(len(part.joints)), key=lambda i: (i not in in_tree, i))
+    in_tree = {edge.constraint for edge in subsystem.tree}
+    order = sorted(range(len(subsystem.joints)), key=lambda i: (i not in in_tree, i))
     between: dict[frozenset, list[PlacedJoint]] = {}
     rows, reasons = set(), []
     for index in order:
-        joint = part.joints[index]
+        joint = subsystem.joints[index]
         others = between.setdefault(frozenset((joint.parent, joint.child)), [])
-        first = next((other for other in others if _repeats(joint, other, SAME_AXIS * part.size)), None)
+        first = next((other for other in others if _repeats(joint, other, SAME_AXIS * subsystem.size)), None)
         others.append(joint)
         if first is not None:
             rows |= {(index, axis) for axis in _constrained_axes(joint)}
             reasons.append(f"joint {joint.name!r} repeats {first.name!r}")
-    return [replace(part, redundant=part.redundant | rows)], reasons
+    return [replace(subsystem, redundant=subsystem.redundant | rows)], reasons
 
 
 def _constrained_axes(joint: PlacedJoint) -> list[int]:

@@ -14,34 +14,36 @@ from gauss.system.subsystem import GROUND, Subsystem
 RIGID_LOOP = 1e-9  # smallest singular value of the unit twists of a rigid loop, relative to the largest
 
 
-def rigid(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
+def rigid(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Weld the bodies of every loop that cannot move, until there is no such loop any more."""
     reasons = []
-    while (loop := _rigid_loop(part)) is not None:
-        names = [part.joints[i].name for i in loop]
+    while (loop := _rigid_loop(subsystem)) is not None:
+        names = [subsystem.joints[i].name for i in loop]
         reasons.append(f"the loop of {', '.join(map(repr, names))} leaves its joints no freedom")
-        part = welded(part, follow(part, {name: np.array(part.joint(name).pair.reference) for name in names}))
-        if not part.joints:
+        subsystem = welded(
+            subsystem, follow(subsystem, {name: np.array(subsystem.joint(name).pair.reference) for name in names})
+        )
+        if not subsystem.joints:
             return [], reasons
-    return [part], reasons
+    return [subsystem], reasons
 
 
-def _rigid_loop(part: Subsystem) -> list[int] | None:
+def _rigid_loop(subsystem: Subsystem) -> list[int] | None:
     """Joints of a loop that cannot move."""
-    poses = _reference(part)
-    for closing in part.closing:
-        loop = _loop(part, closing)
-        twists = np.concatenate([_twists(part, index, poses) for index in loop], axis=1)
-        twists[3:] /= part.size or 1.0
+    poses = _reference(subsystem)
+    for loop_joint in subsystem.loop_joints:
+        loop = _loop(subsystem, loop_joint)
+        twists = np.concatenate([_twists(subsystem, index, poses) for index in loop], axis=1)
+        twists[3:] /= subsystem.size or 1.0
         sizes = np.linalg.svd(twists / np.linalg.norm(twists, axis=0), compute_uv=False)
         if twists.shape[1] <= 6 and sizes.size and sizes.min() > RIGID_LOOP * sizes.max():
             return loop
     return None
 
 
-def _loop(part: Subsystem, closing: int) -> list[int]:
+def _loop(subsystem: Subsystem, loop_joint: int) -> list[int]:
     """Joints of the loop that a joint closes in the tree."""
-    inward = {edge.outer: edge for edge in part.tree}
+    inward = {edge.outer: edge for edge in subsystem.tree}
 
     def path(body: int) -> list[int]:
         found = []
@@ -50,15 +52,15 @@ def _loop(part: Subsystem, closing: int) -> list[int]:
             body = inward[body].inner
         return found
 
-    one, other = path(part.joints[closing].parent), path(part.joints[closing].child)
-    return [closing, *(set(one) ^ set(other))]
+    one, other = path(subsystem.joints[loop_joint].parent), path(subsystem.joints[loop_joint].child)
+    return [loop_joint, *(set(one) ^ set(other))]
 
 
-def _reference(part: Subsystem) -> dict[int, frames.Pose]:
+def _reference(subsystem: Subsystem) -> dict[int, frames.Pose]:
     """World poses of the central frames at the reference configuration."""
     poses = {GROUND: frames.IDENTITY}
-    for edge in part.tree:
-        joint = part.joints[edge.constraint]
+    for edge in subsystem.tree:
+        joint = subsystem.joints[edge.constraint]
         parent, child = (joint.R_parent, joint.p_parent), (joint.R_child, joint.p_child)
         across = joint.pair.pose(np.array(joint.pair.reference))
         if edge.outer == joint.child:
@@ -69,9 +71,9 @@ def _reference(part: Subsystem) -> dict[int, frames.Pose]:
     return poses
 
 
-def _twists(part: Subsystem, index: int, poses) -> np.ndarray:
+def _twists(subsystem: Subsystem, index: int, poses) -> np.ndarray:
     """Velocities (6, k) that a joint allows at the reference configuration: rotation, and motion of the world's origin."""
-    joint = part.joints[index]
+    joint = subsystem.joints[index]
     R, p = frames.compose(poses[joint.parent], (joint.R_parent, joint.p_parent))
     E_omega, E_v = joint.pair.subspace(np.array(joint.pair.reference))
     _, point = joint.pair.pose(np.array(joint.pair.reference))

@@ -16,26 +16,28 @@ SAME_CENTRE = 1e-12  # distance of an axis from the centre, relative to the posi
 SPHERICAL_KINDS = frozenset({"revolute", "universal", "ball"})
 
 
-def sphere(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
+def sphere(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Place the joints of a spherical mechanism in its centre; leave any other as it is."""
-    centres = _centres(part)
+    centres = _centres(subsystem)
     if centres is None:
-        return [part], []
-    joints = tuple(replace(j, p_parent=centres[j.parent], p_child=centres[j.child]) for j in part.joints)
+        return [subsystem], []
+    joints = tuple(replace(j, p_parent=centres[j.parent], p_child=centres[j.child]) for j in subsystem.joints)
     trivial = {(i, axis) for i in range(len(joints)) for axis in (3, 4, 5)}
     point = " ".join(f"{entry:.3g}" for entry in centres.get(-1, np.zeros(3)) + 0.0)
-    return [replace(part, joints=joints, redundant=part.redundant | trivial)], [f"all axes meet in the point ({point})"]
+    return [replace(subsystem, joints=joints, redundant=subsystem.redundant | trivial)], [
+        f"all axes meet in the point ({point})"
+    ]
 
 
-def _centres(part: Subsystem) -> dict[int, np.ndarray] | None:
+def _centres(subsystem: Subsystem) -> dict[int, np.ndarray] | None:
     """The common point in the central frame of every body and in world; None if there is none."""
-    if part.redundant or any(joint.pair.kind not in SPHERICAL_KINDS for joint in part.joints):
+    if subsystem.redundant or any(joint.pair.kind not in SPHERICAL_KINDS for joint in subsystem.joints):
         return None
-    beside, tolerance = neighbours(part.joints), SAME_CENTRE * part.size
+    beside, tolerance = neighbours(subsystem.joints), SAME_CENTRE * subsystem.size
     seed = next(((body, point) for body, joints in beside.items() if (point := _meeting(body, joints)) is not None), None)
     if seed is None:
         return None
-    return propagated(part.joints, seed, partial(_centre_beyond, tolerance), tolerance)
+    return propagated(subsystem.joints, seed, partial(_centre_beyond, tolerance), tolerance)
 
 
 def _centre_beyond(tolerance: float, joint: PlacedJoint, body: int, centre: np.ndarray) -> np.ndarray | None:

@@ -10,12 +10,12 @@ from dataclasses import replace
 from gauss.system.subsystem import Subsystem, Train
 
 
-def trains(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
+def trains(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Collapse couplings between joints of the tree that start from the same inner body."""
-    inner = {part.joints[edge.constraint].name: edge.inner for edge in part.tree}
+    inner = {subsystem.joints[edge.constraint].name: edge.inner for edge in subsystem.tree}
     ratios: dict[str, tuple[str, float]] = {}  # joint → (first joint of its train, ratio of its rate to that of the first)
     kept, collapsed = [], []
-    for coupling in part.couplings:
+    for coupling in subsystem.couplings:
         driver, driven = coupling.driver, coupling.driven
         on_one = driver in inner and driven in inner and inner[driver] == inner[driven]
         first, ratio = ratios.get(driver, (driver, 1.0))
@@ -25,17 +25,17 @@ def trains(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
         ratios.setdefault(first, (first, 1.0))
         collapsed.append(coupling)
     reasons = [f"{c.driven!r} moves {c.ratio:.6g} times as fast as {c.driver!r}" for c in collapsed]
-    return [replace(part, couplings=tuple(kept), trains=_grouped(part, inner, ratios))], reasons
+    return [replace(subsystem, couplings=tuple(kept), trains=_grouped(subsystem, inner, ratios))], reasons
 
 
-def _grouped(part: Subsystem, joints, ratios: dict[str, tuple[str, float]]) -> tuple[Train, ...]:
+def _grouped(subsystem: Subsystem, joints, ratios: dict[str, tuple[str, float]]) -> tuple[Train, ...]:
     """Trains of the joints with a ratio, in the order of the joints."""
     groups: dict[str, list[str]] = {}
     for joint in joints:
         if joint in ratios:
             groups.setdefault(ratios[joint][0], []).append(joint)
     return tuple(
-        Train(tuple(part.index(j) for j in group), tuple(ratios[j][1] / ratios[group[0]][1] for j in group))
+        Train(tuple(subsystem.index(j) for j in group), tuple(ratios[j][1] / ratios[group[0]][1] for j in group))
         for group in groups.values()
     )
 

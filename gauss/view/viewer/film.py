@@ -75,12 +75,12 @@ def export_film(
 def _write_gif(path: Path, pictures, frames: int, size: tuple[int, int]):
     from PIL import Image
 
-    palette, first, rest = None, None, []
+    palette, images = None, []
     for pixels in pictures:
         image = Image.fromarray(pixels)
         palette = palette or Image.fromarray(_sample(pixels)).quantize(255)  # one for all: colours do not flicker
-        reduced = image.quantize(palette=palette, dither=Image.Dither.NONE)
-        first, rest = first or reduced, [*rest, reduced] if first else rest
+        images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    first, *rest = images
     first.save(path, save_all=True, append_images=rest, duration=round(100 / frames) * 10, loop=0)
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import cast
 
 import numpy as np
 import trimesh
@@ -20,7 +21,7 @@ DOT = 0.02  # m: radius of points that enclose nothing
 
 
 @dataclass(frozen=True)
-class Form:
+class BodyMesh:
     """Mesh on a body.
 
     Parameters
@@ -47,7 +48,7 @@ def size(system: System) -> float:
     return max(extents, default=1.0) or 1.0
 
 
-def forms(system: System, visuals=()) -> list[Form]:
+def forms(system: System, visuals=()) -> list[BodyMesh]:
     """Meshes of all bodies: those given for a body, or generated ones; joints; shapes of contact.
 
     Parameters
@@ -58,26 +59,26 @@ def forms(system: System, visuals=()) -> list[Form]:
         Given meshes, with ``body``, ``vertices``, ``faces`` and ``colour``; see :func:`gauss.io.visuals.read_visuals`.
     """
     length = size(system)
-    found = [Form(v.body, "link", trimesh.Trimesh(v.vertices, v.faces, process=False), v.colour) for v in visuals]
+    found = [BodyMesh(v.body, "link", trimesh.Trimesh(v.vertices, v.faces, process=False), v.colour) for v in visuals]
     given = {form.body for form in found}
-    touching = [Form(*_carried(system, shape)) for shape in system.scene.shapes.values() if _solid(shape) is not None]
+    touching = [BodyMesh(*_carried(system, shape)) for shape in system.scene.shapes.values() if _solid(shape) is not None]
     marked = [joint for joint in system.joints if joint.pair.kind not in UNMARKED]
     room = min(length, ROOM * _spacing(marked, length))
     found += _links(system, {GROUND, *given}, {form.body for form in touching}, room)
     if not given:
-        found += [Form(*_joint(system, joint, room)) for joint in marked]
-        found += [Form(GROUND, "joint", _bearing(joint, room)) for joint in marked if _is_bearing(joint)]
+        found += [BodyMesh(*_joint(system, joint, room)) for joint in marked]
+        found += [BodyMesh(GROUND, "joint", _bearing(joint, room)) for joint in marked if _is_bearing(joint)]
     return found + touching
 
 
-def _links(system: System, given: set[str], shaped: set[str], room: float) -> list[Form]:
+def _links(system: System, given: set[str], shaped: set[str], room: float) -> list[BodyMesh]:
     """Generated meshes of the bodies that have none; none for a body that is a point and has a shape of contact."""
     found = []
     for body, points in skeleton(system).items():
         if body not in given:
             points = np.concatenate([points, *_feet(system, body)])
             if len(points) > 1 or body not in shaped:
-                found.append(Form(body, "link", _link(points, room)))
+                found.append(BodyMesh(body, "link", _link(points, room)))
     return found
 
 
@@ -104,7 +105,7 @@ def _link(points: np.ndarray, length: float) -> trimesh.Trimesh:
     if len(points) > 2:
         fan = [[0, k, k + 1] for k in range(1, len(points) - 1)]
         parts.append(trimesh.Trimesh(np.tile(points, (2, 1)), fan + [[len(points) + k for k in f[::-1]] for f in fan]))
-    return trimesh.util.concatenate(parts)
+    return _joined(parts)
 
 
 def _joint(system: System, joint, length: float) -> tuple:
@@ -125,7 +126,7 @@ def _bearing(joint, length: float) -> trimesh.Trimesh:
     R, p = (joint.R_parent, joint.p_parent) if joint.parent < 0 else (joint.R_child, joint.p_child)
     radius, axis = JOINT * length, R[:, 2]
     inner, outer = (HINGE * radius * part * axis for part in (1.0, 1.35))
-    return trimesh.util.concatenate([_rod(p + side * inner, p + side * outer, 1.9 * radius) for side in (-1, 1)])
+    return _joined([_rod(p + side * inner, p + side * outer, 1.9 * radius) for side in (-1, 1)])
 
 
 def _pin(kind: str, at, axis, length: float) -> trimesh.Trimesh:
@@ -146,7 +147,7 @@ def _carried(system: System, shape) -> tuple:
     placed = system.frames[shape.body]
     body = system.structure.bodies[placed.body]
     own = system.frames[body]
-    mesh = _solid(shape, -placed.R.T @ placed.p)
+    mesh = cast(trimesh.Trimesh, _solid(shape, -placed.R.T @ placed.p))  # half-spaces are on the ground
     return body, "contact", mesh.apply_transform(_pose(own.R.T @ placed.R, own.R.T @ (placed.p - own.p)))
 
 
@@ -158,15 +159,15 @@ def _solid(shape, com=(0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
     if isinstance(shape, Sphere):
         return _ball(shape.radius, np.array(shape.at))
     if isinstance(shape, Capsule):
-        ends = shape.corners
-        return trimesh.util.concatenate([_rod(*ends, shape.radius), *(_ball(shape.radius, end) for end in ends)])
+        start, end = shape.corners
+        return _joined([_rod(start, end, shape.radius), _ball(shape.radius, start), _ball(shape.radius, end)])
     if isinstance(shape, Box):
         return trimesh.creation.box(extents=shape.size, transform=_pose(shape.axes, shape.at))
     if isinstance(shape, Points):
         corners = np.vstack([shape.corners, com])
         if np.linalg.matrix_rank(corners - corners[0], tol=FLAT * np.ptp(corners, axis=0).max()) == 3:
             return trimesh.convex.convex_hull(corners)
-        return trimesh.util.concatenate([_ball(shape.radius or DOT, corner) for corner in shape.corners])
+        return _joined([_ball(shape.radius or DOT, corner) for corner in shape.corners])
     return None
 
 
@@ -174,6 +175,10 @@ def _pose(R, p) -> np.ndarray:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = R, p
     return pose
+
+
+def _joined(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    return cast(trimesh.Trimesh, trimesh.util.concatenate(meshes))
 
 
 def _rod(start, end, radius: float) -> trimesh.Trimesh:

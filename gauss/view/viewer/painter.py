@@ -1,6 +1,7 @@
 """Pictures of a motion without a browser: triangles in perspective, the far ones first, with light and shadow."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 from gauss.analysis import reactions
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS, INK
-from gauss.view.viewer.forms import Form, forms, size
+from gauss.view.viewer.forms import BodyMesh, forms, size
 from gauss.view.viewer.framing import FIELD, framing
 from gauss.view.viewer.shown import Shown
 from gauss.view.viewer.stage import BOTTOM, CONTACT, STEEL, TOP, rgb
@@ -27,7 +28,7 @@ ARROW, ARROWS = 0.35, ("#C81E1E", "#EB7814")  # longest arrow, of the size of th
 
 
 @dataclass(frozen=True)
-class Part:
+class PaintedMesh:
     """Triangles (m, 3, 3) in the frame of a body [m], with their colour; body −1 is the ground.
 
     Of a closed surface only what faces the eye is drawn.
@@ -54,7 +55,7 @@ class Painter:
         self.motion, self.view = shown.pictures, framing(shown.pictures)
         self.size = size(self.motion.system)
         self.bodies = self.motion.system.structure.bodies
-        self.parts = [self._part(form) for form in forms(self.motion.system, shown.visuals)]
+        self.parts = [self._painted_mesh(form) for form in forms(self.motion.system, shown.visuals)]
         self.positions, self.rotations = self.motion.poses()
         self.contacts = touches(shown.motion, self.motion, self.size)
         self.reactions = [self._reaction(joint) for joint in shown.joints]
@@ -67,6 +68,7 @@ class Painter:
         """Pixels (height, width, 3) of sample k."""
         placed = [(self._placed(part, k), part) for part in self.parts]
         drawn = [self._lit(triangles, part) for triangles, part in placed]
+        colours: Any
         triangles, colours = (np.concatenate(pieces) for pieces in zip(*drawn, strict=True))
         flat, depth = self._seen(triangles)
         order = np.argsort(-depth.mean(axis=1))
@@ -79,12 +81,12 @@ class Painter:
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
-    def _part(self, form: Form) -> Part:
+    def _painted_mesh(self, form: BodyMesh) -> PaintedMesh:
         mesh = form.mesh if len(form.mesh.faces) <= FINEST else form.mesh.convex_hull
         own = {"joint": STEEL, "contact": CONTACT}.get(form.role)
         body = -1 if form.body == GROUND else self.bodies.index(form.body)
         colour = form.colour or own or rgb(COLOURS[body % len(COLOURS)])
-        return Part(body, np.asarray(mesh.vertices)[np.asarray(mesh.faces)], np.array(colour), mesh.is_watertight)
+        return PaintedMesh(body, np.asarray(mesh.vertices)[np.asarray(mesh.faces)], np.array(colour), mesh.is_watertight)
 
     def _eye(self, aspect: float):
         """Axes of the eye: right, up, towards what is seen."""
@@ -98,13 +100,13 @@ class Painter:
         self.axes.set(xlim=(-high * aspect, high * aspect), ylim=(-high, high))
         self.axes.axis("off")
 
-    def _seen(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _seen(self, points: np.ndarray) -> tuple[Any, np.ndarray]:  # matplotlib takes arrays, but does not say so
         """Points (…, 3) in the picture (…, 2), and how far they are [m]."""
         x, y, far = np.moveaxis((points - self.view.eye) @ self.sight.T, -1, 0)
         far = np.maximum(far, 1e-3 * self.view.reach)
         return np.stack([x / far, y / far], axis=-1), far
 
-    def _placed(self, part: Part, k: int) -> np.ndarray:
+    def _placed(self, part: PaintedMesh, k: int) -> np.ndarray:
         if part.body < 0:
             return part.triangles
         return part.triangles @ self.rotations[k, part.body].T + self.positions[k, part.body]
@@ -112,7 +114,7 @@ class Painter:
     def _room(self) -> np.ndarray:
         return np.stack([self.view.right, self.view.away, self.view.up])
 
-    def _lit(self, triangles: np.ndarray, part: Part) -> tuple[np.ndarray, np.ndarray]:
+    def _lit(self, triangles: np.ndarray, part: PaintedMesh) -> tuple[np.ndarray, np.ndarray]:
         """Triangles that are seen, and their colours."""
         normals = _normals(triangles)
         facing = np.sign((normals * (self.view.eye - triangles.mean(axis=1))).sum(axis=1))
@@ -121,7 +123,7 @@ class Painter:
         brightness = SHADE + (1 - SHADE) * np.clip(towards, 0.0, 1.0)
         return triangles[seen], np.clip(GLOSS * brightness[:, None] * part.colour, 0.0, 1.0)
 
-    def _cast(self, triangles: np.ndarray, part: Part) -> np.ndarray:
+    def _cast(self, triangles: np.ndarray, part: PaintedMesh) -> np.ndarray:
         """Shadows on the floor."""
         view, light = self.view, LIGHT @ self._room()
         if part.closed:

@@ -99,8 +99,9 @@ class Player:
         for title, columns in found.items():
             data = (self.trajectory.t, *np.ascontiguousarray(columns.T))
             gui.add_uplot(data, (uplot.Series(label="t [s]"), *lines), title=title, scales=scales, aspect=1.4)
-        found = energy(self.trajectory)
-        parts = {"kinetic": found.kinetic, "potential": found.potential, "sum": found.kinetic + found.potential}
+        energies = energy(self.trajectory)
+        kinetic, potential = energies.kinetic, energies.potential
+        parts = {"kinetic": kinetic, "potential": potential, "sum": kinetic + potential}
         lines = [uplot.Series(label=name, stroke=COLOURS[k], width=2) for k, name in enumerate(parts)]
         data, axis = (self.trajectory.t, *parts.values()), uplot.Series(label="t [s]")
         gui.add_uplot(data, (axis, *lines), title="energies [J]", scales=scales, aspect=1.4)

@@ -179,7 +179,8 @@ def _path(name: str) -> str:
 
 def rgb(colour: str) -> tuple[float, float, float]:
     """Red, green and blue, from 0 to 1, of a colour such as "#0072B2"."""
-    return tuple(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    red, green, blue = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return red, green, blue
 
 
 def _quaternions(R: np.ndarray) -> np.ndarray:

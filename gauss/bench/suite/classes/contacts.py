@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -35,7 +36,8 @@ def _stops(n: int, form: str) -> SuiteInstance:
     scene, rng = chain([1.0] * n), np.random.default_rng(n)
     angles = rng.uniform(-1.0, 1.0, n)
     for i in range(0, n, 2):
-        scene.stop(f"joint{i}", **{"highest" if i % 4 else "lowest": float(angles[i])})
+        end: dict[str, Any] = {"highest" if i % 4 else "lowest": float(angles[i])}
+        scene.stop(f"joint{i}", **end)
     system = compile_scene(scene)
     effort = 20.0 * rng.standard_normal(n)
     story = f"Chain of {n} rods, every other joint at a stop, under random torques; form {form}."

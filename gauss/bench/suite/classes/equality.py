@@ -10,7 +10,7 @@ from gauss.bench.suite.instance import SuiteInstance
 ROBOTS = {"panda": {}, "ur5": {}, "talos": {"root": "free"}, "solo12": {"root": "free"}, "icub": {"root": "free"}}
 CHAINS = (2, 5, 10, 20, 50, 100)
 TREES = (0, 1, 2, 3, 4, 5)
-LOOPS = {
+LOOPS: dict[str, dict] = {
     "stewart_platform": {},
     "delta_robot": {},
     "spatial_double_pendulum": {},

@@ -31,8 +31,9 @@ def recipes() -> Iterator:
 
 def refuted(instance: SuiteInstance, y=None, z=None, z_box=None) -> SuiteInstance:
     """The instance with a certificate that it has no feasible point; multipliers that are not given are zero."""
-    parts = (y, instance.b.size), (z, instance.h.size), (z_box, instance.n)
-    proof = SuiteReference(zeros(0), *(zeros(size) if part is None else wide(part) for part, size in parts), digits=np.inf)
+    given = lambda part, size: zeros(size) if part is None else wide(part)  # noqa: E731
+    multipliers = given(y, instance.b.size), given(z, instance.h.size), given(z_box, instance.n)
+    proof = SuiteReference(zeros(0), *multipliers, digits=np.inf)
     return with_reference(replace(instance, verdict=INFEASIBLE), proof)
 
 

@@ -5,7 +5,7 @@
 The variables are u₀, x₁, u₁, x₂, … in this order: the equations are banded, as stage-wise solvers want them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -171,8 +171,8 @@ def arm(name: str) -> Plant:
     """Robot arm about a pose, linearised by gauss: torques beside those that hold it."""
     system = gauss.compile_scene(loaded(f"robot:{name}"))
     state = system.state(0.3 * np.ones(system.n_v))
-    holding = inverse_dynamics(system)(state.q, state.v, np.zeros(system.n_v))
-    found = gauss.derivatives(system, state, holding)
+    inverse_torque = inverse_dynamics(system)(state.q, state.v, np.zeros(system.n_v))
+    found = gauss.derivatives(system, state, inverse_torque)
     free = [i for i, c in enumerate(system.coordinates) if "finger" not in c]
     part = np.ix_(free, free)
     K, C, F = found.q[part], found.v[part], found.load[part]
@@ -187,7 +187,7 @@ def arm(name: str) -> Plant:
     return Plant(A, B, Q, np.full(k, 1e-4), *limits, start, states, tuple((f"{j}.torque", "N m") for j in joints), story)
 
 
-PLANTS = {
+PLANTS: dict[str, Callable[[], Plant]] = {
     "cart and pole": cart_and_pole,
     "masses": masses,
     "crane": crane,

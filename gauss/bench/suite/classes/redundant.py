@@ -14,7 +14,7 @@ from gauss.bench.suite.bodies import table
 from gauss.bench.suite.classes.mechanisms import loaded, of_compulsion, started
 from gauss.bench.suite.instance import SuiteInstance, programme
 
-LOOPS = {
+LOOPS: dict[str, dict] = {
     "four_bar": {},
     "parallelogram": {},
     "slider_crank": {},

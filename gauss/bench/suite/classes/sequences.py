@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss.backends.coordinates import Coordinates
 from gauss.bench.scenes import chain
-from gauss.bench.suite.bodies import Heap, pressed
+from gauss.bench.suite.bodies import Heap, make_heap
 from gauss.bench.suite.classes.mpc import PLANTS, horizon
 from gauss.bench.suite.classes.whole_body import control
 from gauss.bench.suite.instance import SuiteInstance, programme
@@ -90,7 +90,7 @@ def _dropped_box() -> Iterator[SuiteInstance]:
     for k in range(2 * STEPS):
         points = place + corners @ R.T
         contacts = [(0, -1, point, (0.0, 0.0, 1.0)) for point in points]
-        heap: Heap = pressed([mass], inertia, [place], contacts)
+        heap: Heap = make_heap([mass], inertia, [place], contacts)
         rows, turning = heap.rows(heap.normal), R @ np.diag(inertia) @ R.T
         M = np.zeros((6, 6))
         M[:3, :3], M[3:, 3:] = (turning + turning.T) / 2, mass * np.eye(3)

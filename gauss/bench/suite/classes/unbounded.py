@@ -23,8 +23,8 @@ def recipes() -> Iterator:
 
 def descending(instance: SuiteInstance, feasible, ray) -> SuiteInstance:
     """The instance with a feasible point, and a ray along which it falls for ever."""
-    sizes = instance.b.size, instance.h.size, instance.n
-    proof = SuiteReference(wide(feasible), *map(zeros, sizes), ray=np.asarray(ray, dtype=float), digits=np.inf)
+    y, z, z_box = (zeros(size) for size in (instance.b.size, instance.h.size, instance.n))
+    proof = SuiteReference(wide(feasible), y, z, z_box, ray=np.asarray(ray, dtype=float), digits=np.inf)
     return with_reference(replace(instance, verdict=UNBOUNDED), proof)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
-from gauss.io.catalog import robot
+from gauss.io.urdf.robots import robot
 
 FEET = {  # frames of the feet, and half the length and width of their soles [m]; zero of a point
     "talos_reduced": (("left_sole_link", "right_sole_link"), (0.10, 0.06)),

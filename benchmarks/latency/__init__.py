@@ -1,0 +1,1 @@
+"""First motion of a scene in a fresh process: cold, warm, steady."""

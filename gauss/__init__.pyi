@@ -1,0 +1,141 @@
+from gauss import (
+    analysis as analysis,
+)
+from gauss import (
+    backends as backends,
+)
+from gauss import (
+    codegen as codegen,
+)
+from gauss import (
+    dynamics as dynamics,
+)
+from gauss import (
+    errors as errors,
+)
+from gauss import (
+    integrators as integrators,
+)
+from gauss import (
+    io as io,
+)
+from gauss import (
+    linkages as linkages,
+)
+from gauss import (
+    math as math,
+)
+from gauss import (
+    rotations as rotations,
+)
+from gauss import (
+    rotors as rotors,
+)
+from gauss import (
+    scene as scene,
+)
+from gauss import (
+    servo as servo,
+)
+from gauss import (
+    simulation as simulation,
+)
+from gauss import (
+    system as system,
+)
+from gauss import (
+    view as view,
+)
+from gauss.analysis import (
+    constraint_forces,
+    contact_forces,
+    drive_forces,
+    energy,
+    friction_forces,
+    inverse_dynamics,
+    reactions,
+    set_valued_forces,
+)
+from gauss.analysis.assembly_modes import assembly_modes
+from gauss.analysis.crosscheck import crosscheck
+from gauss.analysis.derivatives import derivatives
+from gauss.analysis.recommendation import advise
+from gauss.backends import choose, solve
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Solution
+from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes
+from gauss.dynamics.assemble import assemble
+from gauss.dynamics.kinematics import Kinematics
+from gauss.errors import GaussError
+from gauss.integrators import Taylor, generalised_alpha
+from gauss.io import catalog, load, save
+from gauss.io.dataset import load_motion, to_dataset, to_table
+from gauss.io.linkage import load_linkage
+from gauss.io.rotors import load_rotors, save_rotors
+from gauss.linkages import Linkage
+from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
+from gauss.simulation import Trajectory, crossings, rollout, simulate
+from gauss.simulation.sweeps import load_sweep, sweep
+from gauss.system import State, System
+from gauss.view.viewer import show
+
+__version__: str
+
+__all__ = [
+    "Baumgarte",
+    "Body",
+    "Compulsion",
+    "Constraint",
+    "Coupling",
+    "Drive",
+    "Force",
+    "Frame",
+    "GaussError",
+    "Joint",
+    "JointSpring",
+    "Kinematics",
+    "Linkage",
+    "Plan",
+    "Scene",
+    "Solution",
+    "Spring",
+    "Start",
+    "State",
+    "System",
+    "Taylor",
+    "Trajectory",
+    "advise",
+    "assemble",
+    "assembly_modes",
+    "catalog",
+    "choose",
+    "compile_scene",
+    "constraint_forces",
+    "contact_forces",
+    "crosscheck",
+    "crossings",
+    "derivatives",
+    "drive_forces",
+    "energy",
+    "friction_forces",
+    "generalised_alpha",
+    "set_valued_forces",
+    "inverse_dynamics",
+    "load",
+    "load_linkage",
+    "load_motion",
+    "load_rotors",
+    "load_sweep",
+    "mobility",
+    "paradoxes",
+    "reactions",
+    "rollout",
+    "save",
+    "save_rotors",
+    "show",
+    "simulate",
+    "solve",
+    "sweep",
+    "to_dataset",
+    "to_table",
+]

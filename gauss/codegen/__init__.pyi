@@ -1,0 +1,85 @@
+from gauss.codegen.branches import branches
+from gauss.codegen.content_digest import IS_CONTENT, content_digest
+from gauss.codegen.content_key import IdentityKey, content_key
+from gauss.codegen.derivatives import forward, jacobian, reverse
+from gauss.codegen.disk_cache import from_disk
+from gauss.codegen.emit import Writer, straight_line
+from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, entered, graph_of, reachable
+from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
+from gauss.codegen.function import Function, write
+from gauss.codegen.gc_pause import gc_pause
+from gauss.codegen.intrinsics import copy, external, intrinsic
+from gauss.codegen.ir_blocks import BODY, POINTER, constant_array, counted_loop, endless_loop
+from gauss.codegen.kernel import Kernel, trace
+from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
+from gauss.codegen.ldlt import LDLT, least_degree
+from gauss.codegen.native_function import NativeFunction
+from gauss.codegen.optimiser import one_tier
+from gauss.codegen.outlining import fresh_symbols, outlined
+from gauss.codegen.python_wrapper import Interface, PythonWrapper
+from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
+from gauss.codegen.schedule import schedule
+from gauss.codegen.staging import staged
+from gauss.codegen.substitute import substitute
+from gauss.codegen.taylor_series import Series
+from gauss.codegen.terminal_line import compile_notice
+
+__all__ = [
+    "BODY",
+    "DOUBLE",
+    "EntryCode",
+    "Expression",
+    "FLAGS",
+    "Function",
+    "Graph",
+    "HIGHEST_ORDER",
+    "INTEGER",
+    "IS_CONTENT",
+    "IdentityKey",
+    "Interface",
+    "Kernel",
+    "LDLT",
+    "LEAD",
+    "LINE",
+    "Lanes",
+    "NativeFunction",
+    "POINTER",
+    "PythonWrapper",
+    "ROW",
+    "Scalar",
+    "Series",
+    "Writer",
+    "as_number",
+    "branches",
+    "compile_notice",
+    "constant_array",
+    "content_digest",
+    "content_key",
+    "copy",
+    "count",
+    "counted_loop",
+    "endless_loop",
+    "entry_code",
+    "entered",
+    "external",
+    "fastcall",
+    "forward",
+    "fresh_symbols",
+    "from_disk",
+    "gc_pause",
+    "graph_of",
+    "intrinsic",
+    "jacobian",
+    "least_degree",
+    "one_tier",
+    "outlined",
+    "reachable",
+    "reverse",
+    "schedule",
+    "staged",
+    "straight_line",
+    "substitute",
+    "trace",
+    "without_series",
+    "write",
+]

@@ -1,0 +1,304 @@
+"""Digest of an object by content, the same in every process: the key of code on disk.
+
+Numbers, texts, arrays, collections and records of this package enter by value, in an encoding from which they could be read
+back: things of different content have different encodings. Top-level functions and classes of this package, numpy and the
+standard mathematics enter by name, for the key of the cache holds their sources or versions
+(:mod:`gauss.codegen.package_digest`). Another function enters by its code, its defaults, the values that it closes over and
+those of its globals. A traced function enters by its operations. Anything else has no digest, and what depends on it is not
+kept: a digest that misses a number would be the key of the code of another mechanism.
+"""
+
+import builtins
+import dis
+import hashlib
+import struct
+import sys
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache, cached_property, partial
+from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType, NoneType
+from typing import Any
+
+import numpy as np
+
+from gauss.codegen.content_key import PACKAGE, IdentityKey
+from gauss.codegen.expression import Expression
+from gauss.codegen.function import Function
+
+BY_NAME = (PACKAGE, "numpy", "math", "cmath", "operator", "builtins")  # packages whose functions the key of the cache holds
+# built-in functions by which code may depend on more than its constants, globals and arguments
+OPAQUE_BUILTINS = {"__import__", "eval", "exec", "globals", "input", "locals", "open", "vars"}
+IMPORTS = {dis.opmap["IMPORT_NAME"]}
+IS_CONTENT = "is_content"  # metadata of a field of a record: False if results do not depend on it
+CODE_FIELDS: tuple[str, ...] = (
+    "co_code",
+    "co_names",
+    "co_varnames",
+    "co_freevars",
+    "co_cellvars",
+    "co_flags",
+    "co_argcount",
+)
+CODE_FIELDS += ("co_posonlyargcount", "co_kwonlyargcount", "co_exceptiontable")
+
+
+class NoDigestError(TypeError):
+    """An object whose content is unknown."""
+
+
+def content_digest(*things) -> bytes | None:
+    """SHA-256 of the content of objects; None if the content of one is unknown."""
+    encoder = _Encoder()
+    try:
+        encoder.encode(things)
+    except (NoDigestError, RecursionError):
+        return None
+    return hashlib.sha256(b"".join(encoder.parts)).digest()
+
+
+class _Encoder:
+    """Encoding of objects as tagged and delimited parts."""
+
+    def __init__(self):
+        self.parts: list[bytes] = []
+        self.enclosing: dict[int, int] = {}  # address of each object that contains the present one → its depth
+        self.functions: dict[int, int] = {}  # address of each traced function encoded so far → its number
+        self.names: dict[int, bytes] = {}  # address of each named object encoded so far → its name
+
+    def encode(self, thing):
+        """Append the encoding of an object.
+
+        Raises
+        ------
+        NoDigestError
+            If its content is unknown.
+        """
+        kind = type(thing)
+        simple = _SIMPLE.get(kind)
+        if simple is not None:
+            self.parts.append(simple(thing))
+            return
+        depth = self.enclosing.get(id(thing))
+        if depth is not None:
+            self.parts.append(b"itself%d;" % depth)
+            return
+        self.enclosing[id(thing)] = len(self.enclosing)
+        _writer(kind)(self, thing)  # type: ignore[arg-type]  # a type is hashable
+        del self.enclosing[id(thing)]
+
+    def sequence(self, tag: bytes, things):
+        """Append a number of objects."""
+        self.parts.append(b"%s%d(" % (tag, len(things)))
+        for thing in things:
+            self.encode(thing)
+
+
+def _text(text: str) -> bytes:
+    data = text.encode("utf-8", "surrogatepass")
+    return b"s%d:%s" % (len(data), data)
+
+
+_SIMPLE: dict[type, Callable[[Any], bytes]] = {
+    NoneType: lambda _: b"N",
+    bool: lambda thing: b"T" if thing else b"F",
+    int: lambda thing: b"i%d;" % thing,
+    float: lambda thing: b"f" + struct.pack("<d", thing),
+    complex: lambda thing: b"c" + struct.pack("<dd", thing.real, thing.imag),
+    str: _text,
+    bytes: lambda thing: b"b%d:%s" % (len(thing), thing),
+    type(...): lambda _: b"E",
+}
+
+
+@cache
+def _writer(kind: type) -> Callable[[_Encoder, Any], None]:
+    """Encoding of objects of a kind."""
+    for kinds, write, exactly in _WRITERS:
+        if issubclass(kind, kinds):
+            return write if not exactly or kind in kinds else _refused
+    return _record if is_dataclass(kind) and _has_name(kind) else _refused
+
+
+def _refused(_: _Encoder, thing):
+    raise NoDigestError(f"{type(thing).__name__}: unknown content")
+
+
+def _tuple(encoder: _Encoder, thing):
+    if type(thing) is not tuple:
+        _named(encoder, type(thing))
+    if thing and all(type(part) is float for part in thing):
+        encoder.parts.append(b"v%d:" % len(thing) + struct.pack(f"<{len(thing)}d", *thing))
+    else:
+        encoder.sequence(b"t", thing)
+
+
+def _member(encoder: _Encoder, member: Enum):
+    _named(encoder, type(member))
+    encoder.encode(member.name)
+
+
+def _slice(encoder: _Encoder, thing: slice | range):
+    ends = thing.start, thing.stop, thing.step
+    if all(type(end) in (int, NoneType) for end in ends):
+        encoder.parts.append(repr(thing).encode() + b";")
+    else:
+        encoder.sequence(b"S", ends)
+
+
+def _record(encoder: _Encoder, thing):
+    """Append the fields of a record; an attribute beside them must be a property computed from them."""
+    kind = type(thing)
+    beside = getattr(thing, "__dict__", {}).keys() - kind.__dataclass_fields__.keys()
+    if not all(isinstance(getattr(kind, name, None), cached_property) for name in beside):
+        _refused(encoder, thing)
+    _named(encoder, kind)
+    for name in _field_names(kind):  # type: ignore[arg-type]  # a type is hashable
+        encoder.encode(getattr(thing, name))
+
+
+@cache
+def _field_names(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind) if field.metadata.get(IS_CONTENT, True))
+
+
+def _array(encoder: _Encoder, array: np.ndarray):
+    kind = f"a{array.dtype.str}{array.shape}:".encode()
+    if array.dtype.fields is not None:
+        _refused(encoder, array)
+    elif array.dtype.hasobject:
+        encoder.sequence(kind, array.ravel().tolist())
+    else:
+        encoder.parts.append(kind + array.tobytes())
+
+
+def _number(encoder: _Encoder, number: np.generic):
+    encoder.sequence(b"n", (number.dtype.str, number.tobytes()))
+
+
+def _set(encoder: _Encoder, things):
+    found = []
+    for thing in things:
+        own = _Encoder()
+        own.encode(thing)
+        found.append(b"".join(own.parts))
+    encoder.sequence(b"u", sorted(found))
+
+
+def _named(encoder: _Encoder, thing):
+    """Append the name of a top-level object of a package that the key of the cache holds."""
+    name = encoder.names.get(id(thing))
+    if name is None:
+        if not _has_name(thing):
+            _refused(encoder, thing)
+        name = encoder.names[id(thing)] = b"@" + _text(thing.__module__) + _text(thing.__qualname__)
+    encoder.parts.append(name)
+
+
+def _has_name(thing) -> bool:
+    """Whether an object is found under its own name in such a package."""
+    module = getattr(thing, "__module__", None) or ""
+    if module.partition(".")[0] not in BY_NAME:
+        return False
+    found: Any = sys.modules.get(module)
+    for name in getattr(thing, "__qualname__", "<locals>").split("."):
+        found = getattr(found, name, None)
+    return found is thing
+
+
+def _builtin(encoder: _Encoder, thing):
+    owner = getattr(thing, "__self__", None)
+    if isinstance(owner, ModuleType) or owner is None:
+        if thing.__name__ in OPAQUE_BUILTINS:
+            _refused(encoder, thing)
+        _named(encoder, thing)
+    else:
+        encoder.sequence(b"m", (thing.__name__, owner))
+
+
+def _ufunc(encoder: _Encoder, ufunc: np.ufunc):
+    if getattr(np, ufunc.__name__, None) is not ufunc:
+        _refused(encoder, ufunc)
+    encoder.parts.append(b"@" + _text(ufunc.__name__))
+
+
+def _module(encoder: _Encoder, module: ModuleType):
+    if module.__name__.partition(".")[0] not in BY_NAME or module is builtins:
+        _refused(encoder, module)
+    encoder.parts.append(b"M" + _text(module.__name__))
+
+
+def _function(encoder: _Encoder, function: FunctionType):
+    """Append the name of a top-level function of this package, or the code of another and all that it can see."""
+    if id(function) in encoder.names or _has_name(function):
+        _named(encoder, function)
+        return
+    ours = function.__module__.partition(".")[0] == PACKAGE
+    closed = tuple(_content(cell) for cell in function.__closure__ or ())
+    seen = {} if ours else _globals(function)
+    encoder.sequence(b"p", (function.__defaults__, function.__kwdefaults__, vars(function), closed, seen))
+    encoder.encode(function.__code__)
+
+
+def _content(cell) -> tuple:
+    try:
+        return (cell.cell_contents,)
+    except ValueError:  # the name is not bound yet
+        return ()
+
+
+def _code(encoder: _Encoder, code: CodeType):
+    if not IMPORTS.isdisjoint(code.co_code[::2]) or not OPAQUE_BUILTINS.isdisjoint(code.co_names):
+        _refused(encoder, code)
+    encoder.sequence(b"k", [getattr(code, name) for name in CODE_FIELDS])
+    encoder.encode(code.co_consts)
+
+
+def _globals(function: FunctionType) -> dict:
+    """Values of the globals that are named by a function or by one nested in it."""
+    names = sorted(set(_names(function.__code__)) & function.__globals__.keys())
+    return {name: function.__globals__[name] for name in names}
+
+
+def _names(code: CodeType):
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _traced(encoder: _Encoder, function: Function):
+    """Append the operations of a traced function."""
+    if id(function) in encoder.functions:
+        encoder.parts.append(b"g%d;" % encoder.functions[id(function)])
+        return
+    encoder.functions[id(function)] = len(encoder.functions)
+    place = {node: k for k, node in enumerate(function.nodes)}
+    ends = [place.get(x, -1) if isinstance(x, Expression) else float(x) for x in function.outputs]
+    inputs = [place.get(symbol, -1) for symbol in function.inputs]
+    encoder.sequence(b"G", (function.name, function.parameters, inputs, ends, len(place)))
+    for node in place:
+        encoder.sequence(b"x", (node.op, node.value, [place[x] for x in node.operands]))
+
+
+# kinds, their encoding, and whether a subclass is refused, since it may hold more
+_WRITERS: tuple[tuple[tuple[type, ...], Callable[[_Encoder, Any], None], bool], ...] = (
+    ((IdentityKey,), lambda encoder, key: encoder.encode(key.thing), True),
+    ((Function,), _traced, True),
+    ((Enum,), _member, False),
+    ((np.ndarray,), _array, True),
+    ((np.generic,), _number, False),
+    ((tuple,), _tuple, False),
+    ((list,), lambda encoder, thing: encoder.sequence(b"l", thing), True),
+    ((dict,), lambda encoder, thing: encoder.sequence(b"d", [part for item in thing.items() for part in item]), True),
+    ((set, frozenset), _set, True),
+    ((slice, range), _slice, True),
+    ((partial,), lambda encoder, thing: encoder.sequence(b"P", (thing.func, thing.args, thing.keywords)), True),
+    ((MethodType,), lambda encoder, thing: encoder.sequence(b"m", (thing.__func__, thing.__self__)), True),
+    ((CodeType,), _code, True),
+    ((FunctionType,), _function, True),
+    ((BuiltinFunctionType,), _builtin, True),
+    ((np.ufunc,), _ufunc, True),
+    ((ModuleType,), _module, False),
+    ((type,), _named, False),
+)

@@ -1,0 +1,98 @@
+"""Compiled objects on disk by the content that they are made from: a new process loads them without tracing anything.
+
+The key is the digest of that content (:mod:`gauss.codegen.content_digest`), of our sources and of the environment
+(:mod:`gauss.codegen.package_digest`). An entry is a pickle of the Python object around the machine code: names and sizes of
+its functions, tables, facts found while it was traced. In it stand names instead of the machine code, which is kept as
+object code (:mod:`gauss.codegen.machine`), and instead of the objects that the content consists of, which the new process
+has. An entry is read under the seal of :mod:`gauss.codegen.object_cache`, like the machine code itself.
+"""
+
+import hashlib
+import io
+import pickle
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, TypeVar
+
+from gauss.codegen import machine, object_cache
+from gauss.codegen.content_digest import content_digest
+from gauss.codegen.package_digest import package_digest
+
+T = TypeVar("T")
+
+
+def from_disk(content: tuple, make: Callable[[], T]) -> T:
+    """Object made from a content, from the cache on disk if it is there.
+
+    Parameters
+    ----------
+    content : tuple
+        All that the object depends on, first its maker. What has no digest is made anew by every process.
+    make : callable
+        () → the object. Machine code in it is of type :class:`gauss.codegen.machine.MachineCode`.
+    """
+    name = _name(content)
+    if name is None:
+        return make()
+    found = _read(name, content)
+    if found is None:
+        found = make()
+        if _name(content) == name:  # a function may have changed what it closes over meanwhile
+            _write(name, found, content)
+    return found
+
+
+def _name(content: tuple) -> str | None:
+    """Name of an entry in the cache; None if the content has no digest, or nothing is cached."""
+    if object_cache.folder() is None:
+        return None
+    own, package = content_digest(*content), package_digest()
+    return None if own is None or package is None else "made-" + hashlib.sha256(own + package).hexdigest()
+
+
+def _read(name: str, content: tuple):
+    data = object_cache.read(name)
+    if data is None:
+        return None
+    try:
+        return _Unpickler(io.BytesIO(data), content).load()
+    except _NotCachedError:  # the object code was evicted
+        return None
+
+
+def _write(name: str, made, content: tuple):
+    buffer = io.BytesIO()
+    with suppress(pickle.PicklingError, TypeError, AttributeError, RecursionError):  # it holds something of this process
+        _Pickler(buffer, content).dump(made)
+        object_cache.write(name, buffer.getvalue())
+
+
+class _NotCachedError(Exception):
+    """Machine code that is not in the cache."""
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(self, file, content: tuple):
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self.places = {id(thing): k for k, thing in enumerate(content)}
+
+    def persistent_id(self, obj) -> Any:
+        if isinstance(obj, machine.MachineCode):
+            return "code", obj.key
+        place = self.places.get(id(obj))
+        return None if place is None or obj is None else ("content", place)
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, file, content: tuple):
+        super().__init__(file)
+        self.content = content
+
+    def persistent_load(self, pid):
+        kind, which = pid
+        if kind == "content":
+            return self.content[which]
+        code = machine.load_cached(which)
+        if code is None:
+            raise _NotCachedError
+        return code

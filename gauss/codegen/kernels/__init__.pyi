@@ -1,0 +1,68 @@
+from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
+from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, AdaptiveBatchLoop, MotionQueue
+from gauss.codegen.kernels.block_ldlt import BlockLDLT
+from gauss.codegen.kernels.call_recorder import CallRecorder, Operand, RecordedCalls, Slot, Vector
+from gauss.codegen.kernels.call_table import CallTable
+from gauss.codegen.kernels.checked_recursion import CorrectedRecursion, Correction
+from gauss.codegen.kernels.checked_switch import CheckedSwitch
+from gauss.codegen.kernels.column_pivoting import Pivots
+from gauss.codegen.kernels.compiled_loop import Loop
+from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
+from gauss.codegen.kernels.contact_step import ContactForces
+from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record, updated_energy_record
+from gauss.codegen.kernels.explicit import ExplicitTrial, Interpolation, stride
+from gauss.codegen.kernels.first_accepted import FirstAccepted
+from gauss.codegen.kernels.fixed_point import FixedPoint
+from gauss.codegen.kernels.fixed_step import Due, Fixed
+from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
+from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.newton import Newton
+from gauss.codegen.kernels.row_code import RowCode, RowFunction
+from gauss.codegen.kernels.taylor import TaylorStep
+from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
+
+__all__ = [
+    "TRIAL_RESULTS",
+    "RowCode",
+    "RowFunction",
+    "TRIAL_SETTINGS",
+    "Adaptive",
+    "Operand",
+    "BlockLDLT",
+    "CallTable",
+    "CallRecorder",
+    "ContactForces",
+    "Control",
+    "CorrectedRecursion",
+    "Correction",
+    "Due",
+    "ENERGY_RECORD",
+    "TaylorStep",
+    "Fixed",
+    "CheckedSwitch",
+    "Interpolation",
+    "ENERGY_SAMPLE",
+    "Loop",
+    "FixedStepBatchLoop",
+    "RecordedCalls",
+    "Newton",
+    "FirstAccepted",
+    "Pivots",
+    "Slot",
+    "MotionQueue",
+    "MOTION_RECORD",
+    "FixedPoint",
+    "ContactSolver",
+    "CompiledContactSolver",
+    "BatchSpan",
+    "LoopStatus",
+    "LinkStep",
+    "AdaptiveBatchLoop",
+    "TreeRecursion",
+    "ExplicitTrial",
+    "Vector",
+    "WORST_RECORD",
+    "initial_energy_record",
+    "stride",
+    "updated_energy_record",
+]

@@ -1,0 +1,130 @@
+"""LLVM IR → object code of this CPU, and object code → machine code in memory.
+
+Two tiers: quick, by LLVM's FastISel (code-generation level 0, no passes over the IR), and optimised. A module is optimised
+in units of a few functions each, so that no call into LLVM takes long: the time until a background thread stops, and until
+another thread may call LLVM, is that of one unit. Both tiers evaluate the same floating-point operations in the same order,
+fused where the IR says so: their results are equal to the last bit.
+"""
+
+import struct
+from collections.abc import Iterator
+from functools import cache
+from itertools import islice
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from gauss.codegen.module_units import ModuleUnits
+
+OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
+PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
+RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one object for that of another
+UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
+CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
+
+
+@cache
+def target(level: int) -> llvm.TargetMachine:
+    """Code generator of the host CPU for an optimisation level."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features().flatten()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=level, reloc=RELOCATION, codemodel="jitdefault"
+    )
+
+
+@cache
+def width() -> int:
+    """Doubles in one vector register of this CPU: 8, 4 or 2."""
+    features = llvm.get_host_cpu_features()
+    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+
+
+def about(optimise: int) -> str:
+    """Compiler, its settings, and processor: what object code depends on beside its module."""
+    llvm_version = ".".join(map(str, llvm.llvm_version_info))
+    compiler = f"{llvmlite.__version__} {llvm_version} {target(OPTIMISED if optimise else 0).triple} {PASSES} {RELOCATION}"
+    return f"{compiler} O{optimise} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+
+
+def quick_objects(ir_text: str) -> list[bytes]:
+    """Object code of a module, quickly made; functions whose multiply–adds the compiler may choose are optimised."""
+    quick, chosen = (
+        ModuleUnits(ir_text).apart(lambda function: CONTRACTED in function) if CONTRACTED in ir_text else (ir_text, "")
+    )
+    objects = [target(0).emit_object(_parsed(quick))] if quick else []
+    return objects + [_optimised(chosen)] if chosen else objects
+
+
+def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
+    """Object code of a module, unit by unit.
+
+    Parameters
+    ----------
+    ir_text : str
+        The module.
+    optimise : int
+        As of :func:`gauss.codegen.machine.load`, at least 1; modules that are optimised as a whole are one unit.
+    """
+    if optimise == 1:
+        short = len(ir_text) <= UNIT_LENGTH
+        for unit in [ir_text] if short else ModuleUnits(ir_text).short(UNIT_LENGTH):
+            yield _optimised(unit)
+    else:
+        module, builder = _parsed(ir_text), _builder()
+        module.verify()
+        builder.getModulePassManager().run(module, builder)
+        yield target(OPTIMISED).emit_object(module)
+
+
+def _optimised(unit: str) -> bytes:
+    module, (passes, builder) = _parsed(unit), _passes()
+    module.verify()
+    for function in module.functions:
+        if len(list(islice(function.blocks, 2))) > 1:
+            passes.run(function, builder)
+    return target(OPTIMISED).emit_object(module)
+
+
+def _parsed(ir_text: str) -> llvm.ModuleRef:
+    return llvm.parse_assembly(ir_text, context=llvm.create_context())  # which is freed with the module
+
+
+def _builder() -> llvm.PassBuilder:
+    return llvm.create_pass_builder(target(OPTIMISED), llvm.create_pipeline_tuning_options(speed_level=1))
+
+
+@cache
+def _passes() -> tuple[llvm.FunctionPassManager, llvm.PassBuilder]:
+    """Passes over functions, made once: llvmlite never frees them."""
+    builder = _builder()
+    return builder.getFunctionPassManager(), builder
+
+
+def packed(objects: list[bytes]) -> bytes:
+    """Several byte strings as one."""
+    return struct.pack(f"<{1 + len(objects)}Q", len(objects), *map(len, objects)) + b"".join(objects)
+
+
+def unpacked(content: bytes) -> list[bytes]:
+    """Byte strings of :func:`packed`."""
+    (count,) = struct.unpack_from("<Q", content)
+    lengths, at, found = struct.unpack_from(f"<{count}Q", content, 8), 8 * (1 + count), []
+    for length in lengths:
+        found.append(content[at : at + length])
+        at += length
+    return found
+
+
+def linked(objects: list[bytes]) -> llvm.ExecutionEngine:
+    """Machine code in memory, owned by the engine."""
+    target(OPTIMISED)
+    machine = llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
+    )
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    for content in objects:
+        engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+    engine.finalize_object()
+    return engine

@@ -1,0 +1,81 @@
+from gauss.scene import profiles
+from gauss.scene.body import Body, Frame
+from gauss.scene.clutches import Clutch, Freewheel, JointLink
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
+from gauss.scene.contact import Contact, Guard, Slip
+from gauss.scene.contact_distances import FeaturePair
+from gauss.scene.elastic import Elastic, ElasticLink
+from gauss.scene.gears import Gear, Rack
+from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
+from gauss.scene.joint import Coupling, Joint
+from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
+from gauss.scene.losses import IdealCounterpart, JointAtRest, LossyGear
+from gauss.scene.motions import Guided, Prescribed
+from gauss.scene.pairs import PAIRS, Pair
+from gauss.scene.relation import Constraint, Relation
+from gauss.scene.rolling import KnifeEdge, Rolling
+from gauss.scene.scene import GROUND, Scene
+from gauss.scene.set_valued import JointDryFriction, JointFriction, LimitedDrive, SetValued, Slipping
+from gauss.scene.transmissions import Cam, Transmission
+from gauss.scene.unilateral import ClosedGap, OneSidedConstraint, Rope, Stop, Unilateral
+
+__all__ = [
+    "GROUND",
+    "PAIRS",
+    "Angle",
+    "IdealCounterpart",
+    "Body",
+    "Box",
+    "Cam",
+    "ClosedGap",
+    "Clutch",
+    "Capsule",
+    "Coincident",
+    "Collider",
+    "Constraint",
+    "Contact",
+    "Coupling",
+    "Distance",
+    "Drive",
+    "Elastic",
+    "ElasticLink",
+    "Force",
+    "Frame",
+    "Freewheel",
+    "Gear",
+    "SetValued",
+    "Guard",
+    "Guided",
+    "HalfSpace",
+    "Joint",
+    "JointFriction",
+    "JointAtRest",
+    "JointDryFriction",
+    "JointLink",
+    "JointSpring",
+    "KnifeEdge",
+    "LimitedDrive",
+    "LossyGear",
+    "OnCurve",
+    "OnLine",
+    "OnPlane",
+    "OneSidedConstraint",
+    "Pair",
+    "FeaturePair",
+    "Points",
+    "Prescribed",
+    "Rack",
+    "Relation",
+    "Rolling",
+    "Rope",
+    "Scene",
+    "Slip",
+    "Slipping",
+    "Sphere",
+    "Spring",
+    "Start",
+    "Stop",
+    "Transmission",
+    "Unilateral",
+    "profiles",
+]
