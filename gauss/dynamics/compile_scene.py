@@ -1,8 +1,9 @@
 """Compilation of a scene: Scene → System with its dynamics."""
 
+from gauss.arguments import named_arguments
 from gauss.codegen import gc_pause
 from gauss.dynamics.system_dynamics import SystemDynamics
-from gauss.errors import SceneError, named_arguments, require
+from gauss.errors import SceneError, require
 from gauss.scene import Scene
 from gauss.system import System, build
 

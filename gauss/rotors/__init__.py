@@ -4,7 +4,7 @@ A :class:`Network` holds shafts, links and torques; :func:`simulate` integrates 
 coordinates; other functions give one instant, steady operation, vibrations, or the network as part of a scene.
 """
 
-from gauss.errors import named_arguments, named_methods
+from gauss.arguments import named_arguments, named_methods
 from gauss.rotors.elements import Shaft, Torque, law_of
 from gauss.rotors.events import RotorEvent
 from gauss.rotors.explain import explain

@@ -22,7 +22,11 @@ CHOICES = ("auto", *METHODS)
 DEFAULT_ATOL = 1e-9  # rad, and relative to the slow speed of the network
 
 
+@named_arguments
+=======
+@named_arguments
 @one_tier()
+>>>>>>> theirs
 def simulate(
     network: Network,
     duration: float,

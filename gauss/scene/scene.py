@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from gauss.arguments import named_arguments, named_methods
 from gauss.errors import SceneError, did_you_mean
-from gauss.scene import values
+from gauss.scene import builder, contact_builder, values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, Element, name_of
 from gauss.scene.collision import Collider
@@ -382,3 +383,11 @@ class Scene(ConstraintBuilder, ContactBuilder):
         taken = [*self.loads, *self._constraints]
         count = sum(1 for load in taken if load == name or load.startswith(f"{name} "))
         return name if not count else f"{name} {count + 1}"
+
+
+_HERE = (*vars(builder).values(), *vars(contact_builder).values(), *list(globals().values()))
+_KINDS = {kind for kind in _HERE if isinstance(kind, type) and kind.__module__.startswith("gauss.scene.")}
+for _kind in _KINDS:
+    named_arguments(_kind)
+for _builder in (Scene, ConstraintBuilder, ContactBuilder):
+    named_methods(_builder)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
 from gauss.dynamics.laws.switching import Switching
 from gauss.errors import SimulationError
@@ -30,7 +31,11 @@ DEFAULT_ATOL = 1e-10  # of the scale of the scene
 JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the relation, not drift
 
 
+@named_arguments
+=======
+@named_arguments
 @one_tier()
+>>>>>>> theirs
 def simulate(
     servo: Servo,
     duration: float,

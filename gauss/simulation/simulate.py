@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from gauss.arguments import named_arguments
 from gauss.backends import Backend
 from gauss.codegen import gc_pause, one_tier
 from gauss.codegen.tiers import AUTO, Run
@@ -14,7 +15,7 @@ from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Baumgarte
 from gauss.dynamics.store import is_first_use
-from gauss.errors import SimulationError, judged_later, named_arguments, require
+from gauss.errors import SimulationError, judged_later, require
 from gauss.integrators import Integrator
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, described
@@ -134,6 +135,7 @@ def simulate(
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
+        history = History(problem.laws)
         settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
         found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
     watch_balance(found, problem.start)

@@ -6,6 +6,7 @@ from numbers import Integral
 
 import numpy as np
 
+from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
 from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
@@ -16,7 +17,7 @@ from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
-from gauss.errors import SimulationError, did_you_mean, named_arguments, require
+from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep, Integrator
 from gauss.shapes import Shaped
 from gauss.simulation.arguments import sample_times

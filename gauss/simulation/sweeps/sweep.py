@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from gauss.arguments import named_arguments
 from gauss.dynamics import compile_scene
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
-from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, named_arguments, require
+from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
 from gauss.simulation.arguments import check_arguments
