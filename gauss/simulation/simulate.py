@@ -8,6 +8,8 @@ import numpy as np
 from gauss.backends import Backend
 from gauss.codegen import gc_pause, one_tier
 from gauss.codegen.tiers import AUTO, Run
+from gauss.dynamics.conditions import own_backend
+from gauss.dynamics.evaluation_cost import warn_of_slow_route
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
@@ -113,6 +115,8 @@ def simulate(
     SwitchingWarning
         If a law may have switched between two evaluations: fixed steps and methods of libraries do not locate conditions on
         the state, and nothing is known of opaque laws between evaluations.
+    SlowRouteWarning
+        Once for each system, if an element of the scene makes the motion a hundred times slower than machine code.
 
     Raises
     ------
@@ -132,6 +136,8 @@ def simulate(
         found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)
+    if plan is None and not own_backend(problem.question):
+        warn_of_slow_route(problem.system, found.stats.plan, found.stats.evaluations)
     return found
 
 
