@@ -120,6 +120,10 @@ class SwitchingWarning(UserWarning):
     """A law may have switched between two evaluations without effect on the motion."""
 
 
+class SlowRouteWarning(UserWarning):
+    """An element of the scene bars a motion from machine code, which makes it a hundred times slower."""
+
+
 class CacheWarning(UserWarning):
     """The cache of machine code is not used: others can write to it."""
 

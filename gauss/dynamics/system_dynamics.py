@@ -11,6 +11,7 @@ from gauss.backends.compulsion import Compulsion
 from gauss.codegen import count, write
 from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.consistent_states import consistent
+from gauss.dynamics.evaluation_cost import evaluation_cost, slowdown
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import ACCELERATIONS, motion_plan
@@ -33,6 +34,10 @@ class SystemDynamics(Store):
     def plans(self, system: System) -> dict[str, Plan]:
         """Plans of its motions and of its single states, {name: plan}."""
         return {"motions": motion_plan(system), "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
+
+    def cost(self, system: System, plan: Plan) -> tuple[float, float]:
+        """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""
+        return evaluation_cost(system, plan), slowdown(system, plan)
 
     def called(self, system: System) -> dict[str, str]:
         """Loads with opaque laws, and the reasons."""

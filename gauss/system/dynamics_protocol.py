@@ -49,6 +49,9 @@ class Dynamics(Protocol):
     def plans(self, system: "System") -> dict:
         """Plans of its motions and of single states, {what: plan}."""
 
+    def cost(self, system: "System", plan) -> tuple[float, float]:
+        """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""
+
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
 

@@ -17,6 +17,11 @@ def _method(system) -> list[str]:
     lines = []
     for what, plan in system.dynamics.plans(system).items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
+        cost, ratio = system.dynamics.cost(system, plan)
+        if ratio > 1.0:
+            lines.append(
+                f"    about {1e6 * cost:.0f} µs an evaluation (estimated), {ratio:.0f} times the fastest that is barred"
+            )
     lines.append(f"  machine code: {OPTIMISER.status()}")
     costs = system.dynamics.called(system)
     return lines + [

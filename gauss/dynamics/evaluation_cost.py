@@ -1,0 +1,66 @@
+"""Cost of an evaluation of the accelerations along a motion, by a rule: c = c₀ + c₁ n for n bodies.
+
+The constants are measured on one core (``python -m benchmarks.cliffs``) and rounded to a digit; they tell routes apart, and
+do not predict the time of a motion.
+"""
+
+import warnings
+
+from gauss.dynamics.rules import Plan, Rejected
+from gauss.dynamics.store import cached
+from gauss.errors import SlowRouteWarning, user_level
+from gauss.system import System
+
+COSTS = {  # s, and s per body, of an evaluation by a driver and a kind of dynamics
+    ("compiled loop", "compiled"): (1e-6, 3e-7),
+    ("Python loop", "compiled"): (5e-4, 3e-6),
+    ("Python loop", "tree recursion"): (5e-4, 3e-6),
+    ("Python loop", "call graph"): (5e-4, 4e-6),
+    ("certified",): (1e-3, 3.5e-4),
+    ("state", "compiled"): (1e-5, 3e-7),
+}
+CLIFF = 100.0  # ratio of the costs of the route that is taken and of one that is not, above which a motion warns
+LEAST_WASTE = 1.0  # s of estimated cost of a motion below which it does not
+
+
+def evaluation_cost(system: System, plan: Plan | Rejected) -> float:
+    """Estimated cost [s] of an evaluation by a plan; 0 where no rule states it."""
+    key = ("certified",) if plan.dynamics == "certified" else (plan.driver, plan.dynamics)
+    fixed, per_body = COSTS.get(key, (0.0, 0.0))
+    return fixed + per_body * system.structure.n_bodies
+
+
+def slowdown(system: System, plan: Plan) -> float:
+    """Estimated cost of an evaluation over that of the fastest route that was rejected; 1 if that is not faster."""
+    others = [cost for other in plan.rejected if (cost := evaluation_cost(system, other)) > 0.0]
+    return max(1.0, evaluation_cost(system, plan) / min(others)) if others else 1.0
+
+
+def warn_of_slow_route(system: System, plan: Plan, evaluations: int):
+    """Warn once for each system of a route that is :data:`CLIFF` times slower than one that an element bars.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    plan : Plan
+        Plan of the motion.
+    evaluations : int
+        Evaluations of the motion.
+
+    Warns
+    -----
+    SlowRouteWarning
+        With the elements, the estimated costs, and a remedy.
+    """
+    ratio, cost = slowdown(system, plan), evaluation_cost(system, plan)
+    if ratio < CLIFF or cost * evaluations < LEAST_WASTE:
+        return
+    text = f"an evaluation takes about {1e6 * cost:.0f} µs, {ratio:.0f} times as long as in the compiled loop"
+    why = "; ".join(dict.fromkeys(reason for rejected in plan.rejected for reason in rejected.why))
+    remedy = "write laws with gauss.math, so that they are traced" if "law" in why else "system.explain() lists the routes"
+
+    def warn():
+        warnings.warn(f"{system.scene.name!r}: {text}: {why}; {remedy}.", SlowRouteWarning, stacklevel=user_level())
+
+    cached(system, (warn_of_slow_route,), warn)
