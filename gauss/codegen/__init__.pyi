@@ -22,6 +22,7 @@ from gauss.codegen.schedule import schedule
 from gauss.codegen.staging import staged
 from gauss.codegen.substitute import substitute
 from gauss.codegen.taylor_series import Series
+from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
     "BODY",
@@ -50,6 +51,7 @@ __all__ = [
     "Writer",
     "as_number",
     "branches",
+    "compile_notice",
     "constant_array",
     "content_digest",
     "content_key",

@@ -415,8 +415,13 @@ def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
 
 def count(outputs) -> dict[str, int]:
     """Number of operations of each kind in the outputs, those in called functions included."""
+    return tally(reachable(np.ravel(outputs)))
+
+
+def tally(nodes) -> dict[str, int]:
+    """Number of operations of each kind among nodes, those in called functions included."""
     counts: dict[str, int] = {}
-    for node in reachable(np.ravel(outputs)):
+    for node in nodes:
         if node.op == "call":
             for op, number in node.value.operations().items():
                 counts[op] = counts.get(op, 0) + number

@@ -4,10 +4,11 @@
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, count, graph_of, reachable
+from gauss.codegen.expression import Expression, Graph, graph_of, reachable, tally
 from gauss.errors import judged_later
 
 
@@ -37,14 +38,14 @@ class Function:
         """Numbers of inputs and of outputs."""
         return len(self.inputs), len(self.outputs)
 
-    @property
+    @cached_property
     def nodes(self) -> list[Expression]:
         """All nodes on which the outputs depend, operands first."""
         return reachable(self.outputs)
 
     def operations(self) -> dict[str, int]:
         """Number of operations of each kind, those of called functions included."""
-        return count(self.outputs)
+        return tally(self.nodes)
 
     def text(self) -> str:
         """Listing of all operations: functions of equal text compute the same."""

@@ -27,18 +27,22 @@ class EarlyGraph(Graph):
     def entered(self, value: Expression, graph: Graph) -> Expression:
         """Expression of this graph in a later one: a result where it is evaluated here, else evaluated again from these."""
         assert isinstance(graph, LaterGraph)
-        known = graph._entered
+        known = graph.from_early  # by index: a law that is traced along its branches may not be a key
+        if value.index not in known and not self._is_rebuilt(value, known):
+            known[value.index] = graph.early_result(value)
+        if value.index in known:
+            return known[value.index]
         for node in reachable([value], lambda node: node.operands if self._is_rebuilt(node, known) else ()):
             if self._is_rebuilt(node, known):
-                known[node] = graph.copy(node, [known[operand] for operand in node.operands])
-            elif node not in known:
-                known[node] = graph.early_result(node)
-        return known[value]
+                known[node.index] = graph.copy(node, [known[operand.index] for operand in node.operands])
+            elif node.index not in known:
+                known[node.index] = graph.early_result(node)
+        return known[value.index]
 
-    def _is_rebuilt(self, node: Expression, known) -> bool:
+    def _is_rebuilt(self, node: Expression, known: dict[int, Expression]) -> bool:
         """Whether a later function evaluates a node itself; it sees constants and signs, which fold there."""
         early = self.evaluated is None or node.index in self.evaluated
-        return node not in known and (node.is_constant or node.op == "neg" or not early)
+        return node.index not in known and (node.is_constant or node.op == "neg" or not early)
 
     def evaluation(self, op: str, operands: list[Expression]) -> Expression | None:
         """Node of an operation on nodes of this graph, if it may be evaluated here."""
@@ -57,6 +61,7 @@ class LaterGraph(Graph):
         super().__init__(early)
         self._first = early
         self._origins: dict[int, Expression] = {}  # node of the early graph by the index of the result
+        self.from_early: dict[int, Expression] = {}  # node of this graph by the index of that of the early graph
 
     def early_result(self, node: Expression) -> Expression:
         """Result of the early function as an input."""

@@ -36,7 +36,7 @@ class SharedElimination:
     def __init__(self, program: "Program", added: int = 0):
         self.program, self.system = program, program.system
         n, m, n_q = self.system.n_v, program.shares.size, self.system.n_q
-        self.slack = [[one.joints[index].pair.n_v for index in one.closing] for one in self.system.parts]
+        self.slack = [[one.joints[index].pair.n_v for index in one.loop_joints] for one in self.system.subsystems]
         gaps = m + sum(map(sum, self.slack))
         later: dict[str, tuple[Callable, tuple[int, ...]]] = {
             "motion": (self._motion, (n, added)),

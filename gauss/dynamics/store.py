@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
-from gauss.codegen import from_disk, gc_pause
+from gauss.codegen import compile_notice, from_disk, gc_pause
 from gauss.system import System
 
 T = TypeVar("T")
@@ -35,7 +35,7 @@ class Store:
                 being_made = self._being_made.setdefault(key, RLock())
             with being_made:  # a lock for each key: making one entry may request others
                 if key not in self._made:
-                    with gc_pause():
+                    with gc_pause(), compile_notice():
                         self._made[key] = make()
                     self._being_made.pop(key, None)
         return self._made[key]

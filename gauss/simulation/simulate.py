@@ -94,7 +94,7 @@ def simulate(
     verify : bool
         Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool
-        Show a progress bar on runs of more than a second, in a terminal.
+        In a terminal, show a progress bar on runs of more than a second, and a line while code is made for as long.
     plan : Plan, optional
         Driver and dynamics to be used, if their conditions hold, instead of the first row of
         :data:`gauss.dynamics.plan.MOTIONS` whose conditions hold; ``stats.plan`` tells which it was. Its ``tier`` chooses
@@ -124,7 +124,7 @@ def simulate(
     """
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
-    with gc_pause(), one_tier(AUTO if plan is None else plan.tier) as run:
+    with gc_pause(), one_tier(AUTO if plan is None else plan.tier, progress) as run:
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )

@@ -47,6 +47,7 @@ def test_forward_dynamics_undone(scene):
     assert found.forces == pytest.approx([7.0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_prescribed_motion_takes_the_same_force():
     scene = mechanisms.four_bar()
     scene.starts.clear()

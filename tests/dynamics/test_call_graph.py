@@ -118,6 +118,7 @@ def test_they_are_those_of_the_code_that_is_written_out(name):
     assert np.abs(found - whole).max() <= AGREED * np.abs(whole).max()
 
 
+@pytest.mark.slow
 def test_wrong_accelerations_are_noticed(case):
     system, state, kernels = case
     effort = gauss.assemble(system, state).P
@@ -135,6 +136,7 @@ def test_wrong_accelerations_are_noticed(case):
         assert error(wrong) >= 1e-8
 
 
+@pytest.mark.slow
 def test_states_are_brought_back_to_the_constraints(case):
     """The gap closes, the motion that a state had already stays, and a state that meets them does not move."""
     system, state, kernels = case

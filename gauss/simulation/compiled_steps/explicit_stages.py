@@ -72,7 +72,7 @@ class ExplicitStages:
     def projection(self) -> RowFunction | None:
         """Function of a point → (projected point, position residual); None where nothing is projected."""
         size = self.layout.size
-        return RowFunction("settle", size, size + 1, self._project) if self.program.projects else None
+        return RowFunction("project", size, size + 1, self._project) if self.program.projects else None
 
     def first(self, check: Function) -> RowFunction:
         """Function (t, q, v, rtol, atol, atol_rates, parameters) → (point, its check, first step)."""
