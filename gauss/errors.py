@@ -4,16 +4,9 @@ import os
 import sys
 from collections.abc import Iterable
 from contextlib import contextmanager
-from functools import cache, wraps
-from inspect import Parameter, signature
-from pickle import PicklingError
-from types import FunctionType
-from typing import TYPE_CHECKING, Any, TypeVar
-=======
 from functools import cache
 from pickle import PicklingError
 from typing import TYPE_CHECKING
->>>>>>> theirs
 
 if TYPE_CHECKING:
     import numpy as np

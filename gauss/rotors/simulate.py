@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 
+from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
 from gauss.errors import SimulationError, did_you_mean
 from gauss.rotors.contract import reduce
@@ -23,10 +24,7 @@ DEFAULT_ATOL = 1e-9  # rad, and relative to the slow speed of the network
 
 
 @named_arguments
-=======
-@named_arguments
 @one_tier()
->>>>>>> theirs
 def simulate(
     network: Network,
     duration: float,

@@ -32,10 +32,7 @@ JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the r
 
 
 @named_arguments
-=======
-@named_arguments
 @one_tier()
->>>>>>> theirs
 def simulate(
     servo: Servo,
     duration: float,
