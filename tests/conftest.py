@@ -3,6 +3,7 @@
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # pytest-xdist already uses every core
+os.environ.setdefault("GAUSS_TIER", "quick")  # the tiers give the same digits (codegen/test_tiers.py)
 
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402

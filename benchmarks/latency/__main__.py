@@ -6,7 +6,10 @@ Run it with:
 
 An answer is a motion of 0.2 s at rtol 1e-9, for every shipped scene, families of scenes and 20 robots, or the first call of
 a function of a humanoid with two loops. CPU time of the main thread; imports, and reading of the scene from its file, are
-stated apart. Beside it, as scale: fresh processes of Python, of numpy, and of Pinocchio that reads the Panda and calls
+stated apart. The first process compiles quickly, a second one, which is not timed, fills the cache with optimised code, and
+the third is the warm one.
+
+Beside it, as scale: fresh processes of Python, of numpy, and of Pinocchio that reads the Panda and calls
 ``pin.aba`` once. The least of the rounds is quoted: whatever else the machine does only adds to it. Writes
 benchmarks/results/latency.csv, .md and .png.
 """
@@ -48,9 +51,10 @@ def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
     for number in range(rounds):
         for scene, answer in tasks:
             with tempfile.TemporaryDirectory() as folder:
-                for cache in ("cold", "warm"):
+                for cache, tier in (("cold", "auto"), ("", "optimised"), ("warm", "auto")):
+                    found = _first_answer(scene, answer, folder, tier)
                     line = {"scene": scene, "answer": answer, "cache": cache, "round": number}
-                    rows.append(line | _first_answer(scene, answer, folder))
+                    rows += [line | found] if cache else []
         rows += [
             {"scene": name, "answer": "process", "cache": "", "round": number, "first": _process(script)}
             for name, script in ({} if only else SCALE).items()
@@ -59,9 +63,10 @@ def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
     return rows, [*conditions, f"vectors of {width()} doubles"]
 
 
-def _first_answer(scene: str, answer: str, folder: str) -> dict:
+def _first_answer(scene: str, answer: str, folder: str, tier: str) -> dict:
     """What a fresh process measures; only the reason where it fails."""
-    environment = os.environ | {"GAUSS_CACHE": folder, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
+    own = {"GAUSS_CACHE": folder, "GAUSS_TIER": tier, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | own
     command_line = [sys.executable, "-m", "benchmarks.latency.child", scene, answer]
     try:
         done = subprocess.run(

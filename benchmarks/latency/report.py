@@ -36,7 +36,7 @@ def page(rows: list[dict], conditions: list[str]) -> list[str]:
     scale = [[name, _s(row["first"])] for (name, answer, _), row in best.items() if answer == "process"]
     text = [
         "CPU time of the main thread of a fresh process from a scene to its answer: cold with an empty cache of machine",
-        "code, warm with what that process left; later is the second call in the same process. The parts are those of cold;",
+        "code, warm with optimised code in it; later is another call in the warm process. The parts are those of cold;",
         f"imports and reading of the scene are in neither. Warm goal: {WARM_LIMIT} s everywhere. The least of the rounds.",
     ]
     scales = ["", "CPU time of whole processes:", "", *table(["process", "whole"], scale)] if scale else []
@@ -67,7 +67,7 @@ def chart(folder: Path):
         axes.barh(names, widths, left=left, label=f"cold: {part}", height=0.7)
         left = [a + b for a, b in zip(left, widths, strict=True)]
     axes.plot([best[name, "motion", "warm"]["first"] for name in names], names, "k|", markersize=8, label="warm")
-    axes.plot([best[name, "motion", "cold"]["later"] for name in names], names, "k.", markersize=3, label="later")
+    axes.plot([best[name, "motion", "warm"]["later"] for name in names], names, "k.", markersize=3, label="later")
     axes.set(xscale="symlog", xlabel="CPU time to the first motion of 0.2 s [s]", xlim=(0.0, None))
     axes.set_xscale("symlog", linthresh=0.1)
     axes.tick_params(axis="y", labelsize=6)
@@ -82,7 +82,7 @@ def _cells(scene: str, answer: str, best: dict) -> list[str]:
         return [scene, answer, "", str(cold["failed"]), *[""] * (len(SHARES) + 5)]
     limit = COLD_LIMITS.get(scene, "") if answer == "motion" else 1.0
     parts = [_s(cold[part]) for part in SHARES]
-    times = [_s(warm["first"]), f"{1e3 * cold['later']:.2g} ms", _s(warm["import"]), _s(warm["read"])]
+    times = [_s(warm["first"]), f"{1e3 * warm['later']:.2g} ms", _s(warm["import"]), _s(warm["read"])]
     return [scene, answer, f"{cold['rates']:.0f}", _s(cold["first"]), f"{limit} s" if limit else "", *parts, *times]
 
 
