@@ -36,7 +36,8 @@ def _named(function: Any, name: str) -> Any:
 
     @wraps(function)
     def call(*arguments, **named):
-        for unknown in named.keys() - known:
+        if not known.issuperset(named):
+            unknown = next(key for key in named if key not in known)
             raise ArgumentError(f"{name}: no argument {unknown!r}. {did_you_mean(unknown, known - {'self'})}")
         return function(*arguments, **named)
 

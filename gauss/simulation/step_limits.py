@@ -1,6 +1,6 @@
 """Limits of the step and of its progress in Python and compiled loops, and the messages where they are reached."""
 
-import numpy as np
+from math import ulp
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it rounding of time dominates
 LEAST_RESTART_STEP = 1e-6  # relative to the duration: least first step after a switching time; error control reduces it
@@ -13,7 +13,7 @@ EVALUATIONS_PER_CHECK = 48  # a check costs as much as two and a half evaluation
 
 def smallest_step(duration: float, end: float) -> float:
     """Smallest step of a motion [s]: large enough to change the time."""
-    return max(SMALLEST_STEP * duration, float(np.spacing(max(abs(end - duration), abs(end)))))
+    return max(SMALLEST_STEP * duration, ulp(max(abs(end - duration), abs(end))))
 
 
 def too_small(t: float, rtol: float, laws: tuple[str, ...]) -> str:

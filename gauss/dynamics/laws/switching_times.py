@@ -85,6 +85,8 @@ class Timetable:
 
     def last_end(self, begin: float, end: float) -> float:
         """End of the last step up to ``end``: just before it where a switching time falls upon it."""
+        if not self.switches.size:
+            return end
         before = end - APART * max(abs(begin), abs(end))
         return before if ((self.switches >= before) & (self.switches <= end)).any() else end
 
