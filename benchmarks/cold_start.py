@@ -52,7 +52,7 @@ LIMITS = {"without cache": 0.7, "with cache": 0.45}  # what a first result may t
 
 def run(script: str, folder: str) -> tuple[float, list[float]]:
     """Wall time of a fresh process [s], and what it printed."""
-    environment = os.environ | {"GAUSS_CACHE": folder, "PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"GAUSS_CACHE": folder, "GAUSS_TIER": "auto", "PYTHONPATH": str(ROOT)}
     begin = time.perf_counter()
     done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
     return time.perf_counter() - begin, json.loads(done.stdout or "[]")

@@ -2,16 +2,21 @@
 
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, wraps
+from inspect import Parameter, signature
 from pickle import PicklingError
-from typing import TYPE_CHECKING
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     import numpy as np
 
 PACKAGE = os.path.dirname(os.path.abspath(__file__)) + os.sep
+
+
+T = TypeVar("T", bound=Callable)
 
 
 class GaussError(Exception):
@@ -202,3 +207,35 @@ def require(value, kinds: tuple[type, ...], function: str):
     sources = "; ".join(f"{name}: {SOURCES[name]}" for name in names if name in SOURCES)
     given = f"{value!r} (str)" if isinstance(value, str) else f"a {type(value).__name__}"
     raise ArgumentError(f"{function}: expected a {' or '.join(names)}, got {given}.{f' {sources}.' if sources else ''}")
+
+
+def named_arguments(target: T) -> T:
+    """Function, or class by its ``__init__``, that refuses unknown keywords with an ArgumentError that names the nearest."""
+    if not isinstance(target, type):
+        return _named(target, target.__name__)
+    if "__init__" in vars(target):
+        target.__init__ = _named(target.__init__, target.__name__)  # type: ignore[misc]  # the same signature
+    return target
+
+
+def named_methods(target: type):
+    """Refuse unknown keywords in the public methods of a class, as by :func:`named_arguments`."""
+    for name, method in list(vars(target).items()):
+        if isinstance(method, FunctionType) and not name.startswith("_"):
+            setattr(target, name, _named(method, name))
+
+
+def _named(function: Any, name: str) -> Any:
+    """Function that refuses unknown keywords; it stays as it is if it takes any."""
+    kinds = {key: parameter.kind for key, parameter in signature(function).parameters.items()}
+    if Parameter.VAR_KEYWORD in kinds.values():
+        return function
+    known = {key for key, kind in kinds.items() if kind in (Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY)}
+
+    @wraps(function)
+    def call(*arguments, **named):
+        for unknown in named.keys() - known:
+            raise ArgumentError(f"{name}: no argument {unknown!r}. {did_you_mean(unknown, known - {'self'})}")
+        return function(*arguments, **named)
+
+    return call

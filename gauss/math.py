@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gauss.codegen import Expression
+from gauss.codegen import Expression, graph_of
 from gauss.errors import SceneError
 
 pi = np.pi
@@ -238,15 +238,18 @@ def _traced(*values) -> bool:
 
 def _binary(op: str, plain):
     def apply(x, y):
-        traced = next((value for value in (x, y) if isinstance(value, Expression)), None)
-        return plain(x, y) if traced is None else traced.graph.binary(op, traced.graph.lift(x), traced.graph.lift(y))
+        if not isinstance(x, Expression) and not isinstance(y, Expression):
+            return plain(x, y)
+        graph = graph_of((x, y))
+        return graph.binary(op, graph.lift(x), graph.lift(y))
 
     return np.frompyfunc(apply, 2, 1)
 
 
 def _select(condition, x, y):
-    traced = next((value for value in (condition, x, y) if isinstance(value, Expression)), None)
-    return (x if condition else y) if traced is None else traced.graph.select(condition, x, y)
+    if not any(isinstance(value, Expression) for value in (condition, x, y)):
+        return x if condition else y
+    return graph_of((condition, x, y)).select(condition, x, y)
 
 
 _minimum, _maximum = _binary("min", min), _binary("max", max)

@@ -86,6 +86,7 @@ def test_every_public_name_has_a_summary():
         assert (thing.__doc__ or "").strip(), name
 
 
+@pytest.mark.slow
 def test_the_reference_is_made_without_a_warning(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)

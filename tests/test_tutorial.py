@@ -36,6 +36,7 @@ def test_every_cell_runs_and_figures_are_drawn(executed):
     assert "agreement in 5 random states" in text and "redundant rows" in text
 
 
+@pytest.mark.slow
 def test_it_has_a_section_for_each_part_of_the_library(executed):
     headings = [cell.source.splitlines()[0] for cell in executed.cells if cell.cell_type == "markdown"]
     assert [heading.removeprefix("## ") for heading in headings if heading.startswith("## ")] == list(SECTIONS)

@@ -58,7 +58,6 @@ def main(name: str, answer: str) -> dict:
     from benchmarks.latency.scenes import scenes
     from gauss.codegen import emit, function, machine
 
-    optimised = machine.optimised_objects
     compile_scene, ask = gauss.compile_scene, partial(ANSWERS[answer], gauss)
     write = function.write
     traced = watch.part("trace", write)
@@ -66,8 +65,8 @@ def main(name: str, answer: str) -> dict:
         if getattr(module, "write", None) is write:
             module.write = traced
     emit.Writer.body = watch.part("write", emit.Writer.body)
-    machine.quick_object = watch.part("LLVM", machine.quick_object)
-    machine.optimised_objects = watch.part("LLVM", lambda *given: list(optimised(*given)))
+    for compiler in ("quick_objects", "optimised_objects"):
+        setattr(machine, compiler, watch.part("LLVM", _at_once(getattr(machine, compiler))))
     machine.linked = watch.part("link", machine.linked)
     scene = watch.part("read", scenes()[name])()
     watch.lap()
@@ -83,6 +82,10 @@ def main(name: str, answer: str) -> dict:
     return {"first": first, **watch.spent, "whole process": whole, "later": later, "rates": system.n_v, "result": result}
 
 
+def _at_once(generate):
+    return lambda *given: list(generate(*given))
+
+
 def _again(ask, system, state) -> float:
     begin = CLOCK()
     ask(system, state)
@@ -90,7 +93,7 @@ def _again(ask, system, state) -> float:
 
 
 def _motion(gauss, system, state) -> np.ndarray:
-    return gauss.simulate(system, DURATION, rtol=RTOL, state=state, progress=False).q[-1]
+    return gauss.simulate(system, DURATION, rtol=RTOL, progress=False).q[-1]
 
 
 def _accelerations(gauss, system, state) -> np.ndarray:

@@ -6,7 +6,10 @@ ABSOLUTE = {
     "cvxopt": ("feastol", "abstol"),
     "daqp": ("primal_tol", "dual_tol"),
     "ecos": ("feastol", "abstol"),
+    "gurobi": ("FeasibilityTol", "OptimalityTol"),
     "highs": ("primal_feasibility_tolerance", "dual_feasibility_tolerance"),
+    "jaxopt_osqp": ("tol",),
+    "kvxopt": ("feastol", "abstol"),
     "osqp": ("eps_abs",),
     "piqp": ("eps_abs", "eps_duality_gap_abs"),
     "proxqp": ("eps_abs", "eps_duality_gap_abs"),
@@ -18,13 +21,14 @@ RELATIVE = {
     "clarabel": ("tol_gap_rel",),
     "cvxopt": ("reltol",),
     "ecos": ("reltol",),
+    "kvxopt": ("reltol",),
     "osqp": ("eps_rel",),
     "piqp": ("eps_rel", "eps_duality_gap_rel"),
     "proxqp": ("eps_rel", "eps_duality_gap_rel"),
     "qpalm": ("eps_rel",),
     "scs": ("eps_rel",),
 }
-SMALLEST_TOLERANCE = {"highs": 1e-10}  # absolute; smaller ones are refused
+SMALLEST_TOLERANCE = {"gurobi": 1e-9, "highs": 1e-10}  # absolute; smaller ones are refused
 # Without its duality gap, ProxQP ends while small unknowns are still off by many times the tolerance.
 CHECKS = {"piqp": {"check_duality_gap": True}, "proxqp": {"check_duality_gap": True}}
 DEFAULT_TOLERANCE = 1e-9  # absolute and relative

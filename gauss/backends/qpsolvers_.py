@@ -9,6 +9,8 @@ import qpsolvers
 from gauss.backends.programme import Outcome, Programme
 from gauss.errors import BackendError, did_you_mean
 
+ON_JAX = ("jaxopt_osqp", "qpax")
+
 
 class QPSolvers:
     """Adaptor to one solver of qpsolvers.
@@ -57,7 +59,7 @@ def converted(programme: Programme, solver: str) -> qpsolvers.Problem:
 @contextmanager
 def surroundings(solver: str):
     """Warnings silenced, and doubles for solvers on JAX; afterwards all is as the user had it."""
-    with warnings.catch_warnings(), _doubles() if solver == "qpax" else nullcontext():
+    with warnings.catch_warnings(), _doubles() if solver in ON_JAX else nullcontext():
         warnings.simplefilter("ignore")
         yield
 
@@ -74,7 +76,8 @@ def outcome(solution: qpsolvers.Solution, solver: str) -> Outcome:
     if solution.x is None:
         return Outcome(None, None, None, False, f"{solver}: found no solution")
     message = f"{solver}: {'solved' if solution.found else 'claims no solution'}"
-    x, y, z = (None if part is None else np.asarray(part, dtype=float) for part in (solution.x, solution.y, solution.z))
+    parts = (solution.x, solution.y, solution.z)  # jaxopt's multipliers of rows that are not there have no axis
+    x, y, z = (None if part is None or np.ndim(part) != 1 else np.asarray(part, dtype=float) for part in parts)
     return Outcome(x, y, z, bool(solution.found), message)
 
 

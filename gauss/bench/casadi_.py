@@ -73,10 +73,18 @@ def _stagewise(programme: Programme, settings: dict):
     np.maximum.at(lower, where[sign < 0.0], bounds[sign < 0.0])
     np.minimum.at(upper, where[sign > 0.0], bounds[sign > 0.0])
     H, rows = casadi.DM(programme.H), casadi.DM(-programme.C)
-    given = {"h": H, "g": programme.c, "a": rows, "lba": -programme.d, "uba": -programme.d, "lbx": lower, "ubx": upper}
+    given: dict[str, Any] = {
+        "h": H,
+        "g": programme.c,
+        "a": rows,
+        "lba": -programme.d,
+        "uba": -programme.d,
+        "lbx": lower,
+        "ubx": upper,
+    }
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
     stages = {"N": steps, "nx": [0] + [n_x] * steps, "nu": [n_u] * steps + [0], "ng": [0] * (steps + 1)}
-    options = {"inf": FREE, "error_on_fail": False, "record_time": True, "hpipm": settings} | stages
+    options: dict[str, Any] = {"inf": FREE, "error_on_fail": False, "record_time": True, "hpipm": settings} | stages
 
     def call():
         made = casadi.conic("solver", "hpipm", pattern, options)

@@ -23,7 +23,8 @@ that gives none is off by 1. Errors are medians over all problems.
 
 Times are calls from Python on a ready problem, set-up included: shifted geometric means over all problems, a problem
 that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least, for the machine may be
-shared. Bounds are given as rows. How solvers are set is said in [the comparison](qp.md)."""
+shared. Library: the share of a call that the library reports as its own set-up and solve. Bounds are given as rows. How
+solvers are set is said in [the comparison](qp.md)."""
 
 WARM = """Warm starts begin at the solution of the step before, where qpsolvers hands it on, which is x alone; set-up is made
 anew, so that what they spare is iterations. Medians over the steps that have one."""
@@ -41,7 +42,8 @@ dissipate; multipliers are the velocities. newton is gauss's own solver of time 
 of its own; the others are short references in Python, whose times are those of Python. MuJoCo's solvers take models, not
 such problems, and soften contacts.""",
     "mpc": """HPIPM gets stages, and bounds as such; those that are infinite are 1e6, for residuals round where they are
-larger. Fatrop's interface in CasADi fails on these problems.""",
+larger. CasADi analyses the structure of the problem anew in every call, which its library does not count: that is
+HPIPM's solve alone. Fatrop's interface in CasADi fails on these problems.""",
 }
 
 
@@ -71,13 +73,14 @@ def _board(mine: dict[str, list[dict]], solvable: bool) -> list[str]:
     warm = any(np.isfinite(row.get("warm", np.nan)) for found in mine.values() for row in found)
     titles = ["", "solver", "right", "false verdicts", "claimed, beyond"]
     titles += ["kept", "error", "error of multipliers"] if solvable else ["no verdict"]
-    titles += ["crashed, timed out", "time"] + (["warm / cold start"] if warm else [])
+    titles += ["crashed, timed out", "time", "library"] + (["warm / cold start"] if warm else [])
     least = min(map(mean_time, mine.values()), default=np.nan)
     body = []
     for rank, (name, found) in enumerate(mine.items(), start=1):
         texts = [rank, name, f"{sum(map(is_right, found))}/{len(found)}", sum(map(is_false, found))]
         texts += [sum(map(is_broken, found)), *(_accuracy(found) if solvable else [sum(not stated(row) for row in found)])]
         texts += [sum(row["outcome"] in ("crashed", "timed out") for row in found), _factor(mean_time(found) / least)]
+        texts += [_in_library(found)]
         body.append(texts + ([_warm(found)] if warm else []))
     return ["## Leaderboard", "", *table(titles, body), *(["", WARM] if warm else []), ""]
 
@@ -87,6 +90,13 @@ def _accuracy(found: list[dict]) -> list[str]:
     kept = share(sum(map(is_kept, found)) / len(found)) if found[0]["level"] != OWN else ""
     errors = [dual_error(row) if in_time(row) else np.nan for row in found]
     return [kept, number(middle(list(map(error_of, found)))), number(middle(errors))]
+
+
+def _in_library(found: list[dict]) -> str:
+    """Median share of the times of right answers that the library itself reports: of set-up and solve, or of solve alone."""
+    times = [(row["seconds"], row["library"], row.get("solve", np.nan)) for row in found if is_right(row)]
+    shares = [(whole if np.isfinite(whole) else solve) / call for call, whole, solve in times]
+    return f"{np.median(shares):.0%}" if np.isfinite(shares).any() else "–"
 
 
 def _factor(value: float) -> str:

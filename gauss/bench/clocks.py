@@ -52,8 +52,8 @@ def median_times(times: list[Times]) -> dict:
 
 # Solvers whose libraries report no time of their own; that around the call of the library, as qpsolvers takes it, stands
 # for it.
-AROUND = ("cvxopt", "highs", "qpax", "quadprog")
-COMPILING = ("qpax",)  # solvers that compile for every size of problem in their first call
+AROUND = ("cvxopt", "gurobi", "highs", "jaxopt_osqp", "kvxopt", "qpax", "quadprog")
+COMPILING = ("jaxopt_osqp", "qpax")  # solvers that compile for every size of problem in their first call
 UNITS = {"proxqp": 1e-6, "scs": 1e-3}  # of the times that are reported, where these are not seconds
 
 

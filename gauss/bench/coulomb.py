@@ -143,6 +143,8 @@ def _staggered(p: StructuredProgramme, *, tolerance: float, iterations: int, sec
         for count in range(1, iterations + 1):
             call, read, _ = conic.ready("clarabel", replace(convex, c=p.c + sliding), inner)
             r = read(call()).x
+            if r is None:
+                return Outcome(None, None, None, False, "staggered: no forces", count)
             if _residual(p, r) <= tolerance:
                 return Outcome(r, None, None, True, "staggered: solved", count)
             if time.perf_counter() > end:
@@ -159,4 +161,9 @@ def _residual(p: StructuredProgramme, r: np.ndarray) -> float:
     return max(p.residuals(r, *p.multipliers(r, nothing, nothing)))
 
 
-SOLVERS = {"newton": _newton, "gauss_seidel": _gauss_seidel, "admm": _admm, "staggered": _staggered}
+SOLVERS: dict[str, Callable[..., Solve]] = {
+    "newton": _newton,
+    "gauss_seidel": _gauss_seidel,
+    "admm": _admm,
+    "staggered": _staggered,
+}

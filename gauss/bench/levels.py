@@ -17,6 +17,7 @@ FIRST_ORDER, ACTIVE_SET, INTERIOR_POINT = 100_000, 10_000, 1_000
 TIME_LIMITS = {
     "clarabel": "time_limit",
     "daqp": "time_limit",
+    "gurobi": "TimeLimit",
     "highs": "time_limit",
     "osqp": "time_limit",
     "qpalm": "time_limit",
@@ -33,14 +34,16 @@ ITERATION_LIMITS = {
     "proxqp": ("max_iter", ACTIVE_SET),
     "qpalm": ("max_iter", ACTIVE_SET),
     "hpipm": ("iter_max", INTERIOR_POINT),
+    "jaxopt_osqp": ("maxiter", FIRST_ORDER),
+    "kvxopt": ("maxiters", INTERIOR_POINT),
     "qpax": ("max_iter", INTERIOR_POINT),
     "qpoases": ("nWSR", ACTIVE_SET),
     "qrqp": ("max_iter", ACTIVE_SET),
     "scs": ("max_iters", FIRST_ORDER),
 }
-# Beyond what qpbenchmark sets. CVXOPT and ECOS look at the duality gap by tolerances of their own, which must follow like
-# those of the others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
-GAPS = {"cvxopt": ("abstol", "reltol"), "ecos": ("abstol", "reltol")}
+# Beyond what qpbenchmark sets. CVXOPT, KVXOPT and ECOS look at the duality gap by tolerances of their own, which follow
+# like those of others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
+GAPS = dict.fromkeys(("cvxopt", "ecos", "kvxopt"), ("abstol", "reltol"))
 CLOCKS = {"piqp": {"compute_timings": True}, "proxqp": {"compute_timings": True}}
 BEYOND = {
     "clarabel": ("time_limit",),

@@ -3,6 +3,7 @@
 The error of a motion is how far the centres of mass are from where a reference has them at the end, the largest of all [m].
 """
 
+import textwrap
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ TWO = ("dopri5", "dop853")  # a reference, and what tells how good it is
 FINEST = 1e-14
 STEPS = 2**14  # of the finest run from which time stepping is extrapolated
 AUTO = "auto"  # gauss's own choice among the backends
+SENTENCE = 120  # letters of a reason, at most
 REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the least time counts
 
 
@@ -231,4 +233,4 @@ def front(found: Iterable[Attempt]) -> list[Attempt]:
 
 def _short(text: str) -> str:
     """First sentence of a message."""
-    return text.split("; ")[0].split(". ")[0][:90]
+    return textwrap.shorten(text.split("; ")[0].split(". ")[0], SENTENCE, placeholder=" …")

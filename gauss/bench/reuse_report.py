@@ -38,10 +38,6 @@ def _key(row) -> tuple[str, str, str]:
     return row["problem"], row["backend"], row["level"]
 
 
-def _modes(key: tuple[str, str, str], rows) -> dict[str, dict]:
-    return {row["mode"]: row for row in rows if _key(row) == key}
-
-
 def _line(key: tuple[str, str, str], mine: dict[str, dict]) -> list[str]:
     """Line of one backend on one problem, of its rows by mode."""
     once = mine[reuse.ONE_SHOT]["seconds"]

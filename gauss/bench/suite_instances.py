@@ -40,7 +40,7 @@ def of_suite_instance(found: SuiteInstance, start: np.ndarray | None = None) -> 
     instance = of_arrays(found.name, found.kind, found.P, found.q, found.A, found.b, rows, right, **fields)
     verdict = SOLVABLE if found.verdict == SOLVED else found.verdict
     is_known = verdict == SOLVABLE and found.reference is not None and found.reference.x.hi.size == found.n
-    right_one = None if is_known or instance.matrices is None else _known(found, instance.matrices)
+    right_one = _known(found, instance.matrices) if is_known and instance.matrices is not None else None
     return replace(instance, known=right_one, verdict=verdict, start=start)
 
 

@@ -4,7 +4,7 @@ from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
-from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, reachable
+from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, entered, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, write
 from gauss.codegen.gc_pause import gc_pause
@@ -19,8 +19,10 @@ from gauss.codegen.outlining import fresh_symbols, outlined
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
 from gauss.codegen.schedule import schedule
+from gauss.codegen.staging import staged
 from gauss.codegen.substitute import substitute
 from gauss.codegen.taylor_series import Series
+from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
     "BODY",
@@ -49,6 +51,7 @@ __all__ = [
     "Writer",
     "as_number",
     "branches",
+    "compile_notice",
     "constant_array",
     "content_digest",
     "content_key",
@@ -57,12 +60,14 @@ __all__ = [
     "counted_loop",
     "endless_loop",
     "entry_code",
+    "entered",
     "external",
     "fastcall",
     "forward",
     "fresh_symbols",
     "from_disk",
     "gc_pause",
+    "graph_of",
     "intrinsic",
     "jacobian",
     "least_degree",
@@ -71,6 +76,7 @@ __all__ = [
     "reachable",
     "reverse",
     "schedule",
+    "staged",
     "straight_line",
     "substitute",
     "trace",

@@ -64,6 +64,7 @@ class _Encoder:
         self.parts: list[bytes] = []
         self.enclosing: dict[int, int] = {}  # address of each object that contains the present one → its depth
         self.functions: dict[int, int] = {}  # address of each traced function encoded so far → its number
+        self.names: dict[int, bytes] = {}  # address of each named object encoded so far → its name
 
     def encode(self, thing):
         """Append the encoding of an object.
@@ -126,7 +127,10 @@ def _refused(_: _Encoder, thing):
 def _tuple(encoder: _Encoder, thing):
     if type(thing) is not tuple:
         _named(encoder, type(thing))
-    encoder.sequence(b"t", thing)
+    if thing and all(type(part) is float for part in thing):
+        encoder.parts.append(b"v%d:" % len(thing) + struct.pack(f"<{len(thing)}d", *thing))
+    else:
+        encoder.sequence(b"t", thing)
 
 
 def _member(encoder: _Encoder, member: Enum):
@@ -135,7 +139,11 @@ def _member(encoder: _Encoder, member: Enum):
 
 
 def _slice(encoder: _Encoder, thing: slice | range):
-    encoder.sequence(b"S" if type(thing) is slice else b"R", (thing.start, thing.stop, thing.step))
+    ends = thing.start, thing.stop, thing.step
+    if all(type(end) in (int, NoneType) for end in ends):
+        encoder.parts.append(repr(thing).encode() + b";")
+    else:
+        encoder.sequence(b"S", ends)
 
 
 def _record(encoder: _Encoder, thing):
@@ -155,11 +163,13 @@ def _field_names(kind: type) -> tuple[str, ...]:
 
 
 def _array(encoder: _Encoder, array: np.ndarray):
-    encoder.sequence(b"a", (array.dtype.str, array.shape))
-    if array.dtype.hasobject:
-        encoder.sequence(b"o", array.ravel().tolist())
+    kind = f"a{array.dtype.str}{array.shape}:".encode()
+    if array.dtype.fields is not None:
+        _refused(encoder, array)
+    elif array.dtype.hasobject:
+        encoder.sequence(kind, array.ravel().tolist())
     else:
-        encoder.encode(array.tobytes())
+        encoder.parts.append(kind + array.tobytes())
 
 
 def _number(encoder: _Encoder, number: np.generic):
@@ -177,9 +187,12 @@ def _set(encoder: _Encoder, things):
 
 def _named(encoder: _Encoder, thing):
     """Append the name of a top-level object of a package that the key of the cache holds."""
-    if not _has_name(thing):
-        _refused(encoder, thing)
-    encoder.parts.append(b"@" + _text(thing.__module__) + _text(thing.__qualname__))
+    name = encoder.names.get(id(thing))
+    if name is None:
+        if not _has_name(thing):
+            _refused(encoder, thing)
+        name = encoder.names[id(thing)] = b"@" + _text(thing.__module__) + _text(thing.__qualname__)
+    encoder.parts.append(name)
 
 
 def _has_name(thing) -> bool:
@@ -217,7 +230,7 @@ def _module(encoder: _Encoder, module: ModuleType):
 
 def _function(encoder: _Encoder, function: FunctionType):
     """Append the name of a top-level function of this package, or the code of another and all that it can see."""
-    if _has_name(function):
+    if id(function) in encoder.names or _has_name(function):
         _named(encoder, function)
         return
     ours = function.__module__.partition(".")[0] == PACKAGE

@@ -8,12 +8,12 @@ structures of arrays; it calls other functions with its own width. A long functi
 from llvmlite import ir
 
 from gauss.codegen.function import Function
-from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strip_mined_loop
+from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides, strip_mined_loop
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.outlined_pieces import LONGEST_UNCUT, write_pieces
 from gauss.codegen.schedule import Schedule, schedule
-from gauss.codegen.straight_line import calling, straight_line
+from gauss.codegen.straight_line import calling, result_rooms, straight_line
 
 
 class Writer:
@@ -24,27 +24,30 @@ class Writer:
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
 
-    def body(self, function: Function | NativeFunction, width: int = 1) -> ir.Function:
+    def body(self, function: Function | NativeFunction, width: int = 1, strided: bool = False) -> ir.Function:
         """Code of a function for one vector width, emitted at the first request.
 
-        A :class:`gauss.codegen.NativeFunction` emits its own.
+        A :class:`gauss.codegen.NativeFunction` emits its own. Other code takes its inputs and outputs one after the other,
+        whatever stride it is given, unless it is ``strided``.
 
         Raises
         ------
         TypeError
             If an output depends on a symbol that is no input.
         """
-        key = (function, width)
+        key = (function, width, strided)
         if key not in self._bodies:
-            code = function.write(self, width) if isinstance(function, NativeFunction) else self._write(function, width)
-            self._bodies[key] = code
+            if isinstance(function, NativeFunction):
+                self._bodies[key] = function.write(self, width)
+            else:
+                self._bodies[key] = self._write(function, width, strided)
         return self._bodies[key]
 
     def over_states(self, function: Function | NativeFunction, widths):
         """Write ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, input j of state i being
         ``in[j * in_stride + i]``: vectors of the widest width as long as they fit, then single states.
         """  # noqa: D205
-        bodies = {width: self.body(function, width) for width in sorted({1, *widths}, reverse=True)}
+        bodies = {width: self.body(function, width, strided=True) for width in sorted({1, *widths}, reverse=True)}
         run = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [INTEGER, *BODY.args]), name="run")
         count, source, in_stride, target, out_stride = run.args
         b = ir.IRBuilder(run.append_basic_block("entry"))
@@ -54,7 +57,7 @@ class Writer:
             start = strip_mined_loop(b, start, count, width, call)
         b.ret_void()
 
-    def export(self, function: Function, name: str):
+    def export(self, function: Function | NativeFunction, name: str):
         """Write ``name(double* in, double* out)``, one state."""
         entry = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER, POINTER]), name=name)
         b, one = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1)
@@ -67,7 +70,7 @@ class Writer:
             self._schedules[function] = schedule(function)
         return self._schedules[function]
 
-    def _write(self, function: Function, width: int) -> ir.Function:
+    def _write(self, function: Function, width: int, strided: bool) -> ir.Function:
         nodes, inputs = function.nodes, set(function.inputs)
         foreign = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
         if foreign:
@@ -78,10 +81,11 @@ class Writer:
         name = f"{function.name}_{len(self._bodies)}_{width}"
         scheduled = self._scheduled(function)
         if len(nodes) > LONGEST_UNCUT:
-            return write_pieces(self.module, name, scheduled, callees, width)
+            return write_pieces(self.module, name, scheduled, callees, width, strided)
         body, lanes = begin_function(self.module, name, width)
-        source, in_stride, target, out_stride = body.args
+        source, in_stride, target, out_stride = strides(body, width, strided)
         fetch, keep = input_reader(lanes, source, in_stride), output_writer(lanes, target, out_stride)
-        straight_line(lanes, scheduled, fetch, keep, calling(lanes, callees))
+        rooms = result_rooms(lanes, scheduled.nodes)
+        straight_line(lanes, scheduled, fetch, keep, calling(lanes, callees), results=rooms)
         lanes.b.ret_void()
         return body

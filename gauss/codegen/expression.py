@@ -46,14 +46,15 @@ class Graph:
 
     Parameters
     ----------
+    early : Graph, optional
+        Graph of the inputs that are known first: its expressions may enter this one, see :mod:`gauss.codegen.staging`.
     shared : bool
         Whether its symbols are parameters: its expressions may enter any other graph, where a symbol becomes the value set
-        by
-        :meth:`bind`, or a further input.
+        by :meth:`bind`, or a further input.
     """
 
-    def __init__(self, shared: bool = False):
-        self.shared = shared
+    def __init__(self, early: "Graph | None" = None, shared: bool = False):
+        self.early, self.shared = early, shared
         self.bound: dict[str, Expression] = {}  # parameters with a value in this graph
         self.free: dict[str, Expression] = {}  # parameters that are further inputs of this graph
         self._entered: dict[Expression, Expression] = {}
@@ -88,12 +89,16 @@ class Graph:
         if isinstance(value, Expression):
             if value.graph is self:
                 return value
-            if value.graph.shared:
-                return self._enter(value)
+            if value.graph.precedes(self):
+                return value.graph.entered(value, self)
             raise TypeError("expressions of two graphs cannot be combined; trace everything in one Graph.")
         if isinstance(value, NUMBERS):
             return self.constant(value)
         raise TypeError(f"cannot trace {value!r} ({type(value).__name__}); expected a number or an Expression.")
+
+    def precedes(self, graph: "Graph") -> bool:
+        """Whether expressions of this graph may enter another one."""
+        return self.shared or self is graph.early
 
     def bind(self, names, values):
         """Set the values of parameters in this graph."""
@@ -105,14 +110,14 @@ class Graph:
             return self.bound[name]
         return self.free.setdefault(name, self.symbol(name))
 
-    def _enter(self, value: "Expression") -> "Expression":
-        """Copy of an expression of a shared graph, with the values of its parameters in this graph."""
+    def entered(self, value: "Expression", graph: "Graph") -> "Expression":
+        """Copy in another graph of an expression of this shared one, with the values of its parameters there."""
         for node in reachable([value]):
-            if node not in self._entered:
+            if node not in graph._entered:
                 is_symbol = node.op == "symbol"
-                operands = [self._entered[operand] for operand in node.operands]
-                self._entered[node] = self.parameter(node.value) if is_symbol else self.copy(node, operands)
-        return self._entered[value]
+                operands = [graph._entered[operand] for operand in node.operands]
+                graph._entered[node] = graph.parameter(node.value) if is_symbol else graph.copy(node, operands)
+        return graph._entered[value]
 
     def unary(self, op: str, x: "Expression") -> "Expression":
         """Return op(x), folded."""
@@ -146,13 +151,17 @@ class Graph:
 
     def call(self, function, arguments) -> np.ndarray:
         """Outputs of a :class:`gauss.codegen.Function` for these arguments, an object array; constant ones are numbers."""
-        call = self._make("call", tuple(self.lift(argument) for argument in arguments), function)
-        outputs = [self._make("item", (call,), k) for k in range(len(function.outputs))]
+        call = self._make("call", _passed([self.lift(argument) for argument in arguments]), function)
+        outputs = [self.result(call, k) for k in range(len(function.outputs))]
         for k, output in enumerate(function.outputs):
             number = as_number(output)
             if number is not None:
                 outputs[k] = self.constant(number)
         return np.array([*outputs, None], dtype=object)[:-1]
+
+    def result(self, call: "Expression", k: int) -> "Expression":
+        """Return result k of a call."""
+        return self._make("item", (call,), k)
 
     def copy(self, node: "Expression", operands) -> "Expression":
         """Node of another graph, with operands of this one, folded."""
@@ -217,7 +226,7 @@ class Expression:
         elif type(other) is not Expression or other.graph is not graph:
             if not isinstance(other, OPERANDS):
                 return NotImplemented
-            if graph.shared and isinstance(other, Expression):
+            if isinstance(other, Expression) and graph.precedes(other.graph):
                 graph, first = other.graph, other.graph.lift(self)
             other = graph.lift(other)
         return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
@@ -338,6 +347,38 @@ OPERANDS = (*NUMBERS, Expression)
 Scalar = float | Expression  # numbers over which the mechanics is written
 
 
+def graph_of(values) -> Graph:
+    """Graph in which operations on values are traced: the latest one of those of their expressions."""
+    found = None
+    for value in values:
+        if isinstance(value, Expression) and (found is None or found.precedes(value.graph)):
+            found = value.graph
+    if found is None:
+        raise TypeError("expected at least one traced expression.")
+    return found
+
+
+def entered(values, given) -> np.ndarray:
+    """Values as expressions of the graph of given ones: operations on them are traced there; numbers if these are."""
+    values = np.asarray(values)
+    if values.dtype != object or not any(isinstance(value, Expression) for value in np.ravel(given)):
+        return values
+    return np.frompyfunc(graph_of(np.ravel(given)).lift, 1, 1)(values)
+
+
+def _passed(operands: list[Expression]) -> tuple[Expression, ...]:
+    """Operands of a call; if the first ones are all results of another call, in order, this call stands for them.
+
+    Code passes such results where they are, in memory.
+    """
+    if operands and operands[0].op == "item":
+        call = operands[0].operands[0]
+        count = len(call.value.outputs)
+        if [(x.op, x.value, x.operands) for x in operands[:count]] == [("item", k, (call,)) for k in range(count)]:
+            return call, *operands[count:]
+    return tuple(operands)
+
+
 def _is_truth(value) -> bool:
     """Whether a value is a condition, traced or not."""
     traced = isinstance(value, Expression) and (value.op in ("less", "less_equal") or value.is_constant)
@@ -374,8 +415,13 @@ def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
 
 def count(outputs) -> dict[str, int]:
     """Number of operations of each kind in the outputs, those in called functions included."""
+    return tally(reachable(np.ravel(outputs)))
+
+
+def tally(nodes) -> dict[str, int]:
+    """Number of operations of each kind among nodes, those in called functions included."""
     counts: dict[str, int] = {}
-    for node in reachable(np.ravel(outputs)):
+    for node in nodes:
         if node.op == "call":
             for op, number in node.value.operations().items():
                 counts[op] = counts.get(op, 0) + number

@@ -4,10 +4,11 @@
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, count, reachable
+from gauss.codegen.expression import Expression, Graph, graph_of, reachable, tally
 from gauss.errors import judged_later
 
 
@@ -37,14 +38,14 @@ class Function:
         """Numbers of inputs and of outputs."""
         return len(self.inputs), len(self.outputs)
 
-    @property
+    @cached_property
     def nodes(self) -> list[Expression]:
         """All nodes on which the outputs depend, operands first."""
         return reachable(self.outputs)
 
     def operations(self) -> dict[str, int]:
         """Number of operations of each kind, those of called functions included."""
-        return count(self.outputs)
+        return tally(self.nodes)
 
     def text(self) -> str:
         """Listing of all operations: functions of equal text compute the same."""
@@ -73,7 +74,7 @@ class Function:
         count = len(self.inputs) - len(self.parameters)
         if given.size != count:
             raise TypeError(f"function {self.name!r} takes {count} numbers, got {given.size}.")
-        graph = next(part.graph for part in given if isinstance(part, Expression) and not part.graph.shared)
+        graph = graph_of(given)
         return graph, [*given, *(graph.parameter(name) for name in self.parameters)]
 
 
@@ -91,7 +92,11 @@ def write(function, *sizes: int, name: str = "function") -> Function:
     name : str
         Name in the code.
     """
-    graph = Graph()
+    return traced(Graph(), function, *sizes, name=name)
+
+
+def traced(graph: Graph, function, *sizes: int, name: str) -> Function:
+    """Trace a Python function in a new graph; see :func:`write`."""
     arguments = [graph.symbols(f"x{k}", size) for k, size in enumerate(sizes)]
     with judged_later():  # constants fold by IEEE 754, as in machine code: a NaN is no error here
         outputs = function(*arguments)

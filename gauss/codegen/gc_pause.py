@@ -14,8 +14,8 @@ _before: list[tuple[int, ...]] = []  # threshold at each entry; the first one is
 def gc_pause():
     """Raise the threshold of the garbage collector within this context, in all threads.
 
-    At the end only what was allocated within is collected: else the next allocation would begin a collection, maybe a full
-    one, which scans all that was imported and takes as long as a short motion.
+    If a collection is due at its end, only what was allocated within is looked at: the next allocation would begin one of
+    all generations, which scans all that was imported and takes as long as a short motion.
     """
     with _lock:
         _before.append(gc.get_threshold())
@@ -26,7 +26,7 @@ def gc_pause():
     finally:
         with _lock:
             if len(_before) == 1:
-                if gc.isenabled() and _before[0][0]:
+                if gc.isenabled() and 0 < _before[0][0] < gc.get_count()[0]:
                     gc.collect(0)
                 gc.set_threshold(*_before[0])
             _before.pop()

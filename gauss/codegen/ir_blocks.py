@@ -49,14 +49,24 @@ def constant_array(module: ir.Module, name: str, values: np.ndarray) -> ir.Globa
     return known
 
 
+def strides(body: ir.Function, width: int, strided: bool) -> tuple:
+    """Input pointer, input stride, output pointer and output stride of a body; strides are those given, or the width."""
+    source, in_stride, target, out_stride = body.args[:4]
+    return (source, in_stride, target, out_stride) if strided else (source, INTEGER(width), target, INTEGER(width))
+
+
 def input_reader(lanes: Lanes, source, stride):
     """Function of k that loads input k of a body."""
-    return lambda k: lanes.load(source, lanes.b.mul(stride, INTEGER(k)))
+    return lambda k: lanes.load(source, _offset(lanes, stride, k))
 
 
 def output_writer(lanes: Lanes, target, stride):
     """Function of k and a value that stores output k of a body."""
-    return lambda k, value: lanes.store(value, target, lanes.b.mul(stride, INTEGER(k)))
+    return lambda k, value: lanes.store(value, target, _offset(lanes, stride, k))
+
+
+def _offset(lanes: Lanes, stride, k: int):
+    return INTEGER(stride.constant * k) if isinstance(stride, ir.Constant) else lanes.b.mul(stride, INTEGER(k))
 
 
 def strip_mined_loop(b: ir.IRBuilder, start, count, width: int, body):

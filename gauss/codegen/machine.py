@@ -8,7 +8,7 @@ import os
 import zlib
 
 from gauss.codegen import object_cache, tiers
-from gauss.codegen.object_code import about, linked, optimised_objects, packed, quick_object, unpacked, width
+from gauss.codegen.object_code import about, linked, optimised_objects, packed, quick_objects, unpacked, width
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, MachineCode
 
@@ -37,8 +37,8 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
     tier = tiers.wanted()
     if not optimise or tier == OPTIMISED or (tier == AUTO and len(ir_text) < SHORT):
         return _optimised(key, ir_text, optimise)
-    quick, source = quick_object(ir_text), zlib.compress(ir_text.encode(), COMPRESSION)
-    object_cache.write(key + object_cache.QUICK_SUFFIX, packed([quick, source, str(optimise).encode()]))
+    quick, source = quick_objects(ir_text), zlib.compress(ir_text.encode(), COMPRESSION)
+    object_cache.write(key + object_cache.QUICK_SUFFIX, packed([*quick, source, str(optimise).encode()]))
     return _quick(key, quick, source, optimise)
 
 
@@ -51,20 +51,20 @@ def load_cached(key: str) -> MachineCode | None:
     content = object_cache.read(key + object_cache.QUICK_SUFFIX)
     if content is None:
         return None
-    quick, source, optimise = unpacked(content)
+    *quick, source, optimise = unpacked(content)
     if tier == OPTIMISED:
         return _optimised(key, zlib.decompress(source).decode(), int(optimise))
     return _quick(key, quick, source, int(optimise))
 
 
 def _optimised(key: str, ir_text: str, optimise: int) -> MachineCode:
-    objects = list(optimised_objects(ir_text, optimise)) if optimise else [quick_object(ir_text)]
+    objects = list(optimised_objects(ir_text, optimise)) if optimise else quick_objects(ir_text)
     object_cache.write(key, packed(objects))
     return MachineCode(key, linked(objects), OPTIMISED)
 
 
-def _quick(key: str, quick: bytes, source: bytes, optimise: int) -> MachineCode:
-    code = MachineCode(key, linked([quick]), QUICK, (source, optimise))
+def _quick(key: str, quick: list[bytes], source: bytes, optimise: int) -> MachineCode:
+    code = MachineCode(key, linked(quick), QUICK, (source, optimise))
     if os.environ.get(tiers.VARIABLE) != QUICK:
         OPTIMISER.add(code)
     return code

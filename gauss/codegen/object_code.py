@@ -6,7 +6,6 @@ another thread may call LLVM, is that of one unit. Both tiers evaluate the same 
 fused where the IR says so: their results are equal to the last bit.
 """
 
-import re
 import struct
 from collections.abc import Iterator
 from functools import cache
@@ -15,14 +14,13 @@ from itertools import islice
 import llvmlite
 import llvmlite.binding as llvm
 
+from gauss.codegen.module_units import ModuleUnits
+
 OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
 PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
 RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one object for that of another
 UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
-FUNCTION = re.compile(r"^define [^\n]*\n\{\n.*?^\}\n", re.MULTILINE | re.DOTALL)
-GLOBAL = re.compile(r'^(@"[^"]*") = .*\n', re.MULTILINE)
-NAME = re.compile(r'@"[^"]*"')
-INTERNAL = re.compile(r"^define internal ")
+CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
 
 
 @cache
@@ -50,9 +48,13 @@ def about(optimise: int) -> str:
     return f"{compiler} O{optimise} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
-def quick_object(ir_text: str) -> bytes:
-    """Object code of a module, without optimisation."""
-    return target(0).emit_object(llvm.parse_assembly(ir_text, context=llvm.create_context()))
+def quick_objects(ir_text: str) -> list[bytes]:
+    """Object code of a module, quickly made; functions whose multiply–adds the compiler may choose are optimised."""
+    quick, chosen = (
+        ModuleUnits(ir_text).apart(lambda function: CONTRACTED in function) if CONTRACTED in ir_text else (ir_text, "")
+    )
+    objects = [target(0).emit_object(_parsed(quick))] if quick else []
+    return objects + [_optimised(chosen)] if chosen else objects
 
 
 def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
@@ -65,61 +67,39 @@ def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
     optimise : int
         As of :func:`gauss.codegen.machine.load`, at least 1; modules that are optimised as a whole are one unit.
     """
-    machine = target(OPTIMISED)
-    for unit in units(ir_text) if optimise == 1 else (ir_text,):
-        module = llvm.parse_assembly(unit, context=llvm.create_context())
+    if optimise == 1:
+        short = len(ir_text) <= UNIT_LENGTH
+        for unit in [ir_text] if short else ModuleUnits(ir_text).short(UNIT_LENGTH):
+            yield _optimised(unit)
+    else:
+        module, builder = _parsed(ir_text), _builder()
         module.verify()
-        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
-        if optimise == 1:
-            passes = builder.getFunctionPassManager()
-            for function in module.functions:
-                if len(list(islice(function.blocks, 2))) > 1:
-                    passes.run(function, builder)
-        else:
-            builder.getModulePassManager().run(module, builder)
-        yield machine.emit_object(module)
+        builder.getModulePassManager().run(module, builder)
+        yield target(OPTIMISED).emit_object(module)
 
 
-def units(ir_text: str) -> list[str]:
-    """Modules of a few functions each, which together are a module.
-
-    Functions are visible to the other units, but not outside the machine code. Constants are repeated in each unit that
-    reads them; functions that use a variable stay in one unit.
-    """
-    functions = [found.group() for found in FUNCTION.finditer(ir_text)]
-    if len(functions) < 2 or len(ir_text) <= UNIT_LENGTH:
-        return [ir_text]
-    head = FUNCTION.sub("", ir_text)
-    values = {found.group(1): found.group() for found in GLOBAL.finditer(head)}
-    variables = {name for name, line in values.items() if " constant " not in line}
-    head = GLOBAL.sub("", head)
-    functions = [INTERNAL.sub("define ", function) for function in functions]
-    functions.sort(key=lambda function: variables.isdisjoint(NAME.findall(function)))
-    together = sum(not variables.isdisjoint(NAME.findall(function)) for function in functions)
-    return [head + _unit(functions, part, values) for part in _parts([len(function) for function in functions], together)]
+def _optimised(unit: str) -> bytes:
+    module, (passes, builder) = _parsed(unit), _passes()
+    module.verify()
+    for function in module.functions:
+        if len(list(islice(function.blocks, 2))) > 1:
+            passes.run(function, builder)
+    return target(OPTIMISED).emit_object(module)
 
 
-def _unit(functions: list[str], part: range, values: dict[str, str]) -> str:
-    """Some functions of a module, with what they refer to: constants, variables, declared functions."""
-    text = "".join(functions[part.start : part.stop])
-    used = set(NAME.findall(text))
-    lines = [line for name, line in values.items() if name in used]
-    for k, function in enumerate(functions):
-        first = function.partition("\n")[0]
-        if k not in part and NAME.search(first)[0] in used:  # type: ignore[index]  # every function has a name
-            lines.append(first.replace("define ", "declare ", 1) + "\n")
-    return "".join([*lines, text])
+def _parsed(ir_text: str) -> llvm.ModuleRef:
+    return llvm.parse_assembly(ir_text, context=llvm.create_context())  # which is freed with the module
 
 
-def _parts(lengths: list[int], together: int) -> list[range]:
-    """Ranges of about ``UNIT_LENGTH`` characters in all; the first ``together`` functions are in the first."""
-    bounds, size = [0], 0
-    for k, length in enumerate(lengths):
-        if k >= together and size and size + length > UNIT_LENGTH:
-            bounds.append(k)
-            size = 0
-        size += length
-    return [range(a, b) for a, b in zip(bounds, [*bounds[1:], len(lengths)], strict=True)]
+def _builder() -> llvm.PassBuilder:
+    return llvm.create_pass_builder(target(OPTIMISED), llvm.create_pipeline_tuning_options(speed_level=1))
+
+
+@cache
+def _passes() -> tuple[llvm.FunctionPassManager, llvm.PassBuilder]:
+    """Passes over functions, made once: llvmlite never frees them."""
+    builder = _builder()
+    return builder.getFunctionPassManager(), builder
 
 
 def packed(objects: list[bytes]) -> bytes:

@@ -174,17 +174,19 @@ class Optimiser:
 OPTIMISER = Optimiser()
 
 
-def one_tier(tier: str = AUTO) -> Run:
+def one_tier(tier: str = AUTO, shown: bool = True) -> Run:
     """Context in which no machine code changes its tier, also a decorator.
 
     Parameters
     ----------
     tier : str
         Tier of the code that is made in it; with "optimised", all code is optimised first.
+    shown : bool
+        Whether its progress may be shown.
     """
     if tier == OPTIMISED:
         OPTIMISER.wait()
-    return Run(tier)
+    return Run(tier, shown)
 
 
 atexit.register(OPTIMISER.stop)  # LLVM must not run while the process is taken down

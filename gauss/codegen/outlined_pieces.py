@@ -12,10 +12,10 @@ from math import inf
 from llvmlite import ir
 
 from gauss.codegen.expression import Expression
-from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer
+from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.schedule import Schedule
-from gauss.codegen.straight_line import calling, straight_line
+from gauss.codegen.straight_line import Results, calling, passed_on, straight_line
 
 LONGEST_UNCUT = 2_000  # operations above which a function is outlined into pieces
 PIECE_LENGTH = (
@@ -23,7 +23,7 @@ PIECE_LENGTH = (
 )
 
 
-def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: int) -> ir.Function:
+def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: int, strided: bool = False) -> ir.Function:
     """Code of a function for one vector width, in pieces.
 
     Parameters
@@ -38,51 +38,63 @@ def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: 
         Code of the called functions, for this width.
     width : int
         Number of states at a time.
+    strided : bool
+        Whether its inputs and outputs may be apart.
     """
     pieces = cut(whole, PIECE_LENGTH)
-    place, size = places(pieces)
-    codes = [_piece_code(module, f"{name}_{k}", whole, piece, place, callees, width) for k, piece in enumerate(pieces)]
+    place, size = _frame(whole, pieces)
+    codes = [
+        _piece_code(module, f"{name}_{k}", whole, piece, place, callees, width, strided) for k, piece in enumerate(pieces)
+    ]
     body, lanes = begin_function(module, name, width)
-    source, in_stride, target, out_stride = body.args
+    source, in_stride, target, out_stride = strides(body, width, strided)
     frame = lanes.b.bitcast(lanes.b.alloca(lanes.kind, max(size, 1)), POINTER)
     for code in codes:
         lanes.b.call(code, [*body.args, frame])
     rest = [k for k, x in enumerate(whole.outputs) if not isinstance(x, Expression) or x.op in ("symbol", "constant")]
     given, write = [whole.outputs[k] for k in rest], output_writer(lanes, target, out_stride)
     constants = list({x.index: x for x in given if isinstance(x, Expression) and x.is_constant}.values())
-    passed_on = Schedule(constants, whole.inputs, given)
+    unchanged = Schedule(constants, whole.inputs, given)
     straight_line(
-        lanes, passed_on, input_reader(lanes, source, in_stride), lambda k, value: write(rest[k], value), vectorise=False
+        lanes, unchanged, input_reader(lanes, source, in_stride), lambda k, value: write(rest[k], value), vectorise=False
     )
     lanes.b.ret_void()
     return body
 
 
-def _piece_code(module, name: str, whole: Schedule, piece: Schedule, place, callees, width: int) -> ir.Function:
+def _piece_code(module, name: str, whole: Schedule, piece: Schedule, place, callees, width: int, strided) -> ir.Function:
     """Code of a piece: (in, in_stride, out, out_stride, frame)."""
     body, lanes = begin_function(module, name, width, ir.FunctionType(ir.VoidType(), [*BODY.args, POINTER]))
     body.attributes.add("noinline")
-    source, in_stride, target, out_stride, frame = body.args
+    (source, in_stride, target, out_stride), frame = strides(body, width, strided), body.args[-1]
     read, write = input_reader(lanes, source, in_stride), output_writer(lanes, target, out_stride)
     inputs, outputs = {x.index: k for k, x in enumerate(whole.inputs)}, defaultdict(list)
     for k, x in enumerate(whole.outputs):
         if isinstance(x, Expression):
             outputs[x.index].append(k)
 
+    at = lambda index: INTEGER(place[index] * width)  # noqa: E731
+    passed = [node for node in (*piece.nodes, *piece.inputs) if node.op == "call" and node.index in place]
+    results = {node.index: Results(lanes, lanes.b.gep(frame, [at(node.index)]), node.value) for node in passed}
+
     def fetch(k):
         index = piece.inputs[k].index
-        return read(inputs[index]) if index in inputs else lanes.load(frame, INTEGER(place[index] * width))
+        if index in results:
+            return results[index]
+        if index in inputs:
+            return read(inputs[index])
+        return lanes.load(frame, at(index)) if index in place else input_reader(lanes, target, out_stride)(outputs[index][0])
 
     def keep(k, value):
         index = piece.outputs[k].index
         if index in place:
-            lanes.store(value, frame, INTEGER(place[index] * width))
+            lanes.store(value, frame, at(index))
         for output in outputs[index]:
             write(output, value)
 
     called = {node.value for node in piece.nodes if node.op == "call"}
     calls = calling(lanes, {callee: code for callee, code in callees.items() if callee in called})
-    straight_line(lanes, piece, fetch, keep, calls, vectorise=False)
+    straight_line(lanes, piece, fetch, keep, calls, vectorise=False, results=results)
     lanes.b.ret_void()
     return body
 
@@ -100,8 +112,16 @@ def cut(scheduled: Schedule, length: int) -> list[Schedule]:
     return [_piece(run, k, piece_of, last, wanted) for k, run in enumerate(runs)]
 
 
-def places(pieces: list[Schedule]) -> tuple[dict[int, int], int]:
-    """Frame slot of every node that another piece uses, by its index, and the number of slots."""
+def _frame(whole: Schedule, pieces: list[Schedule]) -> tuple[dict[int, int], int]:
+    """Frame slots of values and of calls whose results are passed on as a whole, by their index; number of slots."""
+    place, size = places(pieces, {x.index for x in whole.outputs if isinstance(x, Expression)})
+    for call, count in passed_on(whole.nodes).items():
+        place[call.index], size = size, size + count
+    return place, size
+
+
+def places(pieces: list[Schedule], outputs=frozenset()) -> tuple[dict[int, int], int]:
+    """Frame slot of every node that another piece uses, by its index, and the number of slots; outputs need none."""
     last = {x.index: k for k, piece in enumerate(pieces) for x in piece.inputs}
     found: dict[int, int] = {}
     free: list[int] = []
@@ -109,7 +129,7 @@ def places(pieces: list[Schedule]) -> tuple[dict[int, int], int]:
     size = 0
     for k, piece in enumerate(pieces):
         for node in piece.outputs:
-            if node.index in last:
+            if node.index in last and node.index not in outputs:
                 found[node.index] = heappop(free) if free else size
                 size = max(size, found[node.index] + 1)
                 ends[last[node.index]].append(found[node.index])

@@ -59,26 +59,33 @@ class _Reassociation:
     def depth_first(self) -> list[Expression]:
         """Nodes on which the outputs depend, each right after its operands."""
         found, seen, waiting = [], set(), [(x, False) for x in reversed(self.outputs) if isinstance(x, Expression)]
+        when = self._times()
         while waiting:
             node, is_ready = waiting.pop()
             if is_ready:
                 found.append(node)
             elif node.index not in seen:
                 seen.add(node.index)
+                if not node.operands:
+                    found.append(node)
+                    continue
                 waiting.append((node, True))
-                waiting += [(x, False) for x in sorted(node.operands, key=self._when)]
+                waiting += [(x, False) for x in sorted(node.operands, key=lambda x: when[x.index])]
         return found
 
-    def _when(self, node: Expression) -> int:
-        for made in self.graph.nodes[len(self.when) :]:
-            begin = max((self.when[x.index] for x in made.operands), default=0)
-            self.when.append(begin + (LATENCY.get(made.op, 1) if made.operands else 0))
-        return self.when[node.index]
+    def _times(self) -> list[int]:
+        """Latency of every node so far."""
+        when = self.when
+        for made in self.graph.nodes[len(when) :]:
+            begin = max([when[x.index] for x in made.operands], default=0)
+            when.append(begin + (LATENCY.get(made.op, 1) if made.operands else 0))
+        return when
 
     def _sum(self, terms) -> Expression:
         """Sum of terms (sign, old node): first one that is not a product, then by latency."""
         parts = [(sign, self.new[old.index], old.index in self.products) for sign, old in terms]
-        parts.sort(key=lambda part: self._when(part[1]) - part[2])  # the addition of a product is part of its instruction
+        when = self._times()
+        parts.sort(key=lambda part: when[part[1].index] - part[2])  # the addition of a product is part of its instruction
         plain = next((part for part in parts if not part[2]), parts[0])
         parts.remove(plain)
         sign, total, _ = plain

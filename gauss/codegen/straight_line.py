@@ -17,7 +17,9 @@ from gauss.codegen.schedule import Schedule
 from gauss.codegen.superword import IsomorphicPart, ordered_operands, superword_groups
 
 
-def straight_line(lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Callable, calls=None, vectorise: bool = True):
+def straight_line(
+    lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Callable, calls=None, vectorise: bool = True, results=None
+):
     """Emit the operations of a function at the insertion point.
 
     Parameters
@@ -34,6 +36,8 @@ def straight_line(lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Call
         Emitter of the call of each called function, {function: callable}.
     vectorise : bool
         Whether independent isomorphic parts are packed into SIMD lanes (:mod:`gauss.codegen.superword`).
+    results : dict, optional
+        Memory of the results of calls that are passed on as a whole, by their index; see :func:`passed_on`.
     """
     values = _Values(scheduled, fetch, keep)
     nodes = scheduled.nodes
@@ -41,16 +45,16 @@ def straight_line(lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Call
     for parts in groups:
         _vectorised(lanes, parts, values)
     written = {node.index for parts in groups for part in parts for node in part}
-    _emit(lanes, [node for node in nodes if node.index not in written], values, calls or {})
+    _emit(lanes, [node for node in nodes if node.index not in written], values, calls or {}, results or {})
     values.keep_inputs(lanes)
 
 
-def _emit(lanes: Lanes, nodes: list[Expression], values: "_Values", calls: dict):
+def _emit(lanes: Lanes, nodes: list[Expression], values: "_Values", calls: dict, results: dict):
     """Emit operations one after the other; the value of a call is the function that loads its results."""
     lanes.sincos_together({angle: values[angle.index] for angle in _angles(nodes)})
     for node in nodes:
         if node.op == "call":
-            values[node.index] = calls[node.value]([values[x.index] for x in node.operands])
+            values[node.index] = calls[node.value]([values[x.index] for x in node.operands], results.get(node.index))
         elif node.op == "item":
             values.record(node, values[node.operands[0].index](node.value))
         elif node.op != "symbol":
@@ -116,6 +120,46 @@ def _packed_operands(beside: Lanes, twins: tuple[Expression, ...], vectors: dict
     return {xs[0].index: value(xs) for xs in operands}
 
 
+def passed_on(nodes) -> dict[Expression, int]:
+    """Calls whose results are passed on as a whole to other calls, and the numbers of values in memory for it.
+
+    The arguments of those calls follow the results.
+    """
+    found: dict[Expression, int] = {}
+    for node in nodes:
+        if node.op == "call" and node.operands and node.operands[0].op == "call":
+            first = node.operands[0]
+            found[first] = max(found.get(first, 0), len(first.value.outputs) + len(node.operands) - 1)
+    return found
+
+
+def result_rooms(lanes: Lanes, nodes) -> dict:
+    """Memory of the results of calls that are passed on as a whole."""
+    room = lambda size: lanes.b.alloca(kind(lanes.width), size)  # noqa: E731
+    return {call.index: Results(lanes, room(size), call.value) for call, size in passed_on(nodes).items()}
+
+
+class Results:
+    """Results of a call in memory of their own: they are loaded where they are used.
+
+    Parameters
+    ----------
+    lanes : Lanes
+        Emitter of operations.
+    room : llvmlite.ir.Value
+        Pointer to the memory.
+    function : Function
+        The called function.
+    """
+
+    def __init__(self, lanes: Lanes, room, function: Function):
+        self.lanes, self.room, self.count = lanes, lanes.b.bitcast(room, POINTER), len(function.outputs)
+
+    def __call__(self, k: int):
+        """Load result k."""
+        return self.lanes.load(self.room, ir.Constant(INTEGER, k * self.lanes.width))
+
+
 def calling(lanes: Lanes, callees) -> dict:
     """Emitters of the calls of functions {function: code}."""
     return {callee: _CalleeWriter(lanes, callee, code) for callee, code in callees.items()}
@@ -128,15 +172,20 @@ class _CalleeWriter:
         self.lanes, self.callee, self.code = lanes, callee, code
         code.attributes.add("noinline")
         self.given, self.found = (
-            lanes.b.alloca(kind(lanes.width), max(size, 1)) for size in (len(callee.inputs), len(callee.outputs))
+            lanes.b.bitcast(lanes.b.alloca(kind(lanes.width), max(size, 1)), POINTER)
+            for size in (len(callee.inputs), len(callee.outputs))
         )
 
-    def __call__(self, arguments):
+    def __call__(self, arguments, results: Results | None = None):
         lanes, b = self.lanes, self.lanes.b
         place = lambda k: ir.Constant(INTEGER, k * lanes.width)  # noqa: E731
-        given, found = (b.bitcast(buffer, POINTER) for buffer in (self.given, self.found))
-        for k, argument in enumerate(arguments):
+        given, found, first = self.given, self.found if results is None else results.room, 0
+        if arguments and isinstance(arguments[0], Results):  # the other arguments follow them in their memory
+            given, first, arguments = arguments[0].room, arguments[0].count, arguments[1:]
+        for k, argument in enumerate(arguments, first):
             lanes.store(argument, given, place(k))
         b.call(self.code, [given, place(1), found, place(1)])
-        results = [lanes.load(found, place(k)) for k in range(len(self.callee.outputs))]
-        return results.__getitem__
+        if results is not None:
+            return results
+        values = [lanes.load(found, place(k)) for k in range(len(self.callee.outputs))]
+        return values.__getitem__

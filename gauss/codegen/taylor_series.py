@@ -57,7 +57,7 @@ class Series(NativeFunction):
     def write(self, writer: "Writer", width: int) -> ir.Function:
         """Machine code for one motion at a time: its SIMD lanes are orders."""
         module, plan = writer.module, self.plan
-        first = writer.body(plan.first)
+        first = writer.body(plan.first, strided=True)
         advance = [_AdvanceWriter(module, plan, piece).function for piece in plan.pieces]
         convolve = [_ConvolutionWriter(module, plan, part).function for part in plan.parts]
         for code in (first, *advance, *convolve) if len(plan.pieces) > 1 else ():

@@ -28,7 +28,7 @@ VARIABLE = "GAUSS_TIER"
 
 _sequence = count(1)
 _lock = Lock()
-_running: set[int] = set()  # numbers of the runs in progress
+_running: set["Run"] = set()  # runs in progress
 _offered: list["MachineCode"] = []  # codes with an offer that some run in progress does not take
 _current: ContextVar["Run | None"] = ContextVar("current run", default=None)
 
@@ -65,6 +65,8 @@ class Run(ContextDecorator):
     ----------
     tier : str
         Tier of the code that is made in it; "auto" means that of the environment.
+    shown : bool
+        Whether its progress may be shown.
 
     Attributes
     ----------
@@ -74,22 +76,26 @@ class Run(ContextDecorator):
         Whether quick code ran in it.
     """
 
-    def __init__(self, tier: str = AUTO):
-        self.tier, self.number, self.is_quick = tier, 0, False
+    def __init__(self, tier: str = AUTO, shown: bool = True):
+        self.tier, self.shown, self.number, self.is_quick = tier, shown, 0, False
         self._token: Token | None = None
 
     def _recreate_cm(self) -> "Run":
-        return Run(self.tier)  # a decorated function makes one run for each call
+        return Run(self.tier, self.shown)  # a decorated function makes one run for each call
 
     def __enter__(self) -> "Run":
         outer = _current.get()
         if outer is not None:
             return outer
-        with _lock:
-            self.number = next(_sequence)
-            _running.add(self.number)
+        _running.add(self)
+        self.number = next(_sequence)  # after that: an offer that has not seen this run has a smaller number
         self._token = _current.set(self)
         return self
+
+    @staticmethod
+    def current() -> "Run | None":
+        """Run in progress, if there is one."""
+        return _current.get()
 
     @property
     def ran(self) -> str:
@@ -97,20 +103,24 @@ class Run(ContextDecorator):
         return QUICK if self.is_quick else OPTIMISED
 
     def __exit__(self, *_):
-        if self._token is None:
-            return
-        _current.reset(self._token)
-        with _lock:
-            _running.discard(self.number)
+        if self._token is not None:
+            _current.reset(self._token)
+            _running.discard(self)
             if _offered:
-                oldest = min(_running, default=next(_sequence))
-                for code in [code for code in _offered if code.offer < oldest]:
-                    _offered.remove(code)
-                    code.connect_users()
+                _connect_offered()
+
+
+def _connect_offered():
+    """Let users take the offers that all runs in progress take."""
+    with _lock:
+        oldest = min([run.number for run in list(_running)], default=next(_sequence))
+        for code in [code for code in _offered if code.offer < oldest]:
+            _offered.remove(code)
+            code.connect_users()
 
 
 class CodeUser(Protocol):
-    """Holder of addresses of functions."""
+    """Object with addresses of functions."""
 
     def connect(self, engine: llvm.ExecutionEngine) -> None:
         """Use optimised code from now on."""
@@ -219,4 +229,4 @@ def reset_after_fork():
     global _lock
     _lock = Lock()
     run = _current.get()
-    _running.intersection_update(() if run is None else (run.number,))
+    _running.intersection_update(() if run is None else (run,))

@@ -5,6 +5,7 @@ Body Dynamics Algorithms, 2008, sec. 7.3). A tree is eliminated once for any num
 are kept as three 3 × 3 blocks [A, B; Bᵀ, C], so that symmetry and zeros are used.
 """
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -77,6 +78,12 @@ class ArticulatedBody:
         U = {body: apply(inertias[body], S) for body, S in subspaces.items()}
         D_inverse = invert(sum(S.T @ U[body] for body, S in subspaces.items()))
         return {body: Elimination(U[body], D_inverse, inertias[body]) for body in subspaces}
+
+    def moving(self, tree: KinematicTree) -> "ArticulatedBody":
+        """The same elimination, for a tree in the same position at other rates."""
+        found = copy(self)
+        found.tree = tree
+        return found
 
     def motion(self, tau, wrenches=None):
         """Accelerations by joint and by body under gravity, generalised forces (n_v,) and wrenches {body: (6,)} on links."""

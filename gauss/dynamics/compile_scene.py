@@ -2,13 +2,14 @@
 
 from gauss.codegen import gc_pause
 from gauss.dynamics.system_dynamics import SystemDynamics
-from gauss.errors import SceneError, require
+from gauss.errors import SceneError, named_arguments, require
 from gauss.scene import Scene
 from gauss.system import System, build
 
 COORDINATES = ("auto", "tree", "maximal")
 
 
+@named_arguments
 def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     """System of a scene.
 

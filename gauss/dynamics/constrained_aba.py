@@ -5,12 +5,13 @@ of (S + μ) Δy = residual that converge to the unregularised solution (proximal
 2021). So redundant consistent constraints do no harm, and the same operations serve every state.
 """
 
+from copy import copy
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import LDLT, as_number
+from gauss.codegen import LDLT, as_number, entered
 from gauss.dynamics.aba import ArticulatedBody
 from gauss.dynamics.coupling_constraints import Couplings, RelationRows
 from gauss.dynamics.loop_joints import LoopJoint
@@ -59,18 +60,36 @@ class ConstrainedArticulatedBody:
     """
 
     def __init__(self, subsystem: Subsystem, q, v, relations):
-        self.subsystem, self.tree, self.v = subsystem, KinematicTree(subsystem, q, v), v
+        self.subsystem, self.q = subsystem, q
+        self._begin(v, relations)
         self.articulated = ArticulatedBody(self.tree)
-        self.loop_joints = [LoopJoint(self.tree, index, q, v) for index in subsystem.loop_joints]
+        self.unit_forces = [force for constraint in self.constraints for force in constraint.unit_forces]
+        sizes = [size for constraint in self.constraints for size in constraint.sizes]
+        self.scale = np.array([1.0 / np.sqrt(size) for size in sizes] + [None], dtype=object)[:-1]
+        self.velocity_rhs = np.concatenate([np.zeros(0), *(constraint.velocity_rhs for constraint in self.constraints)])
+
+    def _begin(self, v, relations):
+        """Set the rates, and what depends on them."""
+        subsystem = self.subsystem
+        self.tree, self.v = KinematicTree(subsystem, self.q, v), v
+        self.loop_joints = [LoopJoint(self.tree, index, self.q, v) for index in subsystem.loop_joints]
         self.constraints: list[LoopJoint | Couplings | RelationRows] = [
             *self.loop_joints,
             *([Couplings(subsystem)] if subsystem.couplings else []),
             *(RelationRows(self.tree, *found) for found in zip(subsystem.relations, relations, strict=True)),
         ]
-        self.unit_forces = [force for constraint in self.constraints for force in constraint.unit_forces]
-        sizes = [size for constraint in self.constraints for size in constraint.sizes]
-        self.scale = np.array([1.0 / np.sqrt(size) for size in sizes] + [None], dtype=object)[:-1]
-        self.velocity_rhs = np.concatenate([np.zeros(0), *(constraint.velocity_rhs for constraint in self.constraints)])
+
+    def moving(self, v, relations) -> "ConstrainedArticulatedBody":
+        """The same subsystem in the same position at other rates; what depends on the position alone is not made again."""
+        found = copy(self)
+        found._begin(v, relations)
+        found.articulated = self.articulated.moving(found.tree)
+        return found
+
+    def eliminated(self) -> "ConstrainedArticulatedBody":
+        """The same, with S factored."""
+        _ = self.unit_forces and self.factor
+        return self
 
     @cached_property
     def responses(self) -> list:
@@ -142,16 +161,21 @@ class ConstrainedArticulatedBody:
         return target - self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
 
     def correction(self, residual, rows) -> np.ndarray:
-        """Change (n_v,) of the joint accelerations that removes the residuals of :meth:`residual`.
+        """Change (n_v,) of the joint accelerations that removes the residuals of :meth:`residual`, see :meth:`damped`."""
+        return self.response(residual, self.damped(rows))[0]
 
-        Along rows with pivots below √MU accelerations are undetermined: their part of the residual is damped.
+    def damped(self, rows) -> np.ndarray:
+        """Residual (m,) of the loop constraints without its part along rows with pivots below √MU.
+
+        Accelerations along these are undetermined.
         """
-        if self.unit_forces:
-            damped, rows = LDLT(self.S + np.sqrt(MU) * np.eye(len(self.S))), self.scale * rows
-            for _ in range(2):
-                rows = rows - np.sqrt(MU) * damped.solve(rows)
-            rows = rows / self.scale
-        return self.response(residual, rows)[0]
+        if not self.unit_forces:
+            return rows
+        S, scale = entered(self.S, rows), entered(self.scale, rows)
+        factor, rows = LDLT(S + np.sqrt(MU) * np.eye(len(S))), scale * rows
+        for _ in range(2):
+            rows = rows - np.sqrt(MU) * factor.solve(rows)
+        return rows / scale
 
     def response(self, tau, target) -> tuple[np.ndarray, np.ndarray]:
         """Rates (n_v,) x and multipliers y with M x + Kᵀ y = tau and K x = target."""
@@ -183,13 +207,9 @@ class ConstrainedArticulatedBody:
         """Rates (n_v,), with those of loop joints replaced by those that follow from the tree."""
         return self._all_rates(self._by_joint(self.v), self.tree.carried(self.v), still=True)
 
-    def projected_rates(self, v) -> np.ndarray:
-        """Rates (n_v,) nearest to v in the mass metric with K v = C."""
-        return self._constrained(self._by_joint(v), self.tree.carried(v), still=True, target=self.velocity_rhs)[0]
-
-    def along(self, v) -> np.ndarray:
-        """Component of rates (n_v,) in the null space of K; the rest is orthogonal to it in the mass metric."""
-        return self._constrained(self._by_joint(v), self.tree.carried(v), still=True, target=0.0)[0]
+    def nearest(self, v, target) -> np.ndarray:
+        """Rates x (n_v,) nearest to v in the mass metric with K x = target."""
+        return self._constrained(self._by_joint(v), self.tree.carried(v), still=True, target=target)[0]
 
     def position_correction(self, phi, slack) -> np.ndarray:
         """Newton step (n_v,), the least in the mass metric, on the position residual.

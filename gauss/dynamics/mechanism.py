@@ -1,5 +1,7 @@
 """Dynamics of a system in joint coordinates: the equations of its subsystems, each by itself, over numbers or symbols."""
 
+from copy import copy
+
 import numpy as np
 
 from gauss.codegen import Scalar
@@ -51,11 +53,25 @@ class Mechanism:
 
     def __init__(self, system: System, q, v, t: Scalar = 0.0, subsystems=None):
         relations = _relations(system, State(t, q, v))
-        self.system = system
+        self.system, self.q, self.t = system, q, t
         self.bodies = [
             ConstrainedArticulatedBody(one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
             for one in (system.subsystems if subsystems is None else subsystems)
         ]
+
+    def moving(self, v) -> "Mechanism":
+        """The same system in the same position at other rates; what depends on the position alone is not made again."""
+        relations, found = _relations(self.system, State(self.t, self.q, v)), copy(self)
+        found.bodies = [
+            body.moving(v[body.subsystem.v], [relations[r.index] for r in body.subsystem.relations]) for body in self.bodies
+        ]
+        return found
+
+    def eliminated(self) -> "Mechanism":
+        """The same, with K M⁻¹ Kᵀ factored."""
+        for body in self.bodies:
+            body.eliminated()
+        return self
 
     def motion(self, tau, forces=None, feedback: list[BaumgarteFeedback] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the loop constraints.
@@ -96,6 +112,10 @@ class Mechanism:
         """Change (n_v,) of the joint accelerations that removes the residuals of :meth:`residual`."""
         pairs = zip(self.bodies, self._rows_of(rows), strict=True)
         return self._whole([body.correction(residual[body.subsystem.v], own) for body, own in pairs])
+
+    def damped(self, rows) -> np.ndarray:
+        """Residual (m,) of the loop constraints without its part along nearly dependent rows."""
+        return _joined([body.damped(own) for body, own in zip(self.bodies, self._rows_of(rows), strict=True)])
 
     def dependent_accelerations(self, rates) -> np.ndarray:
         """Joint accelerations (n_v,), with those of loop joints replaced by those that follow from the trees."""
@@ -146,13 +166,13 @@ class Mechanism:
         """Right side C of the velocity rows."""
         return _joined([body.velocity_rhs for body in self.bodies])
 
-    def projected_rates(self, v) -> np.ndarray:
-        """Rates (n_v,) nearest to v in the mass metric with K v = C."""
-        return self._whole([body.projected_rates(v[body.subsystem.v]) for body in self.bodies])
+    def nearest(self, v, target) -> np.ndarray:
+        """Rates x (n_v,) nearest to v in the mass metric with K x = target (m,).
 
-    def along(self, v) -> np.ndarray:
-        """Component of rates (n_v,) in the null space of K; the rest is orthogonal to it in the mass metric."""
-        return self._whole([body.along(v[body.subsystem.v]) for body in self.bodies])
+        With a target of zeros, v − x is orthogonal to the null space of K in the mass metric.
+        """
+        pairs = zip(self.bodies, self._rows_of(target), strict=True)
+        return self._whole([body.nearest(v[body.subsystem.v], own) for body, own in pairs])
 
     def power(self, multipliers) -> Scalar:
         """Power of rheonomic constraints [W]: −λᵀ C."""

@@ -5,7 +5,7 @@ conditions that they violate. The tables are in :mod:`gauss.dynamics.plan`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
 from gauss.codegen.tiers import AUTO, checked
@@ -81,7 +81,10 @@ class Plan:
 
     def ran(self, tier: str) -> "Plan":
         """Copy with the tier of the code that ran."""
-        return Plan(self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected, tier)
+        made = self.__dict__.setdefault("made", {})  # once for all motions of this plan
+        if tier not in made:
+            made[tier] = replace(self, tier=tier)
+        return made[tier]
 
     def to_json(self) -> str:
         """All fields as JSON."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
-from gauss.codegen import from_disk, gc_pause
+from gauss.codegen import compile_notice, from_disk, gc_pause
 from gauss.system import System
 
 T = TypeVar("T")
@@ -18,6 +18,11 @@ class Store:
         self._made: dict[Key, Any] = {}
         self._being_made: dict[Key, RLock] = {}
         self._lock = Lock()
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was made so far."""
+        return not self._made
 
     def on_demand(self, key: Key, make: Callable[[], T]) -> T:
         """Entry of a key, made on first request by one thread; other threads that request it wait.
@@ -35,7 +40,7 @@ class Store:
                 being_made = self._being_made.setdefault(key, RLock())
             with being_made:  # a lock for each key: making one entry may request others
                 if key not in self._made:
-                    with gc_pause():
+                    with gc_pause(), compile_notice():
                         self._made[key] = make()
                     self._being_made.pop(key, None)
         return self._made[key]
@@ -52,6 +57,11 @@ def cached(system: System, key: Key, make: Callable[[], T]) -> T:
         As of :meth:`Store.on_demand`.
     """
     return system.dynamics.on_demand(key, make) if isinstance(system.dynamics, Store) else make()
+
+
+def is_first_use(system: System) -> bool:
+    """Whether nothing was made for a system so far."""
+    return not isinstance(system.dynamics, Store) or system.dynamics.is_empty
 
 
 def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> T:

@@ -27,6 +27,7 @@ from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.point_layout import PointLayout
+from gauss.dynamics.shared_elimination import SharedElimination
 from gauss.dynamics.stabilisation import Drift
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
@@ -148,8 +149,7 @@ class Program:
         """Function (t, q, displacement or rates) → its component in the null space of K, in the mass metric."""
 
         def along(t, q, change):
-            still = np.zeros(self.system.n_v)
-            return Mechanism(self.system, q, still, t[0]).along(change)
+            return self.shared.nearest(self.shared.place(t, q), change, np.zeros(self.shares.size), 0.0)
 
         return write(along, 1, self.system.n_q, self.system.n_v, name="along")
 
@@ -192,25 +192,32 @@ class Program:
         """
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
-        mechanism = Mechanism(self.system, state.q, state.v, state.t)
-        tau, feedback = np.zeros(self.system.n_v) if tau is None else tau, self._feedback(mechanism, state)
-        if self.system.is_tree:
-            motion = kinematics(self.system, state)
-            left = (
-                inverse_dynamics_residual(motion, Applied(motion, self.loads), found) + tau,
-                mechanism.acceleration_residual(found, feedback),
-            )
-        else:
-            own, forces, _ = applied_loads(self.system, self.loads, state)
-            _, multipliers = mechanism.motion(own + tau, forces, feedback)
-            left = mechanism.residual(found, multipliers, own + tau, forces, feedback)
-        change = np.abs(mechanism.correction(*left)) * self.own
-        singularity = _singularity(self._monitored_pivots(mechanism))
+        change, rows, singularity = (self._tree_error if self.system.is_tree else self._loop_error)(state, found, tau)
+        change = np.abs(change) * self.own
         noise = NEAR_SINGULAR_ROUNDOFF * largest(state.v * self.own) ** 2 * singularity * np.sqrt(singularity)
         size = math.maximum(largest(found * self.own), self.error_scale(state.v)) + noise / ACCELERATION_TOLERANCE
-        rows = np.abs(left[1]) * self.shares
+        rows = np.abs(rows) * self.shares
         error = math.where(change.sum() <= FINITE_SUM, largest(change), np.inf)  # a maximum ignores NaN
         return np.array([error / size, rows.sum() / size], dtype=object)
+
+    def _tree_error(self, state: State, acceleration, tau):
+        """Error of the accelerations of a tree, residual of the constraints, singularity; by inverse dynamics of bodies."""
+        mechanism = Mechanism(self.system, state.q, state.v, state.t)
+        motion, rows = (
+            kinematics(self.system, state),
+            mechanism.acceleration_residual(acceleration, self.feedback(mechanism)),
+        )
+        residual = inverse_dynamics_residual(motion, Applied(motion, self.loads), acceleration)
+        residual = residual if tau is None else residual + tau
+        return mechanism.correction(residual, rows), rows, self.monitored(mechanism)[1]
+
+    def _loop_error(self, state: State, acceleration, tau):
+        """Error of the accelerations, residual of the constraints, singularity; by inverse dynamics in joint coordinates."""
+        shared, tau = (self.shared, ()) if tau is None else (self.shared_with_forces, tau)
+        place = shared.place([state.t], state.q)
+        *_, multipliers, (_, singularity) = shared.motion(place, state.v, tau)
+        change, rows, damped = shared.defect(place, state.v, tau, acceleration, multipliers)
+        return shared.nearest(place, change, damped, 0.0), rows, singularity
 
     def error_scale(self, v):
         """Size of accelerations below which errors are no longer relative to them, for rates v (n_v,)."""
@@ -234,36 +241,52 @@ class Program:
         return self._evaluated(t, q, v, tau)[1:]
 
     def _monitored_rates(self, t, q, v):
-        mechanism, acceleration, power = self._evaluated(t, q, v)
-        pivots = self._monitored_pivots(mechanism)
-        return acceleration, power, [_fold(math.minimum, [1.0, *pivots]), _singularity(pivots)]
+        acceleration, power, _, monitored = self.shared.motion(self.shared.place(t, q, often=True), v, often=True)
+        return acceleration, power, monitored
 
     def _evaluated(self, t, q, v, tau=None):
         state = State(t[0], q, v)
-        own, forces, power = applied_loads(self.system, self.loads, state)
+        own, forces, power = self.applied(state)
         mechanism = Mechanism(self.system, q, v, state.t)
         tau = own if tau is None else own + tau
-        acceleration, multipliers = mechanism.motion(tau, forces, self._feedback(mechanism, state))
+        acceleration, multipliers = mechanism.motion(tau, forces, self.feedback(mechanism))
         return mechanism, acceleration, power + np.array([mechanism.power(multipliers), 0.0, 0.0])
 
     def _projected_rates(self, t, q, v):
-        mechanism = Mechanism(self.system, q, v, t[0])
+        shared, m = self.shared, self.shares.size
+        place = shared.place(t, q, often=True)
         for _ in range(POSITION_STEPS):
-            q = retract(self.system, q, mechanism.position_correction(*loop_residual(self.system, q, t[0])))
-        v = Mechanism(self.system, q, v, t[0]).projected_rates(v)
-        residual = _fold(math.maximum, [0.0, *np.abs(loop_residual(self.system, q, t[0])[0] * self.shares)])
-        mechanism, *rates = self._evaluated(t, q, v)
-        return q, v, *rates, [_singularity(self._monitored_pivots(mechanism))], [residual]
+            q = retract(self.system, q, shared.newton_step(place, shared.loop_residual(t, q)))
+        place = shared.place(t, q, often=True)
+        v = shared.nearest(place, v, np.zeros(m), 1.0, often=True)
+        residual = _fold(math.maximum, [0.0, *np.abs(shared.loop_residual(t, q)[:m] * self.shares)])
+        acceleration, power, _, monitored = shared.motion(place, v, often=True)
+        return q, v, acceleration, power, monitored[1:], [residual]
 
-    def _monitored_pivots(self, mechanism: Mechanism):
-        """Pivots of S, if singular configurations are monitored."""
-        return mechanism.pivots if self.has_full_rank else ()
+    @cached_property
+    def shared(self) -> SharedElimination:
+        """Functions of its states that share one elimination."""
+        return SharedElimination(self)
 
-    def _feedback(self, mechanism: Mechanism, state: State):
+    @cached_property
+    def shared_with_forces(self) -> SharedElimination:
+        """The same where generalised forces are added to the loads."""
+        return SharedElimination(self, self.system.n_v)
+
+    def monitored(self, mechanism: Mechanism) -> list:
+        """Least pivot of S, and its singularity, 1 plus the sum of the inverse pivots; 1 if these are not monitored."""
+        pivots = mechanism.pivots if self.has_full_rank else ()
+        return [_fold(math.minimum, [1.0, *pivots]), 1.0 + sum(1.0 / pivot for pivot in pivots)]
+
+    def applied(self, state: State):
+        """Generalised forces, forces on bodies and power of its loads, see :func:`applied_loads`."""
+        return applied_loads(self.system, self.loads, state)
+
+    def feedback(self, mechanism: Mechanism):
         """Baumgarte feedback; None for other stabilisations."""
         if self.drift.gains is None:
             return None
-        return mechanism.baumgarte_feedback(*loop_residual(self.system, state.q, state.t), *self.drift.gains)
+        return mechanism.baumgarte_feedback(*loop_residual(self.system, mechanism.q, mechanism.t), *self.drift.gains)
 
     def projected(self, x):
         """Projected point with its rates, and the position residual."""
@@ -280,11 +303,6 @@ class Program:
         (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.projected_rates([state.t], state.q, state.v)
         q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
         return State(state.t, q, v), Rates(acceleration, power), rest
-
-
-def _singularity(pivots):
-    """1 plus the sum of the inverse pivots."""
-    return 1.0 + sum(1.0 / pivot for pivot in pivots)
 
 
 def off_unit(system: System, q):

@@ -1,4 +1,12 @@
-from gauss.integrators.control import SMALLEST_FACTOR, Tolerance, TrialStep, first_step, next_factor
+from gauss.integrators.control import (
+    SMALLEST_FACTOR,
+    Tolerance,
+    TrialStep,
+    first_length,
+    first_step,
+    next_factor,
+    trial_length,
+)
 from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
@@ -51,9 +59,11 @@ __all__ = [
     "advance",
     "compensation_size",
     "crossed_time",
+    "first_length",
     "first_step",
     "generalised_alpha",
     "method_state_of",
+    "trial_length",
     "next_factor",
     "reach",
 ]

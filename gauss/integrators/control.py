@@ -64,8 +64,15 @@ class Tolerance:
     def scale(self, system: System, state: State) -> np.ndarray:
         """Tolerance (2 n_v,) of (θ, v) in a state."""
         shares = np.ones((2, system.n_v)) if self.shares is None else self.shares
-        coordinates = self.atol * shares[0] + self.rtol * sizes(system, state.q)
-        return np.concatenate([coordinates, self.atol_rates * shares[1] + self.rtol * np.abs(state.v)])
+        return np.concatenate([self.of_coordinates(sizes(system, state.q), shares[0]), self.of_rates(state.v, shares[1])])
+
+    def of_coordinates(self, size, share):
+        """Tolerance of coordinates of a size, with their factors of the absolute tolerance."""
+        return self.atol * share + self.rtol * size
+
+    def of_rates(self, v, share):
+        """Tolerance of rates, with their factors of the absolute tolerance."""
+        return self.atol_rates * share + self.rtol * np.abs(v)
 
 
 @dataclass(frozen=True)
@@ -132,15 +139,29 @@ def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: 
     chart = Chart(equations, point.state)
     y = chart.start(point)
     scale = tolerance.scale(system, point.state)
-    norm = lambda part: np.sqrt(np.sum((part[: scale.size] / scale) ** 2) / scale.size)  # noqa: E731
+    square = lambda part: np.sum((part[: scale.size] / scale) ** 2)  # noqa: E731
     slope = chart.rate(y, point.rates)
-    size = norm(np.concatenate([sizes(system, point.state.q), point.state.v]))
+    squares = square(np.concatenate([sizes(system, point.state.q), point.state.v])), square(slope)
+    h = trial_length(system, *squares)
+    change = chart(point.state.t + h, y + h * slope) - slope
+    return first_length(system, order, h, squares[1], square(change))
+
+
+def trial_length(system: System, size: Scalar, slope: Scalar) -> Scalar:
+    """Length [s] of the step that estimates the second derivative, from the squared norms of a state and its slope."""
     T = system.scale.time  # the formula compares first and second derivatives: it needs a unit of time
-    d1 = T * norm(slope)
-    h = T * math.where(
+    size, d1 = (np.sqrt(square / (2 * system.n_v)) for square in (size, slope))
+    d1 = T * d1
+    return T * math.where(
         math.minimum(size, d1) < SMALLEST_NORM, SHORTEST_FIRST_STEP, 0.01 * size / math.maximum(d1, SMALLEST_NORM)
     )
-    d2 = T * T * norm(chart(point.state.t + h, y + h * slope) - slope) / h
+
+
+def first_length(system: System, order: int, h: Scalar, slope: Scalar, change: Scalar) -> Scalar:
+    """Initial step [s] from the squared norms of a slope, and of its change in a time h."""
+    T = system.scale.time
+    d1, d2 = (np.sqrt(square / (2 * system.n_v)) for square in (slope, change))
+    d1, d2 = T * d1, T * T * d2 / h
     largest = math.maximum(d1, d2)
     free = math.maximum(SHORTEST_FIRST_STEP, h * (1e-3 / T))
     longest = T * math.where(largest <= STATIONARY_SLOPE, free, _root(0.01 / math.maximum(largest, SMALLEST_DIVISOR), order))

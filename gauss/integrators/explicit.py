@@ -65,10 +65,15 @@ class ExplicitPair:
         scale = math.maximum(*(tolerance.scale(system, state) for state in ends))
         allowed = [scale] * len(estimates) if noise is None else [scale + np.abs(h * rounding) for rounding in noise]
         checked = slice(0, scale.size)  # (θ, v): the quadratures of work are not controlled
-        first, *second = (np.sum((estimate[checked] / size) ** 2) for estimate, size in zip(estimates, allowed, strict=True))
+        squares = (np.sum((estimate[checked] / size) ** 2) for estimate, size in zip(estimates, allowed, strict=True))
+        return self.error_of_squares(list(squares), scale.size, h)
+
+    def error_of_squares(self, squares: list, count: int, h: Scalar) -> Scalar:
+        """Error over the tolerance, from the sums of squares of ``count`` entries of each estimate over its tolerance."""
+        first, *second = squares
         if not second:
-            return h * np.sqrt(first / scale.size)
-        return h * first / np.sqrt(math.maximum((first + 0.01 * second[0]) * scale.size, SMALLEST_DIVISOR))
+            return h * np.sqrt(first / count)
+        return h * first / np.sqrt(math.maximum((first + 0.01 * second[0]) * count, SMALLEST_DIVISOR))
 
     def dense(self, equations: Equations, point: Point, h: Scalar, kept: np.ndarray) -> tuple[np.ndarray, int]:
         """Coefficients of dense output, and the evaluations of its extra stages."""
@@ -83,11 +88,15 @@ class ExplicitPair:
         """State and work at a time within a step from a point, by dense output."""
         chart = Chart(equations, point.state)
         start = chart.start(point)
-        x, y = (t - point.state.t) / h, np.zeros_like(start)
-        for i, coefficient in enumerate(coefficients.reshape(-1, start.size)[::-1]):
-            y = (y + coefficient) * (x if (len(self.pair.dense) + i) % 2 == 0 else 1.0 - x)
-        y = y + start
+        y = start + self.change(coefficients.reshape(-1, start.size), (t - point.state.t) / h)
         return chart.state(t, y), y[2 * chart.system.n_v :]
+
+    def change(self, coefficients: np.ndarray, x: Scalar) -> np.ndarray:
+        """Change of y within a step by dense output, x being the time relative to the step."""
+        y = np.zeros_like(coefficients[0])
+        for i, coefficient in enumerate(coefficients[::-1]):
+            y = (y + coefficient) * (x if (len(self.pair.dense) + i) % 2 == 0 else 1.0 - x)
+        return y
 
 
 EXPLICIT = (

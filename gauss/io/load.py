@@ -5,6 +5,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+from gauss.codegen import gc_pause
 from gauss.errors import ArgumentError, FileError, SceneError, StateError, did_you_mean, extra, require
 from gauss.io.catalog import families, servo_files, shipped
 from gauss.scene import Scene
@@ -129,7 +130,8 @@ def _read_toml(path: Path):
 def _read_urdf(path: Path, options, name: str) -> Scene:
     options = _known(str(path), options, ("root", "mimic", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
-    return replace(_robots().read_robot(path, options, extras), source=name)
+    with gc_pause():
+        return replace(_robots().read_robot(path, options, extras), source=name)
 
 
 def _robots():

@@ -7,6 +7,7 @@ cycle of crank angles is one call::
     Linkage --to_scene--> Scene
 """
 
+from gauss.errors import named_arguments, named_methods
 from gauss.linkages.balancing import shaking
 from gauss.linkages.chain import Chain, Dyad, Triad
 from gauss.linkages.columns import table
@@ -56,6 +57,9 @@ RENAMED = {  # former names, and those of today
     "Reduced": "ReducedLinkage",
     "Run": "CrankRun",
 }
+
+
+named_methods(named_arguments(Linkage))
 
 
 def __getattr__(name: str):

@@ -13,6 +13,7 @@ from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.decompose import decompose
 from gauss.linkages.elements import GROUND, CrankMotor, Driver, LinkJoint, Load, PlanarLink
 from gauss.scene import Scene, values
+from gauss.scene.builder import name_of
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Linkage:
 
     def revolute(self, name: str, parent, child, at=(0.0, 0.0), child_at=(0.0, 0.0)) -> LinkJoint:
         """Add a pin, at ``at`` in the frame of the parent and ``child_at`` in that of the child [m]."""
-        return self.add(LinkJoint(name, "revolute", _name(parent), _name(child), at, child_at))
+        return self.add(LinkJoint(name, "revolute", name_of(parent), name_of(child), at, child_at))
 
     def prismatic(
         self, name: str, parent, child, at=(0.0, 0.0), angle=0.0, child_at=(0.0, 0.0), child_angle=0.0
@@ -80,11 +81,11 @@ class Linkage:
 
         See :class:`gauss.linkages.LinkJoint` for the arguments.
         """
-        return self.add(LinkJoint(name, "prismatic", _name(parent), _name(child), at, child_at, angle, child_angle))
+        return self.add(LinkJoint(name, "prismatic", name_of(parent), name_of(child), at, child_at, angle, child_angle))
 
     def drive(self, joint, speed: float = 1.0, acceleration: float = 0.0, start: float = 0.0) -> Driver:
         """Drive the crank, in place of a former drive; see :class:`gauss.linkages.Driver`."""
-        return self.add(Driver(_name(joint), speed, acceleration, start))
+        return self.add(Driver(name_of(joint), speed, acceleration, start))
 
     def set_speed(self, speed: float) -> Driver:
         """Let the crank turn at another speed [rad/s], without acceleration."""
@@ -96,15 +97,15 @@ class Linkage:
 
     def load(self, link, force=(0.0, 0.0), moment: float = 0.0, **options) -> Load:
         """Load a link; see :class:`gauss.linkages.Load`."""
-        return self.add(Load(_name(link), force, moment, **options))
+        return self.add(Load(name_of(link), force, moment, **options))
 
     def mode(self, joint, mode: int):
         """Choose the assembly, +1 or −1, of the dyad with this inner joint; see :class:`gauss.linkages.Dyad`."""
-        self.modes[_name(joint)] = mode
+        self.modes[name_of(joint)] = mode
 
     def pose(self, link, pose):
         """Give the pose x, y [m], angle [rad] of the ternary link of a class III group near the start of the cycle."""
-        self.poses[_name(link)] = values.vector(pose, f"pose of link {_name(link)!r}", "m, m, rad", 3)
+        self.poses[name_of(link)] = values.vector(pose, f"pose of link {name_of(link)!r}", "m, m, rad", 3)
 
     def add(self, element):
         """Add a Link, LinkJoint, Driver, Motor or Load and return it.
@@ -239,7 +240,3 @@ class Linkage:
     def to_scene(self, angle: float | None = None, torque=None) -> Scene:
         """Return the same linkage as a Gauss scene; see :func:`gauss.linkages.scene.to_scene`."""
         return scenes.to_scene(self.chain, angle, torque)
-
-
-def _name(thing) -> str:
-    return thing if isinstance(thing, str) else getattr(thing, "name", thing)

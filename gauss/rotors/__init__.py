@@ -4,6 +4,7 @@ A :class:`Network` holds shafts, links and torques; :func:`simulate` integrates 
 coordinates; other functions give one instant, steady operation, vibrations, or the network as part of a scene.
 """
 
+from gauss.errors import named_arguments, named_methods
 from gauss.rotors.elements import Shaft, Torque, law_of
 from gauss.rotors.events import RotorEvent
 from gauss.rotors.explain import explain
@@ -91,6 +92,9 @@ RENAMED = {  # former names, and those of today
     "Gear": "GearPair",
     "Table": "TorqueTable",
 }
+
+
+named_methods(named_arguments(Network))
 
 
 def __getattr__(name: str):

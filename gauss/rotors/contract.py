@@ -81,7 +81,7 @@ def _torque_at_rest(torque: Torque) -> float:
     with suppress(Exception):  # a law of the user may ask for more than a shaft at rest
         if isinstance(torque.law, Dry):
             return abs(torque.law.value)
-        return abs(torque.law(torque.begin or 0.0, 0.0, 0.0))
+        return abs(float(torque.law(torque.begin or 0.0, 0.0, 0.0)))  # type: ignore[arg-type]  # numbers give a number
     return 0.0
 
 

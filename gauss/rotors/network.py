@@ -7,6 +7,7 @@ from gauss.rotors.elements import Shaft, Torque
 from gauss.rotors.friction_links import FrictionClutch, FrictionDrive, OneWayClutch, TorqueLimiter
 from gauss.rotors.links import GearPair, ShaftLink, TorsionSpring
 from gauss.scene import values
+from gauss.scene.builder import name_of
 
 
 @dataclass(frozen=True)
@@ -75,32 +76,32 @@ class Network:
 
     def torque(self, shaft, law, *, name: str | None = None, begin=None, until=None, role=None, breaks=()) -> Torque:
         """Load or drive a shaft; see :class:`Torque`."""
-        shaft = _name(shaft)
+        shaft = name_of(shaft)
         return self.add(Torque(name or self.fresh(f"torque on {shaft}"), shaft, law, begin, until, role, breaks))
 
     def gear(self, name: str, driven, driver, ratio: float, **options) -> GearPair:
         """Bind the speeds of two shafts; see :class:`GearPair`."""
-        return self.add(GearPair(name, _name(driven), _name(driver), ratio, **options))
+        return self.add(GearPair(name, name_of(driven), name_of(driver), ratio, **options))
 
     def friction_drive(self, name: str, driven, driver, ratio: float, curve, **options) -> FrictionDrive:
         """Drive a shaft by traction; see :class:`FrictionDrive`."""
-        return self.add(FrictionDrive(name, _name(driven), _name(driver), ratio, curve, **options))
+        return self.add(FrictionDrive(name, name_of(driven), name_of(driver), ratio, curve, **options))
 
     def spring(self, name: str, driven, driver, ratio: float = 1.0, **options) -> TorsionSpring:
         """Join two shafts by a torsion spring and damper, with or without backlash; see :class:`TorsionSpring`."""
-        return self.add(TorsionSpring(name, _name(driven), _name(driver), ratio, **options))
+        return self.add(TorsionSpring(name, name_of(driven), name_of(driver), ratio, **options))
 
     def clutch(self, name: str, driven, driver, torque, **options) -> FrictionClutch:
         """Join two shafts by a friction clutch; see :class:`FrictionClutch`."""
-        return self.add(FrictionClutch(name, _name(driven), _name(driver), torque=torque, **options))
+        return self.add(FrictionClutch(name, name_of(driven), name_of(driver), torque=torque, **options))
 
     def torque_limiter(self, name: str, driven, driver, torque: float, **options) -> TorqueLimiter:
         """Join two shafts by a slipping hub; see :class:`TorqueLimiter`."""
-        return self.add(TorqueLimiter(name, _name(driven), _name(driver), torque=torque, **options))
+        return self.add(TorqueLimiter(name, name_of(driven), name_of(driver), torque=torque, **options))
 
     def one_way(self, name: str, driven, driver, **options) -> OneWayClutch:
         """Join two shafts by a freewheel; see :class:`OneWayClutch`."""
-        return self.add(OneWayClutch(name, _name(driven), _name(driver), **options))
+        return self.add(OneWayClutch(name, name_of(driven), name_of(driver), **options))
 
     def fresh(self, name: str) -> str:
         """Name of a torque that is not taken."""
@@ -112,11 +113,7 @@ class Network:
 
     def require_shaft(self, name) -> str:
         """Return the name of a shaft that exists, or raise a SceneError that tells which do."""
-        name = _name(name)
+        name = name_of(name)
         if name not in self.shafts:
             raise SceneError(f"no shaft {name!r} in {self.name!r}. {did_you_mean(str(name), self.shafts)}")
         return name
-
-
-def _name(thing) -> str:
-    return thing if isinstance(thing, str) else getattr(thing, "name", thing)

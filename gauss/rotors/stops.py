@@ -41,7 +41,8 @@ def stops(duration: float, times: Timetable, switches: np.ndarray, samples: np.n
     samples : ndarray or None
         Times of samples [s].
     """
-    found = [StepEnd(before, after, before < after, ()) for before, after in times.stops(0.0, duration)]
+    found = [StepEnd(before, after, before < after, ()) for before, after in times.stops(0.0, duration)[:-1]]
+    found.append(StepEnd(times.last_end(0.0, duration), duration, False, ()))
     found += [StepEnd(t, t, True, ()) for t in np.asarray(switches, dtype=float).tolist() if 0 < t < duration]
     found += [StepEnd(t, t, False, (t,)) for t in ([] if samples is None else samples.tolist())]
     merged: list[StepEnd] = []

@@ -20,6 +20,7 @@ from gauss.rotors.traced_laws import TracedLaws
 
 CURVED = ("exp", "div", "sqrt", "log", "atan2")  # operations that may be flat in one region and steep in another
 KINKS = ("min", "max")  # conditions at which a law is continuous
+POINTS = 16  # random points at which sizes of expressions are taken
 STRIDE = (len(NODES) - 1) // PARTS  # nodes of a subinterval
 
 
@@ -41,7 +42,6 @@ class Surfaces:
 
     def __init__(self, laws: TracedLaws, rtol: float):
         self.rtol, reduced = rtol, laws.reduced
-        self.unit = min(1.0, float(reduced.inertia @ reduced.K**2) * reduced.largest**2)  # of ratios, of torques
         outputs = list(laws.outputs.values())
         own = laws.own | {node.index for node in of_time(outputs, laws.t)}
         comparisons, floors = _conditions(outputs, own)
@@ -55,6 +55,7 @@ class Surfaces:
         self.names = _discontinuous(laws, nodes)
         self.symbols = [laws.t, *laws.theta, *laws.w]
         self.accelerations = list(laws.t.graph.symbols("a", len(laws.w)))
+        self.units = self._sizes(self.curved, reduced.largest)
         self.rates = _rates([*self.functions, *self.curved], laws, self.symbols, self.accelerations)
         parts = [_terms(function) for function in self.functions]
         self.terms = list(dict.fromkeys(term for part in parts for term in part))
@@ -108,6 +109,17 @@ class Surfaces:
             return share, None
         return min(share, (0.5 * (found[0] + found[~together][0]) - begin) / (end - begin)), None
 
+    def _sizes(self, nodes: list[Expression], speed: float) -> np.ndarray:
+        """Typical sizes of expressions, each in its own unit: largest at random angles, speeds, and times of a radian."""
+        scales = np.array([1.0 / speed, *(1.0 for _ in self.accelerations), *(speed for _ in self.accelerations)])
+        points = np.random.default_rng(0).uniform(-1.0, 1.0, (len(scales), POINTS)) * scales[:, None]
+        points[0] = np.abs(points[0])
+        with np.errstate(all="ignore"):
+            given = {symbol.index: Interval.point(values) for symbol, values in zip(self.symbols, points, strict=True)}
+            found = np.array([np.broadcast_to(np.abs(value.low), POINTS) for value in enclose(nodes, given)])
+        found = found.reshape(-1, POINTS)
+        return np.where(np.isfinite(found), found, 0.0).max(axis=1, initial=0.0)
+
     def _enclosures(self, y: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Enclosures (…, 2, PARTS) of all functions, of their rates, and of the terms of switching functions."""
         n_g, both = len(self.accelerations), len(self.functions) + len(self.curved)
@@ -128,7 +140,7 @@ class Surfaces:
         least, most = at.min(axis=1, initial=np.inf), at.max(axis=1, initial=-np.inf)
         self.known = np.minimum(self.known[0], least), np.maximum(self.known[1], most)
         seen = np.maximum(np.abs(self.known[0]), np.abs(self.known[1]))
-        allowed = GRADUAL * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol * (seen + self.unit)
+        allowed = GRADUAL * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol * (seen + self.units)
         return (np.maximum(high - most[:, None], least[:, None] - low) > allowed[:, None]).any(axis=0)
 
     def _located(self, crossed, level, edges, dense: Callable, finest: float) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from gauss.servo.project import projected
 from gauss.servo.realisable import instant
 from gauss.servo.servo import Servo
 from gauss.servo.solve import saddle
-from gauss.servo.verdict import RANK_COSINE, UnrealisableError, Verdict, rank_lost
+from gauss.servo.verdict import RANK_COSINE, UnrealisableError, Verdict, rank_lost, row_lost
 from gauss.system import State, System
 
 CANCELLATION = 1e-3  # of the terms that cancel: least scale of accelerations
@@ -111,8 +111,16 @@ class ServoEngine(Engine):
 
     def lost(self, here: ServoInstant) -> Verdict:
         """Verdict of an instant at or next to which the rank of S is deficient by one."""
-        names = tuple(self.plan.scalars[self.servo.n_contacts + i].name for i in self.plan.active)
-        return rank_lost(here, names, self.servo.efforts)
+        return rank_lost(here, self._active, self.servo.efforts)
+
+    def unmoved(self, here: ServoInstant, rows: np.ndarray) -> Verdict:
+        """Verdict of an instant at or next to which some rows of the relations vanish."""
+        return row_lost(here, rows, self._active, self.servo.efforts)
+
+    @property
+    def _active(self) -> tuple[str, ...]:
+        """Names of the relations that servos hold."""
+        return tuple(self.plan.scalars[self.servo.n_contacts + i].name for i in self.plan.active)
 
     def efforts(self, here: ServoInstant, t: float) -> np.ndarray:
         """Efforts (j,) that hold the relations at a time [s]."""

@@ -25,7 +25,7 @@ from gauss.simulation.tolerances import shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.system import State
 
-LOST_RANK = 1e-3  # of the smallest singular value at the start: below it a motion that breaks off has lost rank of S
+LOST_RANK = 1e-3  # of the smallest singular value, or a row, at the start: below it a motion that breaks off has lost rank
 DEFAULT_ATOL = 1e-10  # of the scale of the scene
 JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the relation, not drift
 
@@ -134,6 +134,16 @@ class ServoRun(PythonRun):
         dynamics, last = self.servo_engine, self.points[1]
         here, first = dynamics.instant(last.state), dynamics.instant(self.points[0].state)
         now, before = (np.linalg.svd(one.cosines, compute_uv=False).min(initial=1.0) for one in (here, first))
+        faded = np.flatnonzero(here.lengths < LOST_RANK * first.lengths)
+        grown = self.system.scale.fastest(last.state.v) > self.system.scale.fastest(self.points[0].state.v) / LOST_RANK
+        if faded.size and grown:
+            verdict = dynamics.unmoved(here, faded)
+            share = (here.lengths[faded] / first.lengths[faded]).min()
+            return (
+                f"t = {last.state.t:.9g} s: {verdict.reason}; the row falls to {share:.1e} of that at the start, and rates "
+                f"grow to {np.abs(last.state.v).max():.1e}. {AVOID}",
+                verdict,
+            )
         if not now < LOST_RANK * before:
             return None
         verdict = dynamics.lost(here)

@@ -128,6 +128,14 @@ def rank_lost(instant: ServoInstant, relations: tuple[str, ...], efforts: tuple[
     return Verdict(relations, efforts, len(sigma) - 1, sigma, "rank lost", reason)
 
 
+def row_lost(instant: ServoInstant, rows: np.ndarray, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
+    """Verdict next to a position at which some rows of the relations vanish, as where an arm is stretched out."""
+    sigma = np.linalg.svd(instant.cosines, compute_uv=False)
+    named, left = _names(relations[row] for row in rows), len(relations) - len(rows)
+    reason = f"no motion of the joints changes {named} there: rank {left} of {len(relations)} is left"
+    return Verdict(relations, efforts, left, sigma, "rank lost", reason)
+
+
 def _clash(instant: ServoInstant, relations) -> str:
     """Names of rows that contacts determine, or that depend on each other; empty if there are none."""
     sizes = np.abs(instant.G) @ np.abs(instant.X_G).max(axis=1, initial=0.0)

@@ -4,12 +4,15 @@ import numpy as np
 
 from gauss import integrators
 from gauss.backends import Backend, ready
+from gauss.codegen import from_disk
 from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
+from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Baumgarte, drift
+from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
@@ -101,7 +104,19 @@ def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.
 
 def _start(system: System) -> State:
     """Initial state of the scene, cached."""
-    return system.initial_state() if system.dynamics is None else system.dynamics.on_demand((_start,), system.initial_state)
+    return cached(system, (_start,), lambda: _assembled(system) if system.has_closures else system.initial_state())
+
+
+def _assembled(system: System) -> State:
+    """Initial state of a scene with loops, from disk unless there is something to be warned of."""
+    found: list[State] = []
+
+    def make():
+        found.append(system.initial_state())
+        return found[0], not violations(system, found[0])
+
+    state, is_met = from_disk((_assembled, system), make)
+    return state if found or is_met else system.initial_state()
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
@@ -114,13 +129,21 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
     """
     if isinstance(breaks, tuple) and not breaks:
         return NO_TIMES.switches
-    try:
-        times = np.unique(start + np.asarray(breaks, dtype=float).reshape(-1))
-    except (TypeError, ValueError):
-        raise SimulationError(f"breaks: expected times [s], got {breaks!r}.") from None
+    times = start + _numbers(breaks, "breaks: expected times [s]").reshape(-1)
     if not np.isfinite(times).all():
         raise SimulationError(f"breaks: expected finite times [s], got {breaks!r}.")
-    return times[(times > start) & (times < start + duration)]
+    return np.unique(times[(times > start) & (times <= start + duration)])
+
+
+def _numbers(value, expected: str) -> np.ndarray:
+    """Array of numbers, or a SimulationError that says what was expected; text is no number."""
+    try:
+        found = np.asarray(value)
+    except ValueError:  # ragged
+        found = np.asarray(None)
+    if found.size and found.dtype.kind not in "iuf":
+        raise SimulationError(f"{expected}, got {value!r}.")
+    return found.astype(float)
 
 
 def chosen(integrator: str | Integrator) -> Integrator:
@@ -150,10 +173,7 @@ def sample_times(times, start: float, duration: float):
     """Times of the samples [s], checked; None for every accepted step."""
     if times is None:
         return None
-    try:
-        samples = start + np.asarray(times, dtype=float)
-    except (TypeError, ValueError):
-        raise SimulationError(f"times: expected increasing numbers [s], got {times!r}.") from None
+    samples = start + _numbers(times, "times: expected increasing numbers [s]")
     end = start + duration
     increasing = samples.ndim == 1 and samples.size > 0 and bool((samples[1:] > samples[:-1]).all())
     if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # False for NaN, too

@@ -12,7 +12,16 @@ from gauss.errors import SimulationError
 from gauss.integrators import Controlled, Taylor, crossed_time
 from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import single
-from gauss.simulation.step_limits import CHATTERING_PROGRESS, LEAST_RESTART_STEP, PROGRESS_TRIALS, steps_per_check
+from gauss.simulation.step_limits import (
+    CHATTERING_PROGRESS,
+    LEAST_RESTART_STEP,
+    PROGRESS_TRIALS,
+    SLIDING_CROSSINGS,
+    steps_per_check,
+)
+
+SLIDING_PROGRESS = 1e-5  # relative to the duration, per PROGRESS_TRIALS, below which a sliding motion is refused
+SLIDING_STEPS = 64  # over which crossings of switching surfaces are counted
 
 
 class CompiledAdaptiveRun(CompiledRun):
@@ -50,20 +59,35 @@ class CompiledAdaptiveRun(CompiledRun):
                     self._cross(self.after)
                 control.end, self.after = next(stops)
             loop(control, self.point, self.confirmed, grid, out, self.budget)
-            self._refuse_chatter()
+            self._refuse_chatter(grid, out)
             if control.status == LoopStatus.DONE and control.end < self.end:
                 control.status = LoopStatus.PAUSED
 
         self._drive(advance, out)
 
-    def _refuse_chatter(self):
+    def _refuse_chatter(self, grid: np.ndarray, out: np.ndarray):
         """Raise a SimulationError where conditions of laws on the state allow almost no progress."""
         control, t = self.control, self.point[0]
-        if not self.switching.conditional or control.steps + control.rejected - self.trials < PROGRESS_TRIALS:
+        trials = control.steps + control.rejected - self.trials
+        if not self.switching.conditional or trials < PROGRESS_TRIALS:
             return
-        if control.status == LoopStatus.PAUSED and t - self.measured_from < CHATTERING_PROGRESS * (self.end - self.start.t):
-            raise SimulationError(endless(self.measured_from, self.switching.conditional), self.trajectory())
+        if control.status == LoopStatus.PAUSED:
+            progress = (t - self.measured_from) / (self.end - self.start.t) * PROGRESS_TRIALS / trials
+            if progress < CHATTERING_PROGRESS or (progress < SLIDING_PROGRESS and self._slides(grid, out)):
+                raise SimulationError(endless(self.measured_from, self.switching.conditional), self.trajectory())
         self.trials, self.measured_from = control.steps + control.rejected, t
+
+    def _slides(self, grid: np.ndarray, out: np.ndarray) -> bool:
+        """Whether the next steps cross switching surfaces again and again."""
+        control, crossings = self.control, 0.0
+        for _ in range(SLIDING_STEPS):
+            self._gather(out)
+            begin = self.layout.point(self.point.copy())
+            self.loop(control, self.point, self.confirmed, grid, out, 1)
+            if control.status != LoopStatus.PAUSED:
+                return False
+            crossings += self.switching.share(begin, self.layout.point(self.point))[1]
+        return crossings > SLIDING_CROSSINGS * SLIDING_STEPS
 
     def _started(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Packed point of a state, its check, and its first step, by machine code."""

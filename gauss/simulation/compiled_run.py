@@ -23,7 +23,7 @@ from gauss.simulation.compiled_steps.taylor_step import compensation_size
 from gauss.simulation.prescribed import AfterJump, crossed
 from gauss.simulation.problem import Problem
 from gauss.simulation.progress import Progress
-from gauss.simulation.step_limits import BUDGET, SMALLEST_STEP
+from gauss.simulation.step_limits import BUDGET, smallest_step
 from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
 from gauss.system import State
 
@@ -56,7 +56,7 @@ class CompiledRun:
         duration = self.end - self.start.t
         work = max(1, self.system.n_v) ** 2 * problem.method.evaluations
         self.budget = max(1, int(BUDGET * min(1.0, BUDGET_WORK / work)))
-        limits = {"smallest": SMALLEST_STEP * duration, "largest": duration}
+        limits = {"smallest": smallest_step(duration, self.end), "largest": duration}
         self.control = Control(end=self.end, acceleration_tolerance=ACCELERATION_TOLERANCE, **limits)
 
     def _initial_method_state(self) -> tuple[np.ndarray | None, int]:

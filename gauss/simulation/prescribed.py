@@ -67,7 +67,7 @@ def of_impact(t: float, names, happened: Impact) -> Event:
 
 
 def beside_jumps(switching: Switching, start: State, end: float, samples, made: Callable) -> Trajectory:
-    """Motion with jumps of prescribed velocities at its start or at samples; these are samples just after the jump.
+    """Motion whose laws jump at its start, at its end or at samples; samples at a jump are those just after it.
 
     Parameters
     ----------
@@ -76,27 +76,30 @@ def beside_jumps(switching: Switching, start: State, end: float, samples, made: 
     start : State
         Initial state.
     end : float
-        Final time [s].
+        Final time [s]; where a law switches there, steps end just before it.
     samples : ndarray or None
         Times to return [s].
     made : callable
-        (start, samples) → trajectory, without samples at a jump.
+        (start, end, samples) → trajectory, without samples at a jump.
     """
-    if not switching.jumps:
-        return made(start, samples)
+    last = switching.times.last_end(start.t, end)
+    if not switching.jumps and last == end:
+        return made(start, end, samples)
     times = samples
     for before, after in switching.times.stops(start.t, end):
         if samples is not None and switching.jumps.within(before, after):
             times = np.where((times > before) & (times < after), after, times)
     begun = _begun(switching.jumps, start, end)
-    if begun is not None and samples is not None:
-        times = np.maximum(times[times > start.t], begun.state.t)
+    if samples is not None:
+        times = times if begun is None else np.maximum(times[times > start.t], begun.state.t)
+        times = np.append(times[times < last], np.full((times >= last).sum(), last))
     try:
-        return _shown(made(start if begun is None else begun.state, times), start, begun, samples)
+        found = made(start if begun is None else begun.state, last, times)
     except SimulationError as error:
         if error.trajectory is not None:
             error.trajectory = _shown(error.trajectory, start, begun, samples)
         raise
+    return _ended(_shown(found, start, begun, samples), switching.jumps, last, end)
 
 
 def _begun(jumps: Jumps, start: State, end: float) -> AfterJump | None:
@@ -114,3 +117,22 @@ def _shown(found: Trajectory, start: State, begun: AfterJump | None, samples) ->
             columns = {name: np.concatenate([[first[name]], column]) for name, column in columns.items()}
         found = replace(found, **columns, events=(begun.event, *found.events))
     return found if samples is None else replace(found, t=samples[: len(found)])
+
+
+def _ended(found: Trajectory, jumps: Jumps, last: float, end: float) -> Trajectory:
+    """Motion whose last sample, just before the final time, is just after a jump there; no impact without that sample."""
+    if last == end or not len(found) or found.t[-1] < last:
+        return found
+    rows = {name: getattr(found, name).copy() for name in ("t", "q", "v", "work")}
+    rows["t"][-1] = end
+    try:
+        reached = crossed(jumps, State(last, rows["q"][-1], rows["v"][-1]), rows["work"][-1], end)
+    except SimulationError as error:
+        error.trajectory = replace(found, **rows)
+        raise
+    if reached is None:
+        return replace(found, **rows)
+    after = {"t": end, "q": reached.state.q, "v": reached.state.v, "work": reached.work}
+    for name, value in after.items():
+        rows[name][-1] = value
+    return replace(found, **rows, events=(*found.events, reached.event))

@@ -32,14 +32,15 @@ from gauss.simulation.step_limits import (
     CHATTERING_PROGRESS,
     LEAST_RESTART_STEP,
     PROGRESS_TRIALS,
+    SLIDING_CROSSINGS,
     SMALLEST_STEP,
+    smallest_step,
     too_small,
 )
 from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.simulation.undetected_switching import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
 from gauss.system import State, System
 
-SLIDING_CROSSINGS = 0.25  # crossings of switching surfaces per trial step, above which a motion slides along one of them
 SLIDING_PROGRESS = 1e-3  # relative to the duration, per PROGRESS_TRIALS, below which a sliding motion is refused
 WHOLE_STEP = 1.0 - 1e-12  # a step that reaches this share of the remaining time goes to its end
 
@@ -128,7 +129,7 @@ class PythonRun:
 
     def _until(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
         """Accepted points up to a switching time, each with the next step size and the dense output."""
-        largest, smallest = duration if self.step is None else self.step, SMALLEST_STEP * duration
+        largest, smallest = duration if self.step is None else self.step, smallest_step(duration, self.end)
         trials, measured_from = 0, point.state.t
         while point.state.t < end:
             trials += 1
@@ -139,7 +140,9 @@ class PythonRun:
             remaining = end - point.state.t
             tried = remaining if h >= remaining * WHOLE_STEP else h
             if not tried >= smallest:  # or NaN
-                point, h = self._handed_over(point, method, SimulationError(too_small(point.state.t, self.tolerance.rtol)))
+                laws = self.switching.conditional + self.switching.called
+                error = SimulationError(too_small(point.state.t, self.tolerance.rtol, laws))
+                point, h = self._handed_over(point, method, error)
                 continue
             try:
                 reached, h, kept = self._trial(method, point, tried, smallest, None if tried < remaining else end)

@@ -47,5 +47,5 @@ def _refuse_friction(problem: Problem):
     if method.name not in [explicit.name for explicit in integrators.EXPLICIT]:  # dense output of others costs a step each
         raise SimulationError(
             f"integrator {method.name!r} does not locate the events of unilateral constraints, friction and limited "
-            f"forces; use 'dop853' for {', '.join(system.scene.changing)}."
+            f"forces; use 'dop853' for {', '.join(system.scene.nonsmooth)}."
         )

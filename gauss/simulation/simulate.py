@@ -1,5 +1,6 @@
 """Simulation of a motion: check the arguments, select the plan, and let its driver compute the trajectory."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 
@@ -14,12 +15,14 @@ from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Baumgarte
-from gauss.errors import SimulationError, judged_later, require
+from gauss.dynamics.store import is_first_use
+from gauss.errors import SimulationError, judged_later, named_arguments, require
 from gauss.integrators import Integrator
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, described
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.energy_balance import watch_balance
+from gauss.simulation.history import History
 from gauss.simulation.prescribed import beside_jumps
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
@@ -28,6 +31,7 @@ from gauss.simulation.verify import verified
 from gauss.system import State, System
 
 
+@named_arguments
 def simulate(
     scene: Scene | System,
     duration: float,
@@ -96,7 +100,7 @@ def simulate(
     verify : bool
         Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool
-        Show a progress bar on runs of more than a second, in a terminal.
+        In a terminal, show a progress bar on runs of more than a second, and a line while code is made for as long.
     plan : Plan, optional
         Driver and dynamics to be used, if their conditions hold, instead of the first row of
         :data:`gauss.dynamics.plan.MOTIONS` whose conditions hold; ``stats.plan`` tells which it was. Its ``tier`` chooses
@@ -114,7 +118,8 @@ def simulate(
         loops record it along the motion, other motions are checked at a few samples; :func:`gauss.energy` checks all.
     SwitchingWarning
         If a law may have switched between two evaluations: fixed steps and methods of libraries do not locate conditions on
-        the state, and nothing is known of opaque laws between evaluations.
+        the state, and nothing is known of opaque laws between evaluations. If the value of a law depends on what it keeps
+        from one call for the next.
     SlowRouteWarning
         Once for each system, if an element of the scene makes the motion a hundred times slower than machine code.
 
@@ -128,14 +133,16 @@ def simulate(
     """
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
-    with gc_pause(), one_tier(AUTO if plan is None else plan.tier) as run:
+    later = isinstance(scene, System) and not is_first_use(scene)
+    with nullcontext() if later else gc_pause(), one_tier(AUTO if plan is None else plan.tier, progress) as run:
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
-        settings = described(problem, duration, integrator, rtol, atol)
+        settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
         found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)
+    history.warn(found)
     if plan is None and not own_backend(problem.question):
         warn_of_slow_route(problem.system, found.stats.plan, found.stats.evaluations)
     return found
@@ -158,9 +165,9 @@ def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
     """Trajectory of a problem by the driver of a plan, with the jumps of prescribed velocities at its samples."""
 
-    def driven(start: State, samples) -> Trajectory:
-        same = start is problem.start and samples is problem.samples
-        return DRIVERS[plan.driver](problem if same else problem._replace(start=start, samples=samples), plan)
+    def driven(start: State, end: float, samples) -> Trajectory:
+        same = start is problem.start and end == problem.end and samples is problem.samples
+        return DRIVERS[plan.driver](problem if same else problem._replace(start=start, end=end, samples=samples), plan)
 
     with judged_later():
         return beside_jumps(problem.switching, problem.start, problem.end, problem.samples, driven)

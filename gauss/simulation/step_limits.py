@@ -1,18 +1,27 @@
 """Limits of the step and of its progress in Python and compiled loops, and the messages where they are reached."""
 
+import numpy as np
+
 SMALLEST_STEP = 1e-13  # relative to the duration: below it rounding of time dominates
 LEAST_RESTART_STEP = 1e-6  # relative to the duration: least first step after a switching time; error control reduces it
 PROGRESS_TRIALS = 500  # trial steps over which progress is measured
 CHATTERING_PROGRESS = 1e-7  # relative to the duration, per PROGRESS_TRIALS, below which a law chatters
+SLIDING_CROSSINGS = 0.25  # crossings of switching surfaces per trial step, above which a motion slides along one of them
 BUDGET = 4096  # steps of one call of a compiled loop: between calls, the bar moves and Ctrl-C is handled
 EVALUATIONS_PER_CHECK = 48  # a check costs as much as two and a half evaluations
 
 
-def too_small(t: float, rtol: float) -> str:
-    """Message when the step size underflows."""
+def smallest_step(duration: float, end: float) -> float:
+    """Smallest step of a motion [s]: large enough to change the time."""
+    return max(SMALLEST_STEP * duration, float(np.spacing(max(abs(end - duration), abs(end)))))
+
+
+def too_small(t: float, rtol: float, laws: tuple[str, ...]) -> str:
+    """Message when the step size underflows; the conditions of some laws on the state may be the cause."""
+    cause = f", or the law of {', '.join(map(repr, laws))} jumps again and again" if laws else ""
     return (
         f"t = {t:.6g} s: the step size fell below the resolution of time, yet its error exceeds rtol {rtol:g}: "
-        "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
+        f"the motion is singular or very stiff here{cause}. Loosen the tolerance, or look at the motion so far."
     )
 
 

@@ -71,6 +71,8 @@ def check_tolerances(**numbers):
             _pair(value, name)
         elif not _is_positive(value):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
+        elif name == "rtol" and value >= 1.0:
+            raise SimulationError(f"rtol: expected a number below 1, a share of each coordinate and rate, got {value!r}.")
 
 
 def _pair(value, what: str) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
@@ -195,7 +196,15 @@ class Trajectory:
         return f"Trajectory({self.system.scene.name!r}, {len(self)} samples, {span})"
 
     def state(self, index: int) -> State:
-        """State of one sample."""
+        """State of one sample; the last one is -1.
+
+        Raises
+        ------
+        StateError
+            If there is no such sample.
+        """
+        if not isinstance(index, Integral) or not -len(self) <= index < len(self):
+            raise StateError(f"state: expected the index of a sample, from {-len(self)} to {len(self) - 1}, got {index!r}.")
         return State(float(self.t[index]), self.q[index], self.v[index])
 
     @cached_property

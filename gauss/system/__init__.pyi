@@ -15,6 +15,7 @@ from gauss.system.manifold import (
     retract,
     rounded,
     sizes,
+    turned,
     velocity_lead,
 )
 from gauss.system.named_access import View
@@ -61,5 +62,6 @@ __all__ = [
     "sides",
     "sizes",
     "velocity_lead",
+    "turned",
     "whole",
 ]

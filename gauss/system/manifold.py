@@ -23,9 +23,14 @@ def retract(system: System, q: Shaped[np.ndarray, " nq"], theta: Shaped[np.ndarr
         if k is None:
             moved[joint.q] = here + step
             continue
-        Q = rotations.multiply(here[k:], rotations.exponential(step[k:]))
-        moved[joint.q] = np.concatenate([here[:k] + step[:k], Q / np.sqrt(Q @ Q)])
+        moved[joint.q] = np.concatenate([here[:k] + step[:k], turned(here[k:], step[k:])])
     return moved
+
+
+def turned(Q: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Unit quaternion Q ∘ exp(θ), for a rotation vector θ."""
+    moved = rotations.multiply(Q, rotations.exponential(theta))
+    return moved / np.sqrt(moved @ moved)
 
 
 def displacement(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from gauss import math
 from gauss.scene import values
+from gauss.scene.stateful_laws import preserved
 
 LENGTH_FIELDS = ("at", "child_at", "other_at", "length", "radius", "crown", "on_radius", "size", "points")
 LEAST_CHANGE = 1e-9  # of a law, relative to its value at the begin: less is round-off
@@ -246,7 +247,8 @@ def _quickest(law, unit: float) -> float:
 
 def _value(law, t: float) -> np.ndarray:
     """Value of a law of time; nothing where it has none, or asks for more than the time."""
-    with suppress(Exception), np.errstate(all="ignore"):  # a law of the user's, outside of the times that it is made for
+    # A law of the user's may fail outside of the times that it is made for, and may keep something from a call.
+    with suppress(Exception), preserved(law), np.errstate(all="ignore"):
         if values.arguments(law) == 1:
             return np.nan_to_num(np.atleast_1d(np.asarray(values.evaluate(law, t), dtype=float)), posinf=0.0, neginf=0.0)
     return np.zeros(1)

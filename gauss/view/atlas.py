@@ -1,11 +1,11 @@
 """Heat map of the stability atlas."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+
+from gauss.view.style import PAGE_DPI, saved
 
 COLOURS = ("#7fbf7b", "#fee08b", "#d9d9d9", "#f0f0f0", "#d7191c")  # passed, degraded, honest, slow, silent
 
@@ -45,6 +45,4 @@ def plot_atlas(methods, cases, verdicts, figures, order, path=None, title: str =
     handles = [Patch(facecolor=colour, edgecolor="0.6", label=name) for name, colour in zip(order, COLOURS, strict=True)]
     figure.legend(handles=handles, loc="outside upper right", ncols=len(order), fontsize=8, frameon=False)
     axes.set_title(f"Figures: the criterion of each case [1]; {title}", fontsize=9, loc="left")
-    if path is not None:
-        figure.savefig(Path(path), dpi=140)
-    return figure
+    return saved(figure, path, PAGE_DPI)

@@ -1,10 +1,10 @@
 """Figures of the comparison of backends: errors, time against error, performance profiles."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+
+from gauss.view.style import PAGE_DPI, saved
 
 SMALLEST_SHOWN, LARGEST_SHOWN = 1e-17, 1e1  # of the errors that are drawn; what is off is drawn at the edge
 COLOURS = {"low": "#9ecae1", "mid": "#4292c6", "high": "#08519c", "tightest": "#08306b", "own": "#d95f02"}
@@ -40,7 +40,7 @@ def plot_errors(names, problems, errors, broken, path=None, title: str = "") -> 
     axes.set_yticks(range(len(names)), names, fontsize=8)
     figure.colorbar(image, ax=axes, label="relative error of the accelerations [1]", fraction=0.03)
     axes.set_title(f"{title}\nframed: claimed success, residuals above the tolerance and rounding; –: no answer", fontsize=9)
-    return _saved(figure, path)
+    return saved(figure, path, PAGE_DPI)
 
 
 def plot_time_error(rows, names, path=None, title: str = "") -> Figure:
@@ -61,7 +61,7 @@ def plot_time_error(rows, names, path=None, title: str = "") -> Figure:
     handles = [figure.axes[0].scatter([], [], s=14, color=colour) for colour in COLOURS.values()]
     figure.legend(handles, COLOURS, loc="outside lower center", ncols=len(COLOURS), fontsize=9, frameon=False)
     figure.suptitle(title, fontsize=10)
-    return _saved(figure, path)
+    return saved(figure, path, PAGE_DPI)
 
 
 def _answers(axes, everything: np.ndarray, mine: list[dict], name: str):
@@ -99,7 +99,7 @@ def plot_profiles(profiles: dict[str, dict], ratios, path=None, title: str = "")
     for axes in panels[:, 0]:
         axes.set_ylabel("share of the problems [1]")
     figure.suptitle(title, fontsize=10)
-    return _saved(figure, path)
+    return saved(figure, path, PAGE_DPI)
 
 
 def _point(row) -> tuple[float, float]:
@@ -110,9 +110,3 @@ def _frame(j: int, i: int):
     from matplotlib.patches import Rectangle
 
     return Rectangle((j - 0.47, i - 0.47), 0.94, 0.94, fill=False, edgecolor="black", linewidth=1.4)
-
-
-def _saved(figure: Figure, path) -> Figure:
-    if path is not None:
-        figure.savefig(Path(path), dpi=140)
-    return figure

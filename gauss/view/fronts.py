@@ -6,7 +6,8 @@ from typing import cast
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.view.backends import LARGEST_SHOWN, SMALLEST_SHOWN, _saved
+from gauss.view.backends import LARGEST_SHOWN, SMALLEST_SHOWN
+from gauss.view.style import PAGE_DPI, saved
 
 Panel = tuple[Mapping[str, Sequence[float]], list[str]]  # times and errors by solver, and the names of those on the front
 MARKERS = "osD^v<>PX*"
@@ -49,7 +50,7 @@ def plot_fronts(names, overall: Panel, panels: Mapping[str, Panel], path=None, t
         for small in grid.flat[len(panels) :]:
             small.set_visible(False)
     figure.suptitle(f"{title}; lines: Pareto fronts", fontsize=10)
-    return _saved(figure, path)
+    return saved(figure, path, PAGE_DPI)
 
 
 def _panel(axes, points: Mapping[str, Sequence[float]], best: list[str], styles: dict[str, dict], size: float):

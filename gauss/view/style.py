@@ -12,6 +12,7 @@ LINES = ("-", "--", "-.", ":")
 INK = "#333333"
 NAMED = 12  # more curves than this need no legend: nobody can tell them apart
 DPI = 150
+PAGE_DPI = 140  # of figures beside pages of results
 
 
 def check_format(path):
@@ -30,7 +31,7 @@ def check_format(path):
         raise FileError(f"{path}: there is no folder {str(Path(path).parent)!r}.")
 
 
-def saved(figure: Figure, path) -> Figure:
+def saved(figure: Figure, path, dpi: int = DPI) -> Figure:
     """Figure, saved if there is a path.
 
     Raises
@@ -40,7 +41,7 @@ def saved(figure: Figure, path) -> Figure:
     """
     if path is not None:
         try:
-            figure.savefig(path, dpi=DPI)
+            figure.savefig(path, dpi=dpi)
         except OSError as error:
             raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
     return figure

@@ -47,6 +47,7 @@ def test_forward_dynamics_undone(scene):
     assert found.forces == pytest.approx([7.0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_prescribed_motion_takes_the_same_force():
     scene = mechanisms.four_bar()
     scene.starts.clear()
@@ -85,7 +86,7 @@ def test_what_the_drives_cannot_do_is_said():
         gauss.inverse_dynamics(loop, loop.initial_state(), [1.0, 0, 0, 0], ["A"])
 
 
-def test_a_drive_without_grip_is_said():
+def test_a_drive_that_holds_nothing_is_named():
     """At its dead point a slider cannot turn the crank."""
     system = gauss.compile_scene(gauss.load("slider_crank"))
     state = system.initial_state()

@@ -88,3 +88,15 @@ def test_the_doctor_says_what_is_missing(monkeypatch):
     assert "no_such_package not installed" in findings["[results]"].text
     assert findings["[results]"].remedy == "pip install no_such_package"
     assert not findings["machine code"].works and "ZeroDivisionError" in findings["machine code"].text
+
+
+def test_the_doctor_lists_and_empties_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("GAUSS_CACHE", str(tmp_path / "cache"))
+    for name in (object_cache.key("code"), "made-" + object_cache.key("entry")):
+        object_cache.write(name, bytes(500_000))
+    (tmp_path / "cache" / "numbers.txt").write_text("of the user")
+    listed = {finding.name: finding.text for finding in doctor.examine_cache()}
+    assert "2 files" in listed["cache"] and listed["object code"] == listed["by content"] == "1 files, 0.5 MB"
+    emptied = {finding.name: finding.text for finding in doctor.examine_cache(empty=True)}
+    assert "2 files" in emptied["emptied"] and emptied["object code"].startswith("0 files")
+    assert {path.name for path in (tmp_path / "cache").iterdir()} == {"key", "numbers.txt"}

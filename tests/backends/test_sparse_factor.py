@@ -67,7 +67,7 @@ def test_states_of_a_long_ladder_meet_their_constraints():
     assert np.abs(velocity_residual_of(system, kinematics(system, state))).max() <= 1e-12
 
 
-def test_rows_that_fade_are_left_to_the_dense_factorisation():
+def test_near_dependent_rows_are_left_to_the_dense_factorisation():
     """The flat ladder: the sparse answer is not certified, so the dense one is given."""
     system, _ = _ladder()
     signs = np.array([-1.0 if name.startswith("B") else 1.0 for name in system.coordinates])

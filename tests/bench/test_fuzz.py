@@ -38,7 +38,7 @@ def test_certificates_hold_for_every_body():
         assert (errors <= solution.certificate.body_errors).all()
 
 
-def test_an_answer_that_hinges_on_a_fading_row_is_not_certified():
+def test_an_answer_that_hinges_on_a_near_dependent_row_is_not_certified():
     _, compulsion = fuzzed(0, FOLDED)
     right, other = gauss.solve(compulsion), gauss.solve(compulsion, "gradient")
     assert right.status.certified and not other.status.certified

@@ -243,6 +243,7 @@ SMALLEST_OF = {  # a small problem of each class, few of whose multipliers are u
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name"), SMALLEST_OF.items())
 def test_errors_of_x_and_of_multipliers_are_those_that_were_put_in(kind, name):
     """Modulo loose directions, and in any units: those of a solver are small, of shifted ones as large as the shift."""

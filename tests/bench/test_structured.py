@@ -126,6 +126,7 @@ def test_files_of_the_suite_are_instances_again(tmp_path, form, name):
     assert np.array_equal(ours.c, theirs.c)
 
 
+@pytest.mark.slow
 def test_a_class_of_cones_has_a_table(tmp_path):
     names, asked = ["coulomb balls 1"], ["newton", "admm", "daqp", "recursion"]
     table = compare_class(tmp_path, COULOMB, problems=names, backends=asked, levels=["high"], progress=False)

@@ -77,6 +77,7 @@ def test_a_wrong_reference_is_refused(few, part):
     assert tried
 
 
+@pytest.mark.slow
 def test_infeasible_and_unbounded_ones_are_proven_in_rational_arithmetic(some):
     """Certificates hold exactly, but that of noise, whose rows are no round numbers."""
     for instance in [i for i in some["infeasible"] if "noisy" not in i.name]:
@@ -123,6 +124,7 @@ def test_references_agree_with_those_of_fifty_digits(name):
     assert set(right.active) <= set(found.reference.active)
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 def test_a_foreign_solver_finds_answers_and_multipliers_of_the_same_signs(some):
     """Signs and places of multipliers are those of qpsolvers, where they are unique."""

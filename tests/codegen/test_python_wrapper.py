@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from gauss.codegen import Interface, PythonWrapper, cpython_layout, fastcall, write
+from gauss.codegen import Interface, PythonWrapper, cpython_layout, entry_code, fastcall, write
 from gauss.errors import StateError
 
 N = 3
@@ -34,7 +34,7 @@ def make(otherwise=lambda *_: np.full(4, -1.0)):
     function = write(lambda q, v, t: [*formula(q, v, t[0]), np.abs(q[0])], N, N, 1)
     interface = Interface({"q": N, "v": N}, "t", limits=(LIMIT,))
     other = PythonWrapper(lambda x: otherwise(*interface.split(x)), replace(interface, limits=()), 4, None, "f", "Another.")
-    return fastcall(function, interface, other, "f", "Four numbers.")
+    return fastcall(entry_code(function, interface), interface, other, "f", "Four numbers.")
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +166,9 @@ def test_another_function_gets_the_arguments_as_they_are(machine_code):
     asked = []
     function = write(lambda q, v, t: [*formula(q, v, t[0]), np.abs(q[0])], N, N, 1)
     interface, out, far = Interface({"q": N, "v": N}, "t", limits=(LIMIT,)), np.zeros(4), Q + [2 * LIMIT, 0, 0]
-    f = fastcall(function, interface, lambda *args, **named: asked.append((args, named)), "f", "Four numbers.")
+    f = fastcall(
+        entry_code(function, interface), interface, lambda *args, **named: asked.append((args, named)), "f", "Four numbers."
+    )
     f(far, V, out=out)
     f(far, V, out, 2.0)
     f(list(far), V)

@@ -1,5 +1,6 @@
 """Quick and optimised machine code: the same digits, one tier for each run, a clean end of the process at any time."""
 
+import io
 import os
 import subprocess
 import sys
@@ -9,11 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, tiers, write
+import gauss
+from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, terminal_line, tiers, write
 from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
+from gauss.codegen.module_units import FUNCTION, ModuleUnits
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.errors import ArgumentError
+from gauss.io.catalog import shipped
 
 ROOT = Path(__file__).parents[2]
 PATIENCE = 60.0  # limit of waiting [s], against a test that hangs
@@ -53,11 +57,13 @@ class Caller:
 
 
 def test_units_are_the_module():
-    """Each function is in one unit, and each unit is small."""
-    units = object_code.units(text(1.0))
-    names = [name for unit in units for name in object_code.NAME.findall("".join(object_code.FUNCTION.findall(unit)))]
-    assert len(units) == text(1.0).count("\ndefine ") > 2
-    assert {'@"run"'} < set(names)
+    """Each function is in one unit, and nothing else is."""
+    whole = ModuleUnits(text(1.0))
+    functions = [function for unit in whole.short(1) for function in FUNCTION.findall(unit)]
+    assert len(functions) > 2 and functions == whole.functions
+    without, having = whole.apart(lambda function: "inner" in function)
+    assert sorted(FUNCTION.findall(without) + FUNCTION.findall(having)) == sorted(functions)
+    assert all(("inner" in function) == (function in having) for function in functions)
 
 
 def test_packed_objects_are_unpacked():
@@ -172,6 +178,7 @@ SCRIPT = """
 import os, sys, time
 import gauss
 from gauss.codegen import optimiser
+from gauss.codegen.module_units import FUNCTION, ModuleUnits
 from gauss.codegen.optimiser import OPTIMISER
 optimiser.REST = 0.0
 system = gauss.compile_scene(gauss.load("n_four_bar", n=3))
@@ -221,3 +228,82 @@ def test_waiting_ends_at_its_limit():
     assert not OPTIMISER.wait(0.01) and time.perf_counter() - began < PATIENCE
     OPTIMISER.go_on()
     assert OPTIMISER.wait(PATIENCE) and code.tier == tiers.OPTIMISED
+
+
+@pytest.mark.parametrize("is_terminal, shown, lines", [(True, True, 1), (True, False, 0), (False, True, 0)])
+def test_a_line_appears_on_a_terminal_while_code_is_made_for_long(is_terminal, shown, lines, monkeypatch):
+    stream = io.StringIO()
+    stream.isatty = lambda: is_terminal
+    monkeypatch.setattr(sys, "stderr", stream)
+    notices = terminal_line
+    monkeypatch.setattr(notices, "SLOW", 0.0)
+    with one_tier(shown=shown), notices.compile_notice(), notices.compile_notice():
+        limit = time.monotonic() + (PATIENCE if lines else 0.05)
+        while time.monotonic() < limit and notices.TEXT not in stream.getvalue():
+            time.sleep(0.01)
+    assert stream.getvalue() == (notices.TEXT + notices.CLEARED) * lines
+    monkeypatch.setattr(notices, "SLOW", PATIENCE)
+    with notices.compile_notice():
+        pass
+    assert stream.getvalue().count(notices.TEXT) == lines
+
+
+SETTINGS = {"dop853": {"rtol": 1e-8}, "taylor": {"rtol": 1e-8}, "time_stepping": {"step": 1e-3}}
+STEPPED = {
+    "block_on_incline",
+    "box_on_plane_4",
+    "painleve_rod",
+    "slack_rope",
+}  # scenes with friction of contacts, and one rope
+MOTIONS = [(name, "time_stepping" if name in STEPPED else "dop853") for name in shipped()] + [("cardan", "taylor")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name, integrator", MOTIONS)
+def test_both_tiers_give_the_same_digits(name, integrator, monkeypatch):
+    monkeypatch.setenv("GAUSS_CACHE", "")
+    found = []
+    for tier in (tiers.QUICK, tiers.OPTIMISED):
+        monkeypatch.setenv(tiers.VARIABLE, tier)
+        motion = gauss.simulate(gauss.load(name), 0.01, integrator=integrator, progress=False, **SETTINGS[integrator])
+        found.append((motion.t.tobytes(), motion.q.tobytes(), motion.v.tobytes()))
+    assert found[0] == found[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [{"step": 1e-3, "steps": 20}, {"times": [0.0, 0.01, 0.02], "integrator": "dop853"}])
+def test_both_tiers_of_a_batch_give_the_same_digits(run, monkeypatch):
+    monkeypatch.setenv("GAUSS_CACHE", "")
+    scene, found = gauss.load("double_pendulum"), []
+    for tier in (tiers.QUICK, tiers.OPTIMISED):
+        monkeypatch.setenv(tiers.VARIABLE, tier)
+        system = gauss.compile_scene(scene)
+        q = np.linspace(-1.0, 1.0, 2 * 13).reshape(13, 2)
+        motions = gauss.rollout(system, q, 0.5 * q, threads=2, **run)
+        found.append((motions.q.tobytes(), motions.v.tobytes()))
+    assert found[0] == found[1]
+
+
+def test_built_in_functions_take_optimised_code(monkeypatch):
+    """Accelerations, called by Python directly: the same function object, first quick, then optimised."""
+    system = gauss.compile_scene(gauss.load("double_pendulum"))
+    function, state = system.forward_dynamics, system.initial_state()
+    first = function(state.q, state.v, np.zeros(2))
+    assert OPTIMISER.wait(PATIENCE)
+    assert (function(state.q, state.v, np.zeros(2)) == first).all()
+
+
+def test_a_plan_chooses_the_tier():
+    system = gauss.compile_scene(gauss.load("pendulum"))
+    move = lambda tier: gauss.simulate(  # noqa: E731
+        system, 0.01, plan=gauss.Plan("compiled loop", "compiled", tier=tier), progress=False
+    )
+    OPTIMISER.stop()
+    quick = move(tiers.QUICK)
+    OPTIMISER.go_on()
+    optimised = move(tiers.OPTIMISED)
+    assert (quick.stats.plan.tier, optimised.stats.plan.tier) == (tiers.QUICK, tiers.OPTIMISED)
+    assert (quick.q == optimised.q).all() and quick.stats.plan == optimised.stats.plan
+    assert gauss.Plan.from_json(quick.stats.plan.to_json()).tier == tiers.QUICK
+    with pytest.raises(ArgumentError, match="quick"):
+        gauss.Plan("compiled loop", "compiled", tier="quik")

@@ -134,6 +134,7 @@ def test_folding():
     assert count(R @ np.eye(3)) == {"sin": 1, "cos": 1, "neg": 1}
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from("+-*/"), st.floats(0.5, 2.0), st.booleans()), min_size=1, max_size=30))
 def test_random_formulas(steps):
     def formula(x):

@@ -78,7 +78,7 @@ def test_a_heavy_tip_is_left_to_the_recursion():
     assert np.array_equal(system.accelerations(state, load), certified(system, state, load))
 
 
-def test_rows_that_fade_near_a_flat_posture_are_left_to_the_recursion():
+def test_near_singular_flat_postures_are_left_to_the_recursion():
     """Compiled elimination gives such rows up; what they lack then is seen."""
     system = gauss.compile_scene(gauss.load("n_four_bar", n=3))
     signs = np.array([-1.0 if name.startswith("B") else 1.0 for name in system.coordinates])

@@ -24,7 +24,7 @@ from tests.support.welded import Welded
 
 AGREED = 1e-11  # relative: both are regularised alike, and rounded otherwise
 PROXIMAL = 1e-9  # relative: of Pinocchio's iteration
-MET = 1e-12  # gap of settled states [rad, m]
+MET_RESIDUAL = 1e-12  # gap of settled states [rad, m]
 
 
 def _ring(kind: str, n: int = 4) -> gauss.Scene:
@@ -118,6 +118,7 @@ def test_they_are_those_of_the_code_that_is_written_out(name):
     assert np.abs(found - whole).max() <= AGREED * np.abs(whole).max()
 
 
+@pytest.mark.slow
 def test_wrong_accelerations_are_noticed(case):
     system, state, kernels = case
     effort = gauss.assemble(system, state).P
@@ -135,6 +136,7 @@ def test_wrong_accelerations_are_noticed(case):
         assert error(wrong) >= 1e-8
 
 
+@pytest.mark.slow
 def test_states_are_brought_back_to_the_constraints(case):
     """The gap closes, the motion that a state had already stays, and a state that meets them does not move."""
     system, state, kernels = case
@@ -145,11 +147,11 @@ def test_states_are_brought_back_to_the_constraints(case):
     found = kernels.project(np.concatenate([[0.0], off, state.v + 1e-6 * rng.normal(size=system.n_v)]))
     settled = replace(state, q=found[:n_q], v=found[n_q:-1])
     gap = np.abs(position_residual(kinematics(system, settled))).max()
-    assert found[-1] <= MET and gap <= 10 * MET
+    assert found[-1] <= MET_RESIDUAL and gap <= 10 * MET_RESIDUAL
     slips = gauss.assemble(system, settled)
     quasi = kinematics(system, settled).quasi_velocities()
     slip = slips.about_rest().residuals(quasi, settled.v, np.zeros(slips.D.size))[1]
-    assert np.abs(slip).max() <= 10 * MET * (1.0 + np.abs(settled.v).max())
+    assert np.abs(slip).max() <= 10 * MET_RESIDUAL * (1.0 + np.abs(settled.v).max())
 
 
 @pytest.mark.slow
@@ -209,7 +211,7 @@ def test_a_long_ladder_moves_on_its_constraints():
     motion = gauss.simulate(system, 0.4, times=np.linspace(0.1, 0.4, 4), progress=False)
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
-        assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET
+        assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET_RESIDUAL
     cranks = motion.q[:, [system.column(f"A{i}") for i in range(51)]]
     assert np.ptp(cranks, axis=1).max() <= 1e-9
     energy = gauss.energy(motion)
@@ -225,7 +227,7 @@ def test_it_goes_through_the_flat_posture():
     angle = -motion.q[:, system.column("A0")]
     assert angle[0] < np.pi / 2 < angle[-1]
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
-        assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET
+        assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET_RESIDUAL
     assert np.ptp(motion.q[:, [system.column(f"A{i}") for i in range(51)]], axis=1).max() <= 1e-6
 
 

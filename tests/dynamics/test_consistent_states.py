@@ -12,7 +12,7 @@ from gauss.errors import AssemblyError, InconsistentConstraintsWarning, SceneErr
 from gauss.system import random_state
 from tests.support import mechanisms
 
-MET = 1e-12  # rad, m: a closed gap
+MET_RESIDUAL = 1e-12  # rad, m: a closed gap
 SCENES = {
     "four-bar": mechanisms.four_bar,
     "slider-crank": lambda: gauss.load("slider_crank"),
@@ -32,10 +32,10 @@ def test_any_guess_is_assembled(scene):
     for _ in range(5):
         guess = random_state(system, rng)
         state = system.initial_state(guess.q, guess.v)
-        assert _gap(system, state) <= MET
+        assert _gap(system, state) <= MET_RESIDUAL
         compulsion = gauss.assemble(system, state)
         rates = compulsion.A @ kinematics(system, state).quasi_velocities() + compulsion.B @ state.v
-        assert np.abs(rates).max() <= MET * (1 + np.abs(state.v).max())
+        assert np.abs(rates).max() <= MET_RESIDUAL * (1 + np.abs(state.v).max())
 
 
 def test_the_step_is_the_least_in_the_mass_metric():
@@ -58,7 +58,7 @@ def test_the_step_is_the_least_in_the_mass_metric():
 def test_what_is_kept_keeps_its_value(angle):
     system = gauss.compile_scene(mechanisms.four_bar())
     state = system.initial_state([angle, 0, 0, 0], [3.0, 0, 0, 0], keep=["A"])
-    assert _gap(system, state) <= MET
+    assert _gap(system, state) <= MET_RESIDUAL
     assert state.q[0] == pytest.approx(angle, abs=1e-12) and state.v[0] == pytest.approx(3.0, abs=1e-12)
 
 

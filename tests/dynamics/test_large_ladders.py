@@ -10,6 +10,7 @@ from gauss.dynamics.plan import motion_plan
 from tests.support import mechanisms
 
 
+@pytest.mark.slow
 def test_a_large_ladder_has_the_certified_accelerations():
     system = mechanisms.ladder(60)
     state, load = system.initial_state(), np.random.default_rng(0).standard_normal(system.n_v)
@@ -18,9 +19,10 @@ def test_a_large_ladder_has_the_certified_accelerations():
     assert np.abs(system.accelerations(state, load) - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_work_grows_with_the_number_of_windows():
     estimated = [sum(part.loop_elimination_work for part in mechanisms.ladder(n).parts) for n in (20, 40, 80)]
-    written = [system.dynamics.operations(system, system.parts) for system in map(mechanisms.ladder, (3, 6, 12))]
+    written = [system.dynamics.operations(system, system.subsystems) for system in map(mechanisms.ladder, (3, 6, 12))]
     for small, middle, large in (estimated, written):
         assert large - middle == pytest.approx(2 * (middle - small), rel=0.05)
 

@@ -59,6 +59,7 @@ def test_allowed_motions_meet_every_row_and_redundancies_exert_nothing(case):
         assert np.abs(exerted).max(initial=0.0) <= ROUNDING * np.abs(found.redundancies).max(initial=1.0)
 
 
+@pytest.mark.slow
 def test_redundant_constraints_are_named_group_by_group():
     """Two loops that share nothing but the ground are two groups; a free body is in none."""
     scene = mechanisms.four_bar()

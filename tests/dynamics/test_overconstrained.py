@@ -66,6 +66,7 @@ def test_redundant_constraints_cost_no_digits(system, reference, rtol):
     assert np.abs(energy.balance).max() <= max(SHARE * rtol, ROUNDING) * np.max(energy.scale)
 
 
+@pytest.mark.slow
 def test_angles_obey_bennetts_closed_form(system):
     found = _motion(system, 1e-10)
     first, second = START + found.q[:, 0], 2.0 * np.arctan(RATIO / np.tan(START / 2)) + found.q[:, 1]
@@ -79,6 +80,7 @@ def test_mobility_is_one_by_rank(system):
     assert mobility.freedoms == 1 and mobility.counted == -2
 
 
+@pytest.mark.slow
 def test_fixed_steps_keep_their_order(system, reference):
     """Stages of RK4 beside the constraints would find accelerations that rows contradicting each other make up."""
     steps = np.array([2e-2, 1e-2, 5e-3])

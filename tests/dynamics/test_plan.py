@@ -104,6 +104,7 @@ def test_a_motion_tells_its_plan(name, plans):
     assert bool(plan.fallback) == (dynamics not in ("none", "certified") and driver != "library")
 
 
+@pytest.mark.slow
 def test_every_rule_of_the_table_is_taken_by_some_case(plans):
     taken = {(plan.driver, plan.dynamics, plan.fallback) for plan in plans.values()}
     assert taken == {(rule.driver, rule.dynamics, rule.fallback) for rule in MOTIONS.rules}

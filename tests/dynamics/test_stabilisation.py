@@ -65,7 +65,7 @@ def test_gains_of_baumgarte_are_those_given(backend):
 
 
 @pytest.mark.slow
-def test_partitioning_chooses_anew_where_a_choice_fades():
+def test_partitioning_chooses_anew_where_a_choice_is_near_singular():
     """The crank of a four-bar turns fully, so no coordinate is independent all the way; adaptive steps and samples, too."""
     times = np.linspace(0.0, 2.0, 15)
     motions = [

@@ -134,6 +134,7 @@ def _turned(joint, model) -> np.ndarray:
     return turn
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("seed", [0, 1])
@@ -162,6 +163,7 @@ def test_trees_accelerate_as_in_mujoco(tmp_path, name, seed):
     assert found[ours] == pytest.approx(data.qacc[theirs], rel=SAME, abs=SAME * abs(data.qacc).max())
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_accelerate_as_in_mujoco(tmp_path, name):

@@ -34,6 +34,7 @@ def test_a_box_on_its_corners_is_pulled():
     assert data.qpos[:2] == pytest.approx(ours.q[-1, :2], abs=GIVES_WAY * 0.225)
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 def test_stops_and_joint_friction():
     scene = gauss.load("double_pendulum_stops")
@@ -54,6 +55,7 @@ def test_a_rope_that_is_taut():
     assert data.body("bob").xpos == pytest.approx(position, abs=GIVES_WAY)
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 def test_every_kind_of_shape_and_pair_is_taken_by_mujoco():
     scene = gauss.Scene("shapes")
@@ -100,6 +102,7 @@ REFUSED = {
         "'h': planes of MuJoCo do not move",
     ),
     "two stops": (lambda s: (s.stop("A", lowest=0.0), s.stop("A", highest=1.0)), "give the lowest and the highest together"),
+    "a limit in Python": (lambda s: s.joint_friction("A", lambda t: 1.0 + t), "friction of A.*Python function"),
     "a limited drive": (lambda s: s.drive("A", speed=1.0, limit=2.0), "'drive of A': MuJoCo has no counterpart"),
     "a gap in Python": (lambda s: s.one_sided("mine", lambda at: at.position("b")[0]), "'mine': MuJoCo has no counterpart"),
 }

@@ -41,6 +41,7 @@ def _all_pairs():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
 def test_a_dataset_holds_the_motion_under_names(motion):
     found = gauss.to_dataset(motion, joints=["B"])

@@ -85,6 +85,7 @@ def test_functions_do_not_fit_into_files(tmp_path):
         gauss.load_rotors("harvestr")
 
 
+@pytest.mark.slow
 def test_command_line_reports_draws_and_writes(tmp_path):
     files = {key: tmp_path / name for key, name in {"plot": "a.png", "network": "b.svg", "csv": "c.csv"}.items()}
     options = [x for key, path in files.items() for x in (f"--{key}", path)]

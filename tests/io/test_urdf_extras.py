@@ -63,6 +63,7 @@ def test_limits_hold_the_start_and_become_stops(arm):
     assert "stop of shoulder.highest" in {gap for event in motion.events for gap in event.gaps}
 
 
+@pytest.mark.slow
 def test_resistance_is_a_damper_and_friction(arm):
     scene = quietly(arm, resistance=True)
     assert scene.loads["damper of shoulder"].damping == 0.7

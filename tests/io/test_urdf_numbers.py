@@ -150,6 +150,7 @@ def test_misspelt_attributes_are_refused_with_their_place(tmp_path, old, new):
         _load(tmp_path, ARM.replace(old, new))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "talos_reduced", "solo12"])
 def test_no_link_of_a_robot_loses_its_mass(tmp_path, name):
     """Total mass and its first moment by the XML alone, with a new line after every number."""

@@ -46,6 +46,7 @@ def started(scene, seed=0):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_joints_of_every_kind(tmp_path, kind, turned):

@@ -54,6 +54,7 @@ def test_a_chain_of_any_length_takes_few_evaluations_for_its_matrix():
     assert colours[0] == colours[1] <= 5
 
 
+@pytest.mark.slow
 def test_a_long_chain_starts_from_rest_with_its_energy_balanced():
     energies = simulate(_chain(40), 0.5, times=[0.25, 0.5], rtol=1e-6, atol=1e-6).energy()
     assert np.abs(energies.balance).max() <= 1e-8 * energies.scale

@@ -91,7 +91,7 @@ def test_freewheel_pushes_and_is_overrun():
     assert np.abs(energy.balance).max() <= BALANCE * energy.input[-1]
 
 
-def test_backlash_is_crossed_freely_and_flanks_never_pull():
+def test_backlash_is_crossed_freely_and_its_sides_never_pull():
     network = Network("backlash")
     network.shaft("out", 0.5)
     network.shaft("in", 0.1)

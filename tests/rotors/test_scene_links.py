@@ -247,7 +247,7 @@ def test_a_system_without_losses_is_what_it_was():
     assert not scene.nonsmooth and isinstance(scene.relations["gear"], LossyGear)
 
 
-def test_explain_and_the_outlook_know_losses():
+def test_explain_and_advise_know_losses():
     scene = _two()
     scene.lossy_gear("gear", "A", "B", 2.0, 0.9)
     system = gauss.compile_scene(scene)
@@ -265,7 +265,7 @@ def test_a_file_keeps_them(tmp_path):
     assert gauss.load(gauss.save(scene, tmp_path / "links.toml")) == scene
 
 
-def test_told_is_a_key():
+def test_contact_modes_are_keys():
     one, other = ContactMode(set_valued={"a": 0}), ContactMode().but(set_valued={"a": 0})
     assert hash(one) == hash(other) and one == other and one != one.but(set_valued={"a": 1})
     assert Clutch("c", "A", "B", 2.0).bounds(0.0) == (-2.0, 2.0)

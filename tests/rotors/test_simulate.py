@@ -43,6 +43,7 @@ def motions():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_reference_tables(motions, name):
     """Every column of the worked examples, which two other routes agree upon."""

@@ -291,6 +291,7 @@ UNREALISABLE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", UNREALISABLE)
 def test_what_cannot_be_held_is_said(case):
     relations, actuators, outcome, words = UNREALISABLE[case]

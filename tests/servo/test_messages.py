@@ -35,6 +35,19 @@ def test_an_arm_drawn_out_of_reach(options):
     assert said == pytest.approx((REACH - np.linalg.norm(START)) / SPEED, abs=LOCATED)
 
 
+def test_an_arm_stretched_along_a_relation():
+    """The row of that relation vanishes, and its direction is no guide: it is named all the same."""
+
+    def off(t, motion):
+        tip = motion.position("lower", (0.8, 0, 0))
+        return [tip[0] - 1.35 - SPEED * t, tip[1]]
+
+    held = Servo(servos.arm(), [ServoRelation("tip", off)], [Motor("hip", "shoulder"), Motor("knee", "elbow")])
+    with pytest.raises(UnrealisableError, match=r"'tip\[0\]'.*rank 1 of 2") as caught:
+        servo.simulate(held, 3.0, progress=False)
+    assert caught.value.verdict.outcome == "rank lost" and caught.value.verdict.rank == 1
+
+
 def test_an_effort_that_turns_round():
     """A thruster on a disk that turns loses its hold at π/2, where its singular value is one on either side."""
     scene = gauss.Scene("turning", gravity=(0, 0, 0))

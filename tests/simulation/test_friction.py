@@ -299,7 +299,7 @@ PRESCRIBED_SLIPS = {  # how an element is made, and its loss [J]: what one drive
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", ["auto", "recursion"])
 @pytest.mark.parametrize("element", PRESCRIBED_SLIPS)
-def test_a_grip_slips_on_through_a_standstill_that_prescribed_motions_do_not_let_it_hold(element, backend):
+def test_an_element_slips_on_through_a_standstill_that_prescribed_motions_do_not_let_it_hold(element, backend):
     """Both shafts turn as prescribed, one at 1 − t: 2 N m lose 2 ∫ |1 − t| dt = 2 J in 2 s, which the drive gives."""
     make, loss = PRESCRIBED_SLIPS[element]
     scene = gauss.Scene("shafts")

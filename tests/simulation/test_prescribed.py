@@ -131,6 +131,32 @@ def test_kink_of_a_position_beside_a_pendulum(settings):
     assert motion.events[0].impulses["drive of x"][0] == pytest.approx(impulses[0], rel=exact)
 
 
+AT_END = [
+    {},
+    {"integrator": "radau5"},
+    {"integrator": "scipy_dop853"},
+    {"integrator": "rk4", "step": 1e-3},
+    {"verify": True},
+]
+
+
+@pytest.mark.parametrize("settings", AT_END, ids=called)
+@pytest.mark.parametrize("times", [None, np.array([0.5, 1.25, 1.5]), np.array([0.25, 1.25])], ids=["steps", "end", "before"])
+def test_a_jump_at_the_end_is_an_impact(settings, times):
+    """The last state is the one just after it, from which a motion can go on; its energy is booked."""
+    system = cart(speed=square)
+    motion = gauss.simulate(system, 1.5, times=times, **settings)
+    assert balanced(motion) <= BALANCE
+    reaches = times is None or times[-1] == 1.5
+    jumps = [0.5, 1.0, 1.5] if reaches else [0.5, 1.0]
+    assert [event.t for event in motion.events] == pytest.approx(jumps, abs=1e-14)
+    if reaches:
+        assert motion.t[-1] == 1.5 and motion.v[-1, 0] == pytest.approx(square(1.5), abs=1e-15)
+        onward = gauss.simulate(system, 0.25, state=motion.state(-1), **settings)
+        whole = gauss.simulate(system, 1.75, **settings)
+        assert not onward.events and np.abs(onward.v[-1] - whole.v[-1]).max() <= EXACT
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("settings", [{}, {"integrator": "radau5"}, {"integrator": "rk4", "step": 1e-3}], ids=called)
 @pytest.mark.parametrize("times", [None, np.linspace(0.0, 1.75, 8)], ids=["every step", "samples"])

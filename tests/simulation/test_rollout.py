@@ -83,6 +83,7 @@ def test_an_interrupt_ends_all_threads(threads, monkeypatch):
     assert len(calls) < 65  # of 130
 
 
+@pytest.mark.slow
 def test_motions_that_are_not_confirmed_are_made_by_simulate():
     heavy = [1.0] * 9 + [1e12]  # joint coordinates lose too many digits when the chain is bent
     system = gauss.compile_scene(mechanisms.chain(heavy))
@@ -94,6 +95,7 @@ def test_motions_that_are_not_confirmed_are_made_by_simulate():
         assert np.array_equal(many.q[k], alone.q) and np.array_equal(many.v[k], alone.v)
 
 
+@pytest.mark.slow
 def test_loops_stay_closed_and_laws_are_compiled():
     scene = mechanisms.four_bar()
     scene.drive("A", torque=lambda t: 3.0 * np.sin(5.0 * t))

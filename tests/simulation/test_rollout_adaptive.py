@@ -119,6 +119,7 @@ def test_an_interrupt_ends_all_threads(threads, monkeypatch):
     assert len(calls) < 10
 
 
+@pytest.mark.slow
 def test_motions_that_are_not_confirmed_are_made_by_simulate():
     heavy = [1.0] * 9 + [1e12]  # joint coordinates lose too many digits when the chain is bent
     system = gauss.compile_scene(mechanisms.chain(heavy))

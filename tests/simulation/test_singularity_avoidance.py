@@ -53,7 +53,7 @@ def test_rows_that_contradict_each_other_lack_something(off):
 
 
 @pytest.mark.parametrize("name", ["dop853", "dopri5"])
-def test_steps_are_moved_away_from_where_rows_fade(name):
+def test_steps_are_moved_away_from_singular_configurations(name):
     """What is left of rows grows with the time from there: the place is found, and a shifted step has no stage near."""
     pair = METHODS[name].pair
     nodes = StageNodes(np.append(pair.c, 1.0), pair.extra_c)

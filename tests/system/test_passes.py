@@ -174,6 +174,7 @@ def test_a_relation_with_nothing_that_moves_is_still_looked_at():
         gauss.simulate(scene, 0.1)
 
 
+@pytest.mark.slow
 def test_a_scene_that_cannot_move_at_all_has_no_parts():
     """It is solved as it is written, for its reactions."""
     scene = gauss.Scene("monument")

@@ -30,6 +30,7 @@ def _driven(law):
     return gauss.compile_scene(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_a_system_is_the_same_after_a_journey(name):
     system = gauss.compile_scene(gauss.load(name))

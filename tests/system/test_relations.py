@@ -93,6 +93,7 @@ def test_rows_are_the_derivatives_of_the_residuals(kind, seed):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_forward_dynamics_from_link_to_link_meets_the_rows(kind):
     """Joint coordinates and closing rows against the full system of all bodies, in a state that need not be consistent."""
@@ -118,6 +119,7 @@ def _conserves_energy(trajectory):
     assert np.abs(energy.balance).max() <= EXACT * energy.scale
 
 
+@pytest.mark.slow
 def test_a_rod_without_mass_is_a_pendulum():
     """A bob on a distance swings like the rod of the reference file; the force of the rod is m(g cos φ + l φ̇²)."""
     data = mechanisms.reference("pendulum")
@@ -137,6 +139,7 @@ def test_a_rod_without_mass_is_a_pendulum():
     assert pull == pytest.approx(9.81 * np.cos(angles) + speed, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_bead_on_a_parabola():
     """ẍ (1 + 4x²) + 4 x ẋ² + 2 g x = 0 for y = x²: the energy, and the acceleration at a state."""
     scene = gauss.Scene("bead", gravity=(0, -9.81, 0))
@@ -151,6 +154,7 @@ def test_a_bead_on_a_parabola():
     _conserves_energy(_run(scene))
 
 
+@pytest.mark.slow
 def test_planetary_gears_turn_as_willis_says():
     """Sun 24, planet 12, ring 48 at rest: carrier = sun · 24/(24 + 48); and the torques are in the same ratio."""
     scene = gauss.Scene("planetary", gravity=(0, 0, 0))
@@ -174,6 +178,7 @@ def test_planetary_gears_turn_as_willis_says():
     assert abs(tooth) * 0.24 == pytest.approx(3.0 - 0.02 * 3.0 / inertia, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_bevel_gears_and_their_bearings():
     """Shafts at 70°: ω₁ z₁ = −ω₂ z₂ about axes that point away from the apex; the tooth force is felt at both bearings."""
     angle, (z1, z2) = np.deg2rad(70.0), (20, 35)
@@ -266,6 +271,7 @@ def _disk(spin, crown=0.0, lean=0.4):
     return scene
 
 
+@pytest.mark.slow
 def test_a_rolling_disk_keeps_its_energy_and_does_not_slip():
     trajectory = _run(_disk((5.0, 0.3, 1.0)), 1.0)
     _conserves_energy(trajectory)

@@ -63,7 +63,7 @@ def test_every_force_goes_with_every_relation(force, tied):
 @pytest.mark.slow
 @pytest.mark.parametrize("coming", COMING)
 @pytest.mark.parametrize("force", ["spring", "damper"])
-def test_springs_go_with_what_closes_and_grips(force, coming):
+def test_springs_go_with_loops_and_friction(force, coming):
     scene = arms()
     FORCES[force](scene)
     COMING[coming](scene)

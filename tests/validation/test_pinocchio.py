@@ -194,6 +194,7 @@ def extended_accelerations(system, state, load) -> np.ndarray:
     return answer[1]
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("size", [3, 40])
 def test_null_space_and_energies(size):

@@ -92,6 +92,7 @@ def test_a_shipped_scene_moves_the_same_in_any_units(name, length, time, mass):
     _agree(_outcome(scene, Units(), **SHIPPED[name]), _outcome(scaled(scene, units), units, **SHIPPED[name]), units)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "free_body", "slider_crank", "box_on_plane_4"])
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(length=EXPONENTS, time=EXPONENTS, mass=EXPONENTS)

@@ -34,6 +34,7 @@ def viewer(motion):
     found.close()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
 def test_the_stage_shows_the_motion(viewer):
     stage = viewer.player.stage

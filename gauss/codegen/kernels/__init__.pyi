@@ -1,4 +1,4 @@
-from gauss.codegen.kernels.adaptive import TRIAL_SETTINGS, Adaptive
+from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
 from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, AdaptiveBatchLoop, MotionQueue
 from gauss.codegen.kernels.block_ldlt import BlockLDLT
 from gauss.codegen.kernels.call_recorder import CallRecorder, Operand, RecordedCalls, Slot, Vector
@@ -17,10 +17,14 @@ from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
 from gauss.codegen.kernels.newton import Newton
+from gauss.codegen.kernels.row_code import RowCode, RowFunction
 from gauss.codegen.kernels.taylor import TaylorStep
 from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
 
 __all__ = [
+    "TRIAL_RESULTS",
+    "RowCode",
+    "RowFunction",
     "TRIAL_SETTINGS",
     "Adaptive",
     "Operand",

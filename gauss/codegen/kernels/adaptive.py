@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.codegen import INTEGER, Function, Writer
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import LoopStatus
@@ -42,15 +42,15 @@ class Adaptive:
 
     size: int
     row: int
-    trial: Function
-    project: Function | None
+    trial: Function | NativeFunction
+    project: Function | NativeFunction | None
     check: Function
-    dense: Function
-    sample: Function
+    dense: Function | NativeFunction
+    sample: Function | NativeFunction
     dense_evaluations: int
     rates: Function
 
-    def compile(self, start: Function) -> Loop:
+    def compile(self, start: Function | NativeFunction) -> Loop:
         """Machine code of the loop, and of ``start``, which is called by name."""
         writer = Writer()
         AdaptiveWriter(self, LoopCode(writer, "adaptive", POINTERS), len(self.trial.outputs)).write()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function, Lanes, NativeFunction, Writer, copy
+from gauss.codegen.text_builder import TextBuilder
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +20,8 @@ class CheckedSwitch(NativeFunction):
         Least value of the indicator with which the fast result is accepted.
     """
 
-    fast: Function
-    refined: Function
+    fast: Function | NativeFunction
+    refined: Function | NativeFunction
     least_accuracy: float
     name = "checked_switch"
 
@@ -38,7 +39,7 @@ class CheckedSwitch(NativeFunction):
         fast, refined, size = writer.body(self.fast, width), writer.body(self.refined, width), len(self.outputs)
         function = self.begin(writer.module)
         given, _, target, _ = function.args
-        b, apart = ir.IRBuilder(function.append_basic_block("entry")), INTEGER(width)
+        b, apart = TextBuilder(function.append_basic_block("entry")), INTEGER(width)
         lanes, place = Lanes(writer.module, width, b), lambda k: INTEGER(k * width)
         found, safe = (b.bitcast(b.alloca(lanes.kind, size + 1), POINTER) for _ in range(2))
         b.call(fast, [given, apart, found, apart])

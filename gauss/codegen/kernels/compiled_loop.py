@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gauss.codegen import Function, Writer, machine
+from gauss.codegen import Function, NativeFunction, Writer, machine
 from gauss.codegen.kernels.loop_control import Control, Numbers
 
 FLOAT = np.dtype(float)
@@ -26,7 +26,7 @@ class Loop:
         Functions of the loop that can also be called by name, see :meth:`evaluate`.
     """
 
-    def __init__(self, writer: Writer, name: str, functions: Sequence[Function]):
+    def __init__(self, writer: Writer, name: str, functions: Sequence[Function | NativeFunction]):
         for function in functions:
             writer.export(function, function.name)
         self.__setstate__((machine.load(str(writer.module)), name, {f.name: f.arity for f in functions}))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, NativeFunction, Writer, constant_array, machine
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer, machine
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS
 from gauss.codegen.kernels.row_code import RowCode
 from gauss.codegen.kernels.slope_sums import SlopeSums
@@ -53,10 +53,10 @@ class ExplicitTrial(NativeFunction):
     size: int
     row: int
     indicator: int
-    start: Function
-    slope: Function
-    finish: Function
-    control: Function
+    start: Function | NativeFunction
+    slope: Function | NativeFunction
+    finish: Function | NativeFunction
+    control: Function | NativeFunction
     name = "trial"
 
     @property
@@ -113,8 +113,8 @@ class Interpolation(NativeFunction):
     weights: np.ndarray
     size: int
     row: int
-    start: Function
-    slope: Function
+    start: Function | NativeFunction
+    slope: Function | NativeFunction
     name = "interpolation"
 
     @property
@@ -132,13 +132,13 @@ class Interpolation(NativeFunction):
         y0 = _begin(rows, self.start, x, K, row)
         rows.copy(K, rows.at(x, 2 * size + 1), known * row)
         _stages(rows, self.slope, x, size, h, y0, K, self.c, known, sums)
-        with rows.each(len(self.weights)) as k:
+        for k in rows.each(len(self.weights)):
             target = rows.at(rows.found, rows.b.mul(k, INTEGER(row)))
-            sums.write(target, sums.zeros(), h, rows.b.add(k, INTEGER(m)), K)
+            sums.write(target, sums.zeros(), h, rows.shifted(k, m), K)
         return rows.done()
 
 
-def _begin(rows: RowCode, start: Function, x, K, size: int):
+def _begin(rows: RowCode, start: Function | NativeFunction, x, K, size: int):
     """Row y of a point; its slope becomes the first of K."""
     both = rows.room(2 * size)
     rows.call(start, x, both)
@@ -146,14 +146,13 @@ def _begin(rows: RowCode, start: Function, x, K, size: int):
     return both
 
 
-def _stages(rows: RowCode, slope: Function, x, size: int, h, y0, K, nodes: np.ndarray, known: int, sums: SlopeSums):
+def _stages(rows: RowCode, slope: Function | NativeFunction, x, size: int, h, y0, K, nodes: np.ndarray, known: int, sums):
     """Compute the slopes of stages at t + c h, by a loop over their nodes c; ``known`` slopes precede them."""
     b, row = rows.b, sums.size
     given = rows.room(size + 1 + row)
     rows.copy(given, x, size)
-    places = constant_array(rows.writer.module, f"{rows.function.name}_nodes", nodes)
-    with rows.each(len(nodes)) as i:
-        node = rows.motions.broadcast(b.load(b.gep(b.bitcast(places, POINTER), [i])))
+    for i in rows.each(len(nodes)):
+        node = rows.motions.broadcast(rows.constant(f"{rows.function.name}_nodes", nodes, i))
         rows.put(given, size, rows.motions.fused("fma", node, rows.number(h, 0), rows.number(x, 0)))
         sums.write(rows.at(given, size + 1), y0, h, i, K)
         rows.call(slope, given, rows.at(K, b.mul(b.add(i, INTEGER(known)), INTEGER(row))))

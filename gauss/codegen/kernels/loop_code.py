@@ -7,9 +7,10 @@ from contextlib import contextmanager
 
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy, endless_loop
+from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, NativeFunction, Writer, copy, endless_loop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, update
 from gauss.codegen.kernels.loop_control import Control, Numbers
+from gauss.codegen.text_builder import TextBuilder
 
 
 class LoopCode:
@@ -36,7 +37,7 @@ class LoopCode:
         self.pointer = dict(zip(pointers, self.function.args, strict=False))
         self.budget = self.function.args[-1]
         self.kind = DOUBLE
-        self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
+        self.b = TextBuilder(self.function.append_basic_block("entry"))
         self.lanes = Lanes(writer.module, width, self.b)
 
     def number(self, value: float) -> ir.Constant:
@@ -68,7 +69,7 @@ class LoopCode:
 
     def set(self, name: str, value):
         """Store a number of the control."""
-        value = value if isinstance(value, ir.Value) else self.number(value)
+        value = self.number(value) if isinstance(value, int | float) else value
         self.b.store(value, self._named(name))
 
     def _named(self, name: str):
@@ -76,7 +77,7 @@ class LoopCode:
 
     def add(self, name: str, amount=1.0):
         """Increase a counter."""
-        amount = amount if isinstance(amount, ir.Value) else self.number(amount)
+        amount = self.number(amount) if isinstance(amount, int | float) else amount
         self.set(name, self.b.fadd(self.get(name), amount))
 
     def is_multiple(self, counter: str, of: str):
@@ -101,13 +102,13 @@ class LoopCode:
 
     def join(self, *parts):
         """Buffer of numbers and arrays (pointer, size), concatenated."""
-        sizes = [part[1] if isinstance(part, tuple) else 1 for part in parts]
+        sizes = [part[1] if type(part) is tuple else 1 for part in parts]
         room, place = self.buffer(sum(sizes)), 0
         for part, size in zip(parts, sizes, strict=True):
-            if isinstance(part, tuple):
+            if type(part) is tuple:
                 self.copy(self.at(room, place), *part)
             else:
-                self.put(part if isinstance(part, ir.Value) else self.number(part), room, place)
+                self.put(self.number(part) if isinstance(part, int | float) else part, room, place)
             place += size
         return room
 
@@ -133,7 +134,7 @@ class LoopCode:
         self.call(update(), given, found)
         return [self.take(found, k) for k in range(len(ENERGY_RECORD))]
 
-    def call(self, function: Function, given, found):
+    def call(self, function: Function | NativeFunction, given, found):
         """Call a traced function on buffers."""
         apart = INTEGER(self.width)
         self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])

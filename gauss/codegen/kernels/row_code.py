@@ -4,11 +4,27 @@ A loop over the entries is as long for a hundred coordinates as for one. What it
 one coordinate, inlined.
 """
 
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import reduce
 
+import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy, counted_loop, schedule, straight_line
+from gauss.codegen import (
+    DOUBLE,
+    INTEGER,
+    LINE,
+    Function,
+    Lanes,
+    NativeFunction,
+    Writer,
+    constant_array,
+    copy,
+    counted_loop,
+    schedule,
+    straight_line,
+)
 from gauss.codegen.text_builder import TextBuilder
 
 
@@ -65,7 +81,11 @@ class RowCode:
         """Copy numbers; the two do not overlap."""
         copy(self.b, target, source, size * self.width)
 
-    def call(self, function: Function, given, found):
+    def constant(self, name: str, values: np.ndarray, k):
+        """Entry of a constant array: an integer, or a double."""
+        return self.b.load(self.b.gep(constant_array(self.writer.module, name, values), [INTEGER(0), k]))
+
+    def call(self, function: Function | NativeFunction, given, found):
         """Call a function."""
         apart = INTEGER(self.width)
         self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])
@@ -77,13 +97,86 @@ class RowCode:
         straight_line(lanes, schedule(function), given.__getitem__, found.__setitem__, vectorise=False)
         return [lanes.number(found[k]) for k in range(len(function.outputs))]
 
-    @contextmanager
-    def each(self, count: int):
-        """Write a loop over the whole numbers below a count."""
+    def each(self, count: int) -> Iterator:
+        """Write ``for`` a loop over the whole numbers below a count; unrolled for a batch, which runs for long."""
+        if self.width > 1:
+            yield from map(INTEGER, range(count))
+            return
         with counted_loop(self.b, INTEGER(0), INTEGER(count)) as k:
             yield k
+
+    def shifted(self, k, by: int):
+        """Index k + ``by``."""
+        return INTEGER(k.constant + by) if isinstance(k, ir.Constant) else self.b.add(k, INTEGER(by))
+
+    def reduced(self, count: int, start: ir.Value, following: Callable) -> ir.Value:
+        """Value after ``value = following(k, value)`` for the whole numbers k below a count."""
+        if self.width > 1:
+            return reduce(lambda total, k: following(INTEGER(k), total), range(count), start)
+        return reduced(self.b, INTEGER(0), INTEGER(count), start, following)
+
+    def sum_of_squares(self, count: int, numerators, denominators) -> ir.Value:
+        """Sum of the squares of quotients of entries of two arrays."""
+
+        def following(k, total):
+            quotient = self.b.fdiv(self.number(numerators, k), self.number(denominators, k))
+            return self.motions.fused("fma", quotient, quotient, total)
+
+        return self.reduced(count, self.motions.constant(0.0), following)
 
     def done(self) -> ir.Function:
         """End the function."""
         self.b.ret_void()
         return self.function
+
+
+@dataclass(frozen=True, eq=False)
+class RowFunction(NativeFunction):
+    """Function whose code is loops over arrays.
+
+    Parameters
+    ----------
+    name : str
+        Name in the code.
+    n_in, n_out : int
+        Numbers of inputs and of outputs.
+    emit : callable
+        RowCode → None: emits its body.
+    """
+
+    name: str
+    n_in: int
+    n_out: int
+    emit: Callable[[RowCode], None]
+
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return self.n_in, self.n_out
+
+    def operations(self) -> dict[str, int]:
+        """None are counted: loops over entries are little beside the functions that they call."""
+        return {}
+
+    def write(self, writer: Writer, width: int) -> ir.Function:
+        """Machine code for one motion, or for one per SIMD lane."""
+        code = RowCode(writer, self.begin(writer.module), width)
+        self.emit(code)
+        return code.done()
+
+
+def reduced(b: ir.IRBuilder, first, end, start: ir.Value, following: Callable) -> ir.Value:
+    """Value after ``value = following(k, value)`` for the whole numbers k from ``first`` to ``end − 1``."""
+    before, (head, inside, after) = b.block, (b.function.append_basic_block(name) for name in ("sum", "term", "summed"))
+    b.branch(head)
+    b.position_at_end(head)
+    k, total = b.phi(INTEGER), b.phi(start.type)
+    k.add_incoming(first, before)
+    total.add_incoming(start, before)
+    b.cbranch(b.icmp_signed("<", k, end), inside, after)
+    b.position_at_end(inside)
+    total.add_incoming(following(k, total), b.block)
+    k.add_incoming(b.add(k, INTEGER(1)), b.block)
+    b.branch(head)
+    b.position_at_end(after)
+    return total

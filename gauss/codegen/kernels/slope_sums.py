@@ -5,12 +5,13 @@ row of slopes has a multiple of its length; entries of a batch of motions are ve
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Lanes, constant_array, counted_loop, machine
-from gauss.codegen.kernels.row_code import RowCode
+from gauss.codegen.kernels.row_code import RowCode, reduced
 from gauss.codegen.text_builder import TextBuilder
 
 
@@ -28,7 +29,7 @@ class SlopeSums:
     """
 
     def __init__(self, rows: RowCode, weights: Sequence[np.ndarray], size: int):
-        self.rows, self.size = rows, size
+        self.rows, self.size, self.weights = rows, size, weights
         entries = [(i, weight) for sum_of in weights for i, weight in enumerate(sum_of) if weight]
         counts = [np.count_nonzero(sum_of) for sum_of in weights]
         table = {
@@ -42,11 +43,28 @@ class SlopeSums:
 
     def write(self, target, base, h, k, K):
         """Write sum k to an array: ``target = base + h · weights[k] @ K``."""
+        if self.rows.width > 1:
+            self._unrolled(target, base, h, self.weights[k.constant], K)
+            return
         b, name = self.rows.b, f"slope_sum_{self.size}_{self.rows.width}"
         code = self.rows.writer.module.globals.get(name) or self._code(name)
         first = b.bitcast(self.first, INTEGER.as_pointer())
         bounds = [b.load(b.gep(first, [b.add(k, INTEGER(j))])) for j in (0, 1)]
         b.call(code, [target, base, h, *self.table, *bounds, K])
+
+    def _unrolled(self, target, base, h, weights: np.ndarray, K):
+        """Write a sum for a batch, its terms unrolled: that runs for long."""
+        b, lanes, width = self.rows.b, self.rows.motions, self.rows.width
+        terms, h = (
+            [(i, lanes.constant(float(weight))) for i, weight in enumerate(weights) if weight],
+            lanes.load(h, INTEGER(0)),
+        )
+        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), width) as k:
+            slopes = [(lanes.load(K, b.add(k, INTEGER(i * self.size * width))), weight) for i, weight in terms]
+            total = b.fmul(*slopes[0])
+            for slope, weight in slopes[1:]:
+                total = lanes.fused("fma", slope, weight, total)
+            lanes.store(lanes.fused("fma", total, h, lanes.load(base, k)), target, k)
 
     def zeros(self) -> ir.Constant:
         """Row of zeros."""
@@ -70,21 +88,13 @@ class SlopeSums:
             place = b.add(k, b.load(b.gep(places, [j])))
             return lanes.broadcast(b.load(b.gep(weights, [j]))), lanes.load(K, place)
 
-        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), lanes.width) as k:
-            before, second, begun = b.block, b.add(first, INTEGER(1)), b.fmul(*term(first, k))
-            head, inside, after = (code.append_basic_block(part) for part in ("sum", "term", "summed"))
-            b.branch(head)
-            b.position_at_end(head)
-            j, total = b.phi(INTEGER), b.phi(lanes.kind)
-            j.add_incoming(second, before)
-            total.add_incoming(begun, before)
-            b.cbranch(b.icmp_signed("<", j, last), inside, after)
-            b.position_at_end(inside)
+        def added(j, total, k):
             weight, slope = term(j, k)
-            total.add_incoming(lanes.fused("fma", weight, slope, total), inside)
-            j.add_incoming(b.add(j, INTEGER(1)), inside)
-            b.branch(head)
-            b.position_at_end(after)
+            return lanes.fused("fma", weight, slope, total)
+
+        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), lanes.width) as k:
+            start, second = b.fmul(*term(first, k)), b.add(first, INTEGER(1))
+            total = reduced(b, second, last, start, partial(added, k=k))
             lanes.store(lanes.fused("fma", total, h, lanes.load(base, k)), target, k)
         b.ret_void()
         return code

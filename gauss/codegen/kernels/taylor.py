@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.codegen import FLAGS, HIGHEST_ORDER, INTEGER, LEAD, ROW, Function, Series, Writer
+from gauss.codegen import FLAGS, HIGHEST_ORDER, INTEGER, LEAD, ROW, Function, NativeFunction, Series, Writer
 from gauss.codegen.kernels.adaptive import AdaptiveWriter
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
 from gauss.codegen.kernels.loop_code import LoopCode
@@ -60,7 +60,7 @@ class TaylorStep:
     sample: Function
     rates: Function
 
-    def compile(self, start: Function) -> Loop:
+    def compile(self, start: Function | NativeFunction) -> Loop:
         """Machine code of the loop, and of ``start``, which is called by name."""
         writer = Writer()
         _TaylorWriter(self, LoopCode(writer, "taylor", POINTERS), self.size).write()

@@ -22,6 +22,7 @@ from gauss.codegen import (
     schedule,
     straight_line,
 )
+from gauss.codegen.text_builder import TextBuilder
 
 VOID, BYTES = ir.VoidType(), ir.IntType(8).as_pointer()
 
@@ -125,7 +126,7 @@ class _TreeRecursionWriter:
         recursion, width = self.recursion, self.width
         body = recursion.begin(self.module)
         source, in_stride, target, out_stride = body.args
-        b = ir.IRBuilder(body.append_basic_block("entry"))
+        b = TextBuilder(body.append_basic_block("entry"))
         n, bytes_ = len(recursion.kinds), INTEGER((len(recursion.kinds) + 1) * recursion.record * width * 8)
         room = b.call(external(self.module, "malloc", BYTES, [INTEGER]), [bytes_])
         records = b.bitcast(room, POINTER)
@@ -171,7 +172,7 @@ class _TreeRecursionWriter:
         code = ir.Function(self.module, ir.FunctionType(VOID, kinds), name)
         code.linkage = "internal"
         code.attributes.add("noinline")
-        b = ir.IRBuilder(code.append_basic_block("entry"))
+        b = TextBuilder(code.append_basic_block("entry"))
         lanes = Lanes(self.module, self.width, b)
         i, source, in_stride, target, out_stride, records = code.args
         size = INTEGER(self.recursion.record * self.width)

@@ -328,7 +328,7 @@ class ModeSelector:
             found = certified(problem, at.backend, what)
             return -found.multipliers[links.rows] - Q
 
-        Q = piecewise_affine_root(residual, np.zeros(len(links.names)))
+        Q = piecewise_affine_root(residual, np.zeros(len(links.names)), links.units)
         return ModeTrial(mode, system, found, forces_of(self.system, system, mode, at.state, found), Q @ extra)
 
     def _scale(self, at: ModeProblem, found: ModeTrial) -> float:

@@ -29,7 +29,6 @@ CONVERGED_STEP = 1e-14  # Newton step relative to the largest force
 CONVERGED_RESIDUAL = 1e-12  # residual of a force relative to the largest multiplier
 LEAST_CONTRACTION = 0.1  # of Newton steps: an affine problem converges much faster
 ROUNDOFF_STEP = 1e-8  # Newton step relative to the largest force by round-off, above all of QP solvers
-LEAST_FORCE = 1.0  # N m, N: smaller forces, as near a reversal, have round-off relative to this one
 MOST_ROUNDS = 20  # of Newton's method
 NOT_CONVERGED = "the forces of the links with losses did not converge."
 
@@ -45,12 +44,15 @@ class NonIdealRows(NamedTuple):
         Their rows.
     R, W : ndarray, shape (m, n_v)
         Jacobian of the rows, and generalised forces for Q = 1.
+    units : ndarray, shape (m,)
+        Forces of the scene along the driven joints [N m, N].
     """
 
     names: tuple[str, ...]
     rows: np.ndarray
     R: np.ndarray
     W: np.ndarray
+    units: np.ndarray
 
 
 def non_ideal_rows(system: System, whole: System, mode: ContactMode) -> NonIdealRows:
@@ -62,11 +64,21 @@ def non_ideal_rows(system: System, whole: System, mode: ContactMode) -> NonIdeal
         for matrix, factors in ((R, link.acts_on), (W, joint_factors(link, mode.power_flow[name]))):
             for joint, factor in factors.items():
                 matrix[k, system.column(joint)] += factor
-    return NonIdealRows(tuple(links), np.array([places[name] for name in links], dtype=int), R, W)
+    units = np.array([system.scale.energy / system.scale.coordinates[system.column(link.driven)] for link in links.values()])
+    return NonIdealRows(tuple(links), np.array([places[name] for name in links], dtype=int), R, W, units)
 
 
-def piecewise_affine_root(residual, guess: np.ndarray) -> np.ndarray:
+def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.ndarray:
     """Root Q (m,) of the piecewise affine ``residual(Q)`` (m,) by Newton's method; the last call is at the root.
+
+    Parameters
+    ----------
+    residual : callable
+        Forces (m,) → residual (m,).
+    guess : ndarray, shape (m,)
+        Initial forces.
+    units : ndarray, shape (m,)
+        Forces of the scene: smaller ones, as near a reversal, have round-off relative to these.
 
     Raises
     ------
@@ -77,18 +89,18 @@ def piecewise_affine_root(residual, guess: np.ndarray) -> np.ndarray:
     if not left.any():
         return Q
     for _ in range(MOST_ROUNDS):
-        jacobian = np.array([residual(Q + unit) - left for unit in np.eye(Q.size)]).T
+        jacobian = np.array([residual(Q + unit) - left for unit in np.diag(units)]).T / units
         before = np.inf
         while True:
             step = np.linalg.lstsq(jacobian, -left, rcond=None)[0]
-            Q, size = Q + step, np.abs(step).max()
+            Q, size = Q + step, np.abs(step / units).max()
             left = residual(Q)
-            if size <= CONVERGED_STEP * np.abs(Q).max() or not left.any():
+            if size <= CONVERGED_STEP * np.abs(Q / units).max() or not left.any():
                 return Q
             if size >= LEAST_CONTRACTION * before:  # rounding, or a kink was crossed
                 break
             before = size
-        if size <= ROUNDOFF_STEP * max(np.abs(Q).max(), LEAST_FORCE):
+        if size <= ROUNDOFF_STEP * max(np.abs(Q / units).max(), 1.0):
             return Q
     raise SimulationError(NOT_CONVERGED)
 
@@ -195,7 +207,7 @@ class LossyEngine(Engine):
             found = self.compiled.rates(self.cut, state, Q @ self.links.W)
             return self.links.R @ found.acceleration
 
-        self.Q = piecewise_affine_root(residual, self.Q)
+        self.Q = piecewise_affine_root(residual, self.Q, self.links.units)
         return found
 
     def solution(self, state: State) -> tuple[Solution, np.ndarray]:

@@ -87,6 +87,7 @@ def _needed(outputs, known) -> list[Expression]:
 
 def _operation(node: Expression, x: list):
     if node.op == "call":  # intervals of all its outputs
+        x = [*x[0], *x[1:]] if isinstance(x[0], list) else x  # all results of another call
         own = dict(zip((symbol.index for symbol in node.value.inputs), x, strict=True))
         return enclose(node.value.outputs, own)
     if node.op == "item":

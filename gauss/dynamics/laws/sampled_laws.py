@@ -6,17 +6,19 @@ sampling interval may be missed; ``breaks=`` gives such times.
 
 import numpy as np
 
-from gauss.dynamics.laws.stateful_laws import preserved
 from gauss.dynamics.laws.switching_times import CLOSE, NO_TIMES, Timetable
+from gauss.scene.stateful_laws import preserved
 
 SAMPLES = 32_768  # of a law over a motion: resolves a millisecond in twenty seconds
+LEAST_SAMPLES = 256  # of a short motion
+LONGEST_GAP = 1.5  # between two samples, relative to their mean distance
 MOST_JUMPS = 1000  # located jumps: a law with more of them is rough throughout
 REPEATED_SAMPLES = 4  # taken again after all others: a function of time gives equal numbers
 JUMP_RATIO = 8.0  # of a change between two samples to its neighbours, above which it is a jump
 PARTS = 8  # cells of an interval in which a law changes, next to intervals in which it is constant
 
 
-def sampled_times(law, motion, begin: float, end: float, what: str = "a law") -> Timetable:
+def sampled_times(law, motion, begin: float, end: float, what: str = "a law", uses_time: bool = False) -> Timetable:
     """Jumps of one law, and ends of the intervals in which it is constant.
 
     Parameters
@@ -24,11 +26,13 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law") ->
     law : callable
         Of (t, motion).
     motion : Kinematics
-        Kinematics of the initial state.
+        Kinematics of the initial state; None for laws of rotors.
     begin, end : float
         Interval of time [s].
     what : str
         Name of the law in warnings.
+    uses_time : bool
+        Whether the law is known to use the time: a constant value is then warned of.
     """
 
     def value(t: float) -> np.ndarray:
@@ -39,9 +43,21 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law") ->
 
     try:
         with preserved(law):
-            return _located(value, begin, end, what)
+            return _located(value, begin, end, what, _count(motion, end - begin), CONSTANT if uses_time else "")
     except _NoValueError:  # the motion reports this failure by name
         return NO_TIMES
+
+
+def _count(motion, duration: float) -> int:
+    """Number of samples: of a motion shorter than the time of the scene, as many as fall to it."""
+    share = 1.0 if motion is None else min(1.0, duration / motion.system.scale.time)
+    return max(LEAST_SAMPLES, int(SAMPLES * share))
+
+
+CONSTANT = (
+    "{} asks for the time, but has the same value at all of {} sampled times: pulses shorter than {:.2g} s may be missed; "
+    "give breaks=[...] [s], or write it with gauss.math"
+)
 
 
 FORGETS = (
@@ -55,12 +71,10 @@ class _NoValueError(Exception):
     """A law has no value at some time in the initial state."""
 
 
-def _located(value, begin: float, end: float, what: str) -> Timetable:
+def _located(value, begin: float, end: float, what: str, count: int, constant: str) -> Timetable:
     """Jumps of a function of time, and ends of the intervals in which it is constant."""
-    jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # no period coincides with the samples
-    times = begin + (end - begin) * np.concatenate(
-        [[0.0], (np.arange(SAMPLES) + 0.5 + 0.5 * (jitter - 0.5)) / SAMPLES, [1.0]]
-    )
+    jitter = (0.6180339887498949 * np.arange(count)) % 1.0  # no period coincides with the samples
+    times = begin + (end - begin) * np.concatenate([[0.0], (np.arange(count) + 0.5 + 0.5 * (jitter - 0.5)) / count, [1.0]])
     found = [value(t) for t in times]
     if len({entry.size for entry in found}) > 1:
         raise _NoValueError
@@ -71,15 +85,26 @@ def _located(value, begin: float, end: float, what: str) -> Timetable:
     change = np.abs(np.diff(values, axis=0)).max(axis=1)
     moves = change > 0.0
     if not moves.any():
-        return NO_TIMES
+        text = constant.format(what, times.size, (end - begin) / count * LONGEST_GAP)
+        return Timetable(NO_TIMES.switches, NO_TIMES.mesh, (text,)) if constant else NO_TIMES
     beside = np.maximum(np.append(change[1:], 0.0), np.insert(change[:-1], 0, 0.0))
-    jumps = np.flatnonzero(moves & (change > JUMP_RATIO * beside))
+    jumps = np.flatnonzero(moves & ((change > JUMP_RATIO * beside) | _isolated(moves)))
     if len(jumps) > MOST_JUMPS:
         return NO_TIMES
     close = CLOSE * max(abs(begin), abs(end))
     switches = [_bisected(value, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
     inside = _cells(times, moves)
     return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])
+
+
+def _isolated(moves: np.ndarray) -> np.ndarray:
+    """Cells in which a law changes, in runs of no more than two: one sample sees a pulse as two changes."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(int)))
+    first, last = edges[::2], edges[1::2]
+    found = np.zeros_like(moves)
+    for begin, end in zip(first[last - first <= 2], last[last - first <= 2], strict=True):
+        found[begin:end] = True
+    return found
 
 
 def _cells(times: np.ndarray, moves: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable, timetable
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_law
 from gauss.integrators import Point
 from gauss.scene.values import as_function
-from gauss.system import Relations, State, System
+from gauss.system import BoundLoad, Relations, State, System
 
 LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements that may be laws
 
@@ -74,19 +74,26 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     prescribed = prescribed_times(system.relations, begin, end, monotone)
     unilateral = [prescribed_times(found, begin, end, monotone) for found in (system.contacts, system.set_valued)]
     times = times.join(prescribed, *unilateral)
-    jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
+    last = prescribed.last_end(begin, end)
+    jumps = prescribed_jumps(system, start, end, [*prescribed.stops(begin, end), (last, end)])
     motion = kinematics(system, start) if laws.called else None
-    asked = [(law, f"the law of {bound.load.name!r}") for bound in laws.called for law in bound.laws]
-    times = times.join(*(sampled_times(law, motion, begin, end, what) for law, what in asked))
+    times = times.join(*(_sampled(bound, laws, motion, begin, end) for bound in laws.called))
     times = times.join(*_limits(system, start, end))
     watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if needs_poses(bound.load))
     found = Switching(times, None, called, jumps=jumps)
     return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
 
 
+def _sampled(bound: BoundLoad, laws: Laws, motion, begin: float, end: float) -> Timetable:
+    """Jumps of the opaque laws of a load."""
+    what, given = f"the law of {bound.load.name!r}", getattr(bound.load, "breaks", ())
+    uses_time = laws.fails(bound.load.name) and not needs_poses(bound.load) and not given
+    return NO_TIMES.join(*(sampled_times(law, motion, begin, end, what, uses_time) for law in bound.laws))
+
+
 def _given_times(system: System, breaks, begin: float, end: float) -> Timetable:
     """Switching times given by the user, for the motion or for a load."""
-    given = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
+    given = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t <= end)]
     return Timetable(np.unique(np.asarray(given, dtype=float)), np.zeros(0)) if given else NO_TIMES
 
 

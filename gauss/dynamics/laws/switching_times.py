@@ -36,7 +36,8 @@ class Timetable:
     Attributes
     ----------
     switches : ndarray, shape (k,)
-        Times at which a condition changes [s], ascending: no step crosses one.
+        Times at which a condition changes [s], ascending: no step crosses one. The end of the interval is one of them if a
+        condition is another there than just before.
     mesh : ndarray, shape (m,)
         Ends of cells [s], ascending: steps end at each.
     limitations : tuple of str
@@ -82,6 +83,11 @@ class Timetable:
                 merged.append((float(before), float(after)))
         return [*merged, (end, end)]
 
+    def last_end(self, begin: float, end: float) -> float:
+        """End of the last step up to ``end``: just before it where a switching time falls upon it."""
+        before = end - APART * max(abs(begin), abs(end))
+        return before if ((self.switches >= before) & (self.switches <= end)).any() else end
+
 
 NO_TIMES = Timetable(np.zeros(0), np.zeros(0))
 
@@ -112,7 +118,7 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
     switches = _changes(conditions, clock, begin, end, limitations) if conditions else np.zeros(0)
     degree = _degrees(nodes, clock)
     curved = [node for node in nodes if node.op in CURVED and degree[node.index] > STEEPEST]
-    edges = np.array([begin, *switches, end])
+    edges = np.array([begin, *switches[switches < end], end])
     mesh = _mesh(curved, conditions, clock, edges, limitations, monotone) if curved else np.zeros(0)
     return Timetable(switches, mesh, tuple(limitations))
 
@@ -175,7 +181,8 @@ def _changes(conditions, clock: Expression, begin: float, end: float, limitation
     first = np.flatnonzero(np.concatenate([[True], low[1:] - high[:-1] > close]))  # adjacent cells hold one change
     last = np.append(first[1:], low.size) - 1
     times = 0.5 * (low[first] + high[last])
-    return times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
+    inside = times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
+    return np.append(inside, end) if times[-1] >= end - 4.0 * close else inside
 
 
 def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, limitations: list[str], monotone: bool) -> np.ndarray:

@@ -4,13 +4,14 @@ import numpy as np
 
 from gauss.codegen import Expression, Function, Graph, branches, substitute
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.dynamics.laws.stateful_laws import preserved
 from gauss.dynamics.store import cached
+from gauss.scene.stateful_laws import preserved
 from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import BoundLoad, State, System
 
 PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # times of comparison, in the time of the scene
 AGREEMENT = 1e-6  # relative: traced functions may have other round-off
+UNTRACEABLE = ("TypeError: ", "TracerError: ")
 FIELDS = ("effort", "force", "moment")  # fields of loads that hold laws
 
 
@@ -66,6 +67,10 @@ class Laws:
         if self.motion is None:
             self.motion = symbols(self.system)
         return _confirmed(law, traced_law(law, self.motion), self.motion)
+
+    def fails(self, name: str) -> bool:
+        """Whether a law of a load with opaque laws fails with symbols, so that it uses its arguments."""
+        return any(reason in self.reasons[name] for reason in UNTRACEABLE)
 
     @property
     def outputs(self) -> list[Expression]:

@@ -44,7 +44,7 @@ def robot(name: str) -> Path:
     if len(found) > 1:
         places = ", ".join("/".join(f.with_suffix("").parts[-3:]) for f in found)
         raise FileError(f"robot {name!r} is not unique in {PACKAGE}; choose one of {places}.")
-    return Path(package.locate_file(found[0]))
+    return Path(str(package.locate_file(found[0])))
 
 
 def read_robot(path: Path, options: dict, extras: dict) -> Scene:

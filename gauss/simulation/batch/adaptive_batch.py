@@ -20,7 +20,8 @@ from gauss.dynamics.traced_system import Program
 from gauss.integrators import ExplicitPair, Tolerance
 from gauss.simulation.batch.fixed_step_batch import CHUNKS_PER_THREAD, in_threads
 from gauss.simulation.compiled_run import CHECK_ERRORS
-from gauss.simulation.compiled_steps.loop_functions import adaptive, beginning
+from gauss.simulation.compiled_steps.explicit_stages import ExplicitStages
+from gauss.simulation.compiled_steps.loop_functions import adaptive
 from gauss.simulation.step_limits import BUDGET, LEAST_RESTART_STEP, SMALLEST_STEP, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
 
@@ -43,11 +44,14 @@ class AdaptiveBatchCode:
         self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
         functions = adaptive(program, method, batch=True, shares=shares)
 
-        def start(x, rtol, atol, atol_rates):
-            state = self.layout.point(x).state
-            point, h = beginning(program, method, state, Tolerance(rtol[0], atol[0], atol_rates[0], shares))
-            packed = self.layout.pack(point)
-            return packed, [h, program.residual(state)], program.energies(packed)
+        first = ExplicitStages(program, method, batch=True, shares=shares).first(functions.check)
+
+        def start(x, *tolerance):
+            state, size = self.layout.state(x), self.layout.size
+            parameters = x[size - len(self.layout.parameters) :]
+            given = np.concatenate([[state.t], state.q, state.v, *tolerance, parameters])
+            point, checked, h = np.split(x[0].graph.call(first, given), [size, -1])
+            return point, h, [program.residual(state)], checked[CHECK_ERRORS:]
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
         self.check = Kernel(functions.check)
@@ -120,7 +124,8 @@ class AdaptiveBatch:
         self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES
     ) -> AdaptiveBatchResult:
         """Trajectories to the last of the times, with steps up to ``largest`` [s], from one switching time to the next."""
-        end, count = float(times[-1]), self.starts.shape[1]
+        end, count = switching.last_end(0.0, float(times[-1])), self.starts.shape[1]
+        times = np.minimum(times, end)
         begun = int(np.searchsorted(times, 0.0, side="right"))
         grid = np.append(times, np.inf)
         out = np.empty((count, len(times), len(self.starts)))

@@ -16,7 +16,7 @@ from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
-from gauss.errors import SimulationError, did_you_mean, require
+from gauss.errors import SimulationError, did_you_mean, named_arguments, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep, Integrator
 from gauss.shapes import Shaped
 from gauss.simulation.arguments import sample_times
@@ -67,6 +67,7 @@ class Rollout:
     rejected: Shaped[np.ndarray, " batch"]
 
 
+@named_arguments
 def rollout(
     system: System,
     q0,

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Scalar, write
+from gauss.codegen import Function, NativeFunction, Scalar, write
 from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
@@ -25,26 +25,33 @@ def adaptive(program: Program, method: Controlled, batch: bool = False, shares=N
     """Functions of an adaptive method, for one motion or for a batch; ``shares`` are factors of the tolerance."""
     layout, size = program.layout, program.layout.size
     begin = _equations(program, method)
-    if isinstance(method, ExplicitPair) and not program.drift.partitioned:
+    sample: Function | NativeFunction
+    project: Function | NativeFunction | None
+    if _is_explicit(method, program):
         stages = ExplicitStages(program, method, batch, shares)
-        (trial, dense), dense_evaluations = stages.functions(), method.pair.extra_c.size
-        trimmed: Callable[[np.ndarray], np.ndarray] = stages.coefficients
+        (trial, dense), sample, dense_evaluations = stages.functions(), stages.sample(), method.pair.extra_c.size
+        project = stages.projection()
     else:
         trial, dense, dense_evaluations = _written(program, method, begin, shares)
-        trimmed = lambda coefficients: coefficients  # noqa: E731
+        sample, project = _sample(program, method, begin, len(dense.outputs)), program.projection()
+    check = write(program.watched_point, size, name="check")
+    return Adaptive(size, layout.row, trial, project, check, dense, sample, dense_evaluations, program.rates)
+
+
+def _sample(program: Program, method: Controlled, begin: Callable, count: int) -> Function:
+    """Function (point, h, coefficients of dense output, t) → state and work at t."""
+    layout = program.layout
 
     def sample(x, h, coefficients, t):
         equations = begin(layout.point(x))
-        state, work = method.interpolate(equations, layout.point(x), h[0], trimmed(coefficients), t[0])
+        state, work = method.interpolate(equations, layout.point(x), h[0], coefficients, t[0])
         if program.drift.partitioned:
             state, _ = equations.completed(state)
         if program.projects:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work
 
-    sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
-    project, check = program.projection(), write(program.watched_point, size, name="check")
-    return Adaptive(size, layout.row, trial, project, check, dense, sample, dense_evaluations, program.rates)
+    return write(sample, layout.size, 1, count, 1, name="sample")
 
 
 def single(program: Program, method: Controlled | Taylor, shares=None) -> Loop:
@@ -54,6 +61,8 @@ def single(program: Program, method: Controlled | Taylor, shares=None) -> Loop:
     """
     functions = taylor_step(program, shares) if isinstance(method, Taylor) else adaptive(program, method, shares=shares)
     check = functions.check
+    if _is_explicit(method, program):
+        return functions.compile(ExplicitStages(program, method, shares=shares).first(check))
 
     def start(t, q, v, rtol, atol, atol_rates):
         state, tolerance = State(t[0], q, v), Tolerance(rtol[0], atol[0], atol_rates[0], shares)
@@ -62,6 +71,11 @@ def single(program: Program, method: Controlled | Taylor, shares=None) -> Loop:
         return packed, check(packed), [h]
 
     return functions.compile(write(start, 1, program.layout.n_q, program.layout.n_v, 1, 1, 1, name="start"))
+
+
+def _is_explicit(method: Controlled | Taylor, program: Program) -> TypeGuard[ExplicitPair]:
+    """Whether the steps of a method are those of :class:`ExplicitStages`."""
+    return isinstance(method, ExplicitPair) and not program.drift.partitioned
 
 
 def beginning(program: Program, method: Controlled | Taylor, state: State, tolerance: Tolerance) -> tuple[Point, Scalar]:

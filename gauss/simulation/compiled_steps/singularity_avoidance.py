@@ -38,8 +38,8 @@ class StageNodes:
         times = distinct(np.concatenate([c, others]))
         widest = int(np.argmax(np.diff(times)))
         self.middle, self.half = times[widest : widest + 2].mean(), np.diff(times)[widest] / 2
-        self.times, first = np.unique(c[::-1], return_index=True)
-        self.stages = len(c) - 1 - first  # of stages at one node the last, the most accurate one
+        self.times = distinct(c)
+        self.stages = np.array([np.flatnonzero(c == t)[-1] for t in self.times])  # at one node the last, most accurate one
 
     def place(self, sigma: np.ndarray) -> Scalar:
         """Time of the zero of σ next to the stage with the smallest one, relative to the step.

@@ -9,10 +9,11 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, Scalar, write
-from gauss.codegen.kernels import TRIAL_SETTINGS, CheckedSwitch
+from gauss.codegen.kernels import TRIAL_RESULTS, TRIAL_SETTINGS, CheckedSwitch, RowCode, RowFunction
 from gauss.dynamics.error_scale import NEAR_SINGULAR_ROUNDOFF
 from gauss.dynamics.traced_system import Program, largest
 from gauss.integrators import ExplicitPair, Tolerance, method_state_of, next_factor
+from gauss.simulation.compiled_steps.chart_code import ChartCode
 from gauss.simulation.compiled_steps.singularity_avoidance import StageNodes
 from gauss.system import State
 
@@ -36,37 +37,75 @@ class StepControl:
         Whether the constraint Jacobian can become rank-deficient.
     row : int
         Size of an error estimate.
-    shares : ndarray, optional
-        Factors of the tolerance, see :class:`gauss.integrators.Tolerance`.
+    chart : ChartCode
+        Chart of the system, with the factors of the tolerance.
     """
 
-    def __init__(self, program: Program, method: ExplicitPair, near_singular: bool, row: int, shares=None):
+    def __init__(self, program: Program, method: ExplicitPair, near_singular: bool, row: int, chart: ChartCode):
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
-        self.near_singular, self.row, self.shares = near_singular, row, shares
+        self.near_singular, self.row, self.chart, self.shares = near_singular, row, chart, chart.shares
         self.own, self.T = program.pattern.scale.coordinates, program.pattern.scale.time
         self.nodes = StageNodes(np.append(method.pair.c, 1.0), method.pair.extra_c)
 
-    def function(self) -> Function | CheckedSwitch:
+    def function(self) -> RowFunction | CheckedSwitch:
         """Function (point, *GIVEN, end of the step, σ at each slope, error estimates) → verdict.
 
         A verdict is the error over the tolerance, the step-size factor, evaluations and factorisations.
         """
         pair, size = self.method.pair, self.layout.size
         given = (size, *[1] * len(TRIAL_SETTINGS), size, len(pair.c) + 1, *[self.row] * len(pair.errors))
-        regular = write(self._regular, *given, name="step_control")
+        regular = RowFunction("step_control", sum(given), TRIAL_RESULTS + int(self.near_singular), self._regular)
         if not self.near_singular:
             return regular
         return CheckedSwitch(regular, write(self._singular, *given, name="singular_step_control"), NEGLIGIBLE_NOISE)
 
-    def _regular(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, sigma, *estimates):
+    def _regular(self, code: RowCode):
         """Verdict; where the Jacobian can become rank-deficient, also the tolerance over the error by rounding."""
-        tolerance, ends = self._tolerance(rtol, atol, atol_rates), self._ends(x, reached)
-        error = self.method.error(self.system, ends, estimates, h[0], tolerance)
+        size, count, pair = self.layout.size, 2 * self.system.n_v, self.method.pair
+        reached = size + len(TRIAL_SETTINGS)
+        estimates = reached + size + len(pair.c) + 1
+        ends = [code.at(code.given, place) for place in (0, reached)]
+        sizes = [code.room(count) for _ in ends]
+        for end, target in zip(ends, sizes, strict=True):
+            self.chart.sizes(code, end, target)
+        allowed = self.chart.tolerances(code, code.at(code.given, size + TRIAL_SETTINGS.index("rtol")), sizes)
+        found = code.room(estimates + len(pair.errors) + 1)
+        code.copy(found, code.given, estimates)
+        for k in range(len(pair.errors)):
+            estimate = code.at(code.given, estimates + k * self.row)
+            code.put(found, estimates + k, code.sum_of_squares(count, estimate, allowed))
+        code.put(found, estimates + len(pair.errors), self._fastest(code, ends))
+        code.call(self._verdict(len(pair.c) + 1, len(pair.errors)), found, code.found)
+
+    def _fastest(self, code: RowCode, ends: list):
+        """Largest rate at the ends of a step, in units of the scene [1/s]."""
+        zero, rates = code.motions.constant(0.0), [code.at(end, 1 + self.layout.n_q) for end in ends]
         if not self.near_singular:
-            return [*self._seen(x, reached, error, self._factor(x, error), refused, smallest), self.method.evaluations, 0.0]
-        spoilt, factor = h[0] * self.T * largest(self._noise(ends, sigma)), self._shifted(x, error, sigma)
-        verdict = self._seen(x, reached, error, factor, refused, smallest)
-        return [*verdict, self.method.evaluations, 0.0, self._allowed(ends, tolerance) / spoilt]
+            return zero
+        larger = write(lambda most, unit, v: [math.maximum(most[0], largest(v * unit))], 1, 1, 2, name="larger")
+
+        def following(k, most):
+            unit = code.motions.broadcast(code.constant("inverse_rate_units", 1.0 / self.own, k))
+            return code.inline(larger, most, unit, *(code.number(v, k) for v in rates))[0]
+
+        return code.reduced(self.system.n_v, zero, following)
+
+    def _verdict(self, slopes: int, estimates: int) -> Function:
+        """Function of the inputs but the estimates, sums of squares of the latter, and the largest rate → verdict."""
+        size = self.layout.size
+
+        def verdict(x, h, rtol, atol, atol_rates, refused, last, smallest, reached, sigma, squares, speed):
+            error = self.method.error_of_squares(list(squares), 2 * self.system.n_v, h[0])
+            if not self.near_singular:
+                found = self._seen(x, reached, error, self._factor(x, error), refused, smallest)
+                return [*found, self.method.evaluations, 0.0]
+            spoilt = h[0] * self.T * largest(self._noise(speed[0], sigma))
+            found = self._seen(x, reached, error, self._shifted(x, error, sigma), refused, smallest)
+            tolerance = self._allowed(speed[0], self._tolerance(rtol, atol, atol_rates))
+            return [*found, self.method.evaluations, 0.0, tolerance / spoilt]
+
+        sizes = size, *[1] * len(TRIAL_SETTINGS), size, slopes, estimates, 1
+        return write(verdict, *sizes, name="verdict")
 
     def _singular(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, sigma, *estimates):
         """Verdict near a singular configuration.
@@ -75,9 +114,10 @@ class StepControl:
         stages lies near the configuration is first moved; after repeated rejections rounding is allowed for.
         """
         tolerance, ends, n = self._tolerance(rtol, atol, atol_rates), self._ends(x, reached), self.system.n_v
+        speed = self._speed(ends)
         along = lambda change: self.program.along([ends[1].t], ends[1].q, change)  # noqa: E731
         projected = [np.concatenate([along(change[:n]), along(change[n : 2 * n])]) for change in estimates]
-        noise, share = self._noise(ends, sigma), np.exp(LOG_NOISE_GROWTH * (refused[0] - REJECTIONS_BEFORE_NOISE))
+        noise, share = self._noise(speed, sigma), np.exp(LOG_NOISE_GROWTH * (refused[0] - REJECTIONS_BEFORE_NOISE))
         units = np.concatenate([self.own * self.T, self.own])
         rounding = [share * (np.abs(weights) @ noise) * units for weights in self.method.pair.errors]
         error = self.method.error(self.system, ends, projected, h[0], tolerance, rounding)
@@ -85,7 +125,7 @@ class StepControl:
         ends_late = last[0] * (place - self.nodes.middle) > 0.0  # the end of the run cannot be moved
         shift = math.where(ends_late, 1.0, self.nodes.shift(place))
         moves = math.where(shift < 1.0, math.where(refused[0] < MOST_MOVES, 1.0, 0.0), 0.0)
-        moves = math.where(MOVING_NOISE * h[0] * self.T * largest(noise) > self._allowed(ends, tolerance), moves, 0.0)
+        moves = math.where(MOVING_NOISE * h[0] * self.T * largest(noise) > self._allowed(speed, tolerance), moves, 0.0)
         factor = math.where(moves > 0.0, shift, self._shifted(x, error, sigma))
         error, factor = self._seen(x, reached, math.where(moves > 0.0, np.inf, error), factor, refused, smallest)
         return [error, factor, self.method.evaluations, 0.0]
@@ -110,13 +150,13 @@ class StepControl:
         """Largest rate at the ends of a step, in units of the scene [1/s]."""
         return math.maximum(*(largest(state.v * (1.0 / self.own)) for state in ends))
 
-    def _noise(self, ends: tuple[State, State], sigma: np.ndarray) -> np.ndarray:
-        """Rounding error ε v² / σ³ of the accelerations of each stage, from σ there [1/s²]."""
-        return NEAR_SINGULAR_ROUNDOFF * self._speed(ends) ** 2 / sigma**3
+    def _noise(self, speed: Scalar, sigma: np.ndarray) -> np.ndarray:
+        """Rounding error ε v² / σ³ of the accelerations of each stage, from the largest rate, and σ there [1/s²]."""
+        return NEAR_SINGULAR_ROUNDOFF * speed**2 / sigma**3
 
-    def _allowed(self, ends: tuple[State, State], tolerance: Tolerance) -> Scalar:
+    def _allowed(self, speed: Scalar, tolerance: Tolerance) -> Scalar:
         """Tolerance of the largest rate, in units of the scene."""
-        return tolerance.atol_rates + tolerance.rtol * self.T * self._speed(ends)
+        return tolerance.atol_rates + tolerance.rtol * self.T * speed
 
     def _ends(self, x, reached) -> tuple[State, State]:
         return self.layout.state(x), self.layout.state(reached)

@@ -11,7 +11,7 @@ import numpy as np
 from gauss.dynamics import compile_scene
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
-from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
+from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, named_arguments, require
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
 from gauss.simulation.arguments import check_arguments
@@ -29,6 +29,7 @@ from gauss.system import System
 DEFAULT_ATOL = 1e-9  # relative to the scale of the scene
 
 
+@named_arguments
 def sweep(
     scene: Scene | Callable[..., Scene],
     vary: Mapping[str, Sequence[float]],

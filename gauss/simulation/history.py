@@ -1,0 +1,71 @@
+"""Laws that depend on their history: their values at samples, with the state before a motion and with that after it.
+
+Methods call a law several times in a step, and again in steps that they reject: what a law keeps from these calls is not the
+history of the motion.
+"""
+
+import warnings
+
+import numpy as np
+
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.errors import SwitchingWarning, user_level
+from gauss.scene.stateful_laws import PreservedState
+from gauss.simulation.trajectory import Trajectory
+
+COMPARED_SAMPLES = 5  # of a motion, at which a law is called with both states
+
+
+class History:
+    """State of the opaque laws of a system before a motion.
+
+    Parameters
+    ----------
+    laws : Laws
+        Loads of the system.
+    """
+
+    def __init__(self, laws: Laws):
+        own = [(str(getattr(bound.load, "name", "")), law) for bound in laws.called for law in bound.laws]
+        self.kept = [(name, law, PreservedState(law)) for name, law in own]
+
+    def warn(self, trajectory: Trajectory):
+        """Warn of laws whose values depend on what calls during the motion have changed.
+
+        Warns
+        -----
+        SwitchingWarning
+            With the names of the loads, and a remedy.
+        """
+        names = dict.fromkeys(name for name, law, before in self.kept if _depends(law, before, trajectory))
+        if names:
+            warnings.warn(
+                f"{trajectory.system.scene.name!r}: the law of {', '.join(map(repr, names))} depends on what it keeps from "
+                "one call for the next, but methods call a law several times in a step, and again in steps that they "
+                "reject: its motion is another one. Simulate a controller with a state from sample to sample, each time "
+                "with state=motion.state(-1), and change its output in between.",
+                SwitchingWarning,
+                stacklevel=user_level(),
+            )
+
+
+def _depends(law, before: PreservedState, trajectory: Trajectory) -> bool:
+    """Whether a law has other values with its present state than with the one before; its present state is left."""
+    if not before.differs():
+        return False
+    after, count = PreservedState(law), min(COMPARED_SAMPLES, len(trajectory))
+    rows = np.linspace(0, len(trajectory) - 1, count).astype(int)
+    motions = [kinematics(trajectory.system, trajectory.state(int(row))) for row in rows]
+    try:
+        return any(not np.array_equal(_value(law, one, before), _value(law, one, after)) for one in motions)
+    except Exception:  # a law may fail in any way in a state that it does not expect
+        return True
+    finally:
+        after.restore()
+
+
+def _value(law, motion, state: PreservedState) -> np.ndarray:
+    """Value of a law with a state of its own."""
+    state.restore()
+    return np.asarray(law(motion.state.t, motion), dtype=float)
