@@ -211,11 +211,10 @@ def test_a_law_that_was_changed_is_traced_again():
     assert np.abs(after - before).max() > 1e-3
 
 
-def test_what_is_not_compiled_says_why():
+def test_a_force_on_a_body_leaves_a_large_tree_its_recursion():
     long = gauss.load("n_pendulum", n=45)
     long.force("push", "rod9", force=(1, 0, 0))
-    plan = motion_plan(gauss.compile_scene(long))
-    assert plan.dynamics == "certified" and all("'push'" in why for rejected in plan.rejected for why in rejected.why[:1])
+    assert motion_plan(gauss.compile_scene(long)).dynamics == "tree recursion"
     assert motion_plan(gauss.compile_scene(mechanisms.rods(2))).driver == "compiled loop"
 
 
@@ -241,7 +240,7 @@ def test_explain_names_the_laws_that_cost_time_and_they_are_called_once_in_an_ev
 def test_compiled_accelerations_are_confirmed():
     """A kernel that is wrong is found out, and not used any more."""
     system = gauss.compile_scene(mechanisms.rods(2))
-    traced = CompiledEngine(system, Program(system, Laws(system)).kernels(), [])
+    traced = CompiledEngine(system, Program(system, Laws(system)).kernels())
     state = system.state([0.1, 0.2], [1.0, -1.0])
     rates = traced.rates(system, state)
     traced.check(Point(state, np.zeros(3), rates))

@@ -111,18 +111,16 @@ def test_laws_off_their_limits_count_once_where_the_recursion_answers():
     assert off(system.accelerations(state, load), certified(system, state, load)) <= ROUNDING
 
 
-@pytest.mark.parametrize("what", ["law on a body", "force on a large tree", "law of the motion"])
-def test_what_is_not_compiled_is_solved(what):
-    scene = gauss.load("n_pendulum", n=45) if what == "force on a large tree" else mechanisms.rods(2)
-    if what == "force on a large tree":
-        scene.force("push", "rod9", force=(1, 0, 0))
+@pytest.mark.parametrize("what", ["law on a body", "law of the motion"])
+def test_opaque_laws_are_called_beside_machine_code(what):
+    scene = mechanisms.rods(2)
     if what == "law on a body":
         scene.force("wind", next(iter(scene.bodies)), force=lambda t: (t, 0.0, 1.0 if float(t) > 0 else 0.0))
     if what == "law of the motion":
         scene.drive("J1", torque=lambda t, motion: float(motion.coordinate("J2")))
     system = gauss.compile_scene(scene)
     (state,), (load,) = mechanisms.consistent_states(system, 1)
-    assert np.array_equal(system.accelerations(state, load), certified(system, state, load))
+    assert off(system.accelerations(state, load), certified(system, state, load)) <= ROUNDING
     with pytest.raises(SimulationError, match="cannot be compiled: .*; use system.accelerations"):
         _ = system.forward_dynamics
 

@@ -14,6 +14,7 @@ from gauss.dynamics.conditions import has_large_loops
 from gauss.dynamics.engines.call_graph import CallGraphKernels
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.traced_system import Program
@@ -98,7 +99,7 @@ def case(request):
 def test_accelerations_are_those_of_the_certified_recursion(case):
     system, state, kernels = case
     load = np.random.default_rng(2).normal(size=system.n_v)
-    found = kernels.refined(np.concatenate([state.q, state.v, load, [0.0]]), system.loads)
+    found = kernels.refined(np.concatenate([state.q, state.v, load, [0.0]]), LoadForces(system, system.loads))
     solution = gauss.solve(gauss.assemble(system, state, load))
     assert str(solution.status) == "solved"
     scale = np.abs(solution.qdd).max()

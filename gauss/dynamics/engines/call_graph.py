@@ -69,10 +69,10 @@ class CallGraphKernels:
         self._given = {name: Vector(places) for name, places in given.items()}
         self._memory = recorder.compiled()
 
-    def refined(self, inputs: np.ndarray, loads: LoadForces) -> np.ndarray:
+    def refined(self, inputs: np.ndarray, loads: LoadForces | None = None) -> np.ndarray:
         """(q, v, τ, t) → as :func:`gauss.dynamics.traced_refinement.refined_once`, under loads."""
         q, v, effort, (t,) = np.split(inputs, np.cumsum([self.system.n_q, self.system.n_v, self.system.n_v]))
-        effort = effort + loads(State(t, q, v))[0]
+        effort = effort if loads is None else effort + loads(State(t, q, v))[0]
         with self._lock:
             self._at(q, v)
             found, multipliers, _ = self._constrained("motion", effort, 0.0)
