@@ -6,10 +6,11 @@ another thread may call LLVM, is that of one unit. Both tiers evaluate the same 
 fused where the IR says so: their results are equal to the last bit.
 """
 
+import gc
 import struct
 from collections.abc import Iterator
 from functools import cache
-from itertools import islice
+from itertools import count, islice
 
 import llvmlite
 import llvmlite.binding as llvm
@@ -20,6 +21,7 @@ OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth l
 PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
 RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one object for that of another
 UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
+LINKS_PER_COLLECTION = 32  # modules linked between two collections, which take 30 ms
 CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
 
 
@@ -117,6 +119,9 @@ def unpacked(content: bytes) -> list[bytes]:
     return found
 
 
+_links = count(1)
+
+
 def linked(objects: list[bytes]) -> llvm.ExecutionEngine:
     """Machine code in memory, owned by the engine."""
     target(OPTIMISED)
@@ -127,4 +132,11 @@ def linked(objects: list[bytes]) -> llvm.ExecutionEngine:
     for content in objects:
         engine.add_object_file(llvm.ObjectFileRef.from_data(content))
     engine.finalize_object()
+    _collect_engines_that_are_gone()
     return engine
+
+
+def _collect_engines_that_are_gone():
+    """Collect garbage from time to time: few Python objects hold much machine code, and the collector counts objects."""
+    if next(_links) % LINKS_PER_COLLECTION == 0 and gc.isenabled():
+        gc.collect()
