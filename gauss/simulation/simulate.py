@@ -119,10 +119,8 @@ def simulate(
         If a law may have switched between two evaluations: fixed steps and methods of libraries do not locate conditions on
         the state, and nothing is known of opaque laws between evaluations. If the value of a law depends on what it keeps
         from one call for the next.
-=======
     SlowRouteWarning
         Once for each system, if an element of the scene makes the motion a hundred times slower than machine code.
->>>>>>> theirs
 
     Raises
     ------
@@ -139,16 +137,13 @@ def simulate(
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
-        history = History(problem.laws)
         settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
         found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)
     history.warn(found)
-=======
     if plan is None and not own_backend(problem.question):
         warn_of_slow_route(problem.system, found.stats.plan, found.stats.evaluations)
->>>>>>> theirs
     return found
 
 
