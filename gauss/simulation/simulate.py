@@ -10,6 +10,8 @@ from gauss.arguments import named_arguments
 from gauss.backends import Backend
 from gauss.codegen import gc_pause, one_tier
 from gauss.codegen.tiers import AUTO, Run
+from gauss.dynamics.conditions import own_backend
+from gauss.dynamics.evaluation_cost import warn_of_slow_route
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
