@@ -233,7 +233,7 @@ def _function(encoder: _Encoder, function: FunctionType):
     if id(function) in encoder.names or _has_name(function):
         _named(encoder, function)
         return
-    ours = function.__module__.partition(".")[0] == PACKAGE
+    ours = (function.__module__ or "").partition(".")[0] == PACKAGE
     closed = tuple(_content(cell) for cell in function.__closure__ or ())
     seen = {} if ours else _globals(function)
     encoder.sequence(b"p", (function.__defaults__, function.__kwdefaults__, vars(function), closed, seen))

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping
 from gauss.codegen.expression import COMMUTATIVE, Expression, Graph, reachable
 from gauss.codegen.function import Function, traced
 
+REPEATED = ("neg", "less", "less_equal")  # signs fold, and conditions are no numbers: each function evaluates its own
+
 
 class EarlyGraph(Graph):
     """Graph of the early inputs.
@@ -40,9 +42,9 @@ class EarlyGraph(Graph):
         return known[value.index]
 
     def _is_rebuilt(self, node: Expression, known: dict[int, Expression]) -> bool:
-        """Whether a later function evaluates a node itself; it sees constants and signs, which fold there."""
+        """Whether a later function evaluates a node itself, as constants and what is :data:`REPEATED`."""
         early = self.evaluated is None or node.index in self.evaluated
-        return node.index not in known and (node.is_constant or node.op == "neg" or not early)
+        return node.index not in known and (node.is_constant or node.op in REPEATED or not early)
 
     def evaluation(self, op: str, operands: list[Expression]) -> Expression | None:
         """Node of an operation on nodes of this graph, if it may be evaluated here."""
@@ -76,7 +78,7 @@ class LaterGraph(Graph):
 
     def _make(self, op: str, operands: tuple, value=None) -> Expression:
         origins = self._origins
-        if value is None and op != "neg" and all(x.index in origins or x.is_constant for x in operands):
+        if value is None and op not in REPEATED and all(x.index in origins or x.is_constant for x in operands):
             nodes = [self._first.constant(x.value) if x.is_constant else origins[x.index] for x in operands]
             node = self._first.evaluation(op, nodes)
             if node is not None:

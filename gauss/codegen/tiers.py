@@ -16,11 +16,12 @@ from contextlib import ContextDecorator
 from contextvars import ContextVar, Token
 from itertools import count
 from threading import Lock
-from typing import Protocol
-
-import llvmlite.binding as llvm
+from typing import TYPE_CHECKING, Protocol
 
 from gauss.errors import ArgumentError, did_you_mean
+
+if TYPE_CHECKING:
+    import llvmlite.binding as llvm
 
 AUTO, QUICK, OPTIMISED = "auto", "quick", "optimised"
 TIERS = AUTO, QUICK, OPTIMISED
@@ -122,7 +123,7 @@ def _connect_offered():
 class CodeUser(Protocol):
     """Object with addresses of functions."""
 
-    def connect(self, engine: llvm.ExecutionEngine) -> None:
+    def connect(self, engine: "llvm.ExecutionEngine") -> None:
         """Use optimised code from now on."""
 
 
@@ -148,7 +149,7 @@ class MachineCode:
         Number of the offer of optimised code; 0 without one.
     """
 
-    def __init__(self, key: str, engine: llvm.ExecutionEngine, tier: str, source: tuple[bytes, int] | None = None):
+    def __init__(self, key: str, engine: "llvm.ExecutionEngine", tier: str, source: tuple[bytes, int] | None = None):
         self.key, self.tier, self.source, self.offer = key, tier, source, 0
         self._engines = [engine]  # the quick one stays: calls in progress may be in it
         self._users: weakref.WeakSet[CodeUser] = weakref.WeakSet()
@@ -175,7 +176,7 @@ class MachineCode:
             if self._is_last:
                 user.connect(self._engines[-1])
 
-    def offer_optimised(self, engine: llvm.ExecutionEngine):
+    def offer_optimised(self, engine: "llvm.ExecutionEngine"):
         """Offer optimised code to later runs, and to calls outside runs."""
         with _lock:
             self._engines.append(engine)
@@ -218,7 +219,7 @@ class EntryPoint:
             run.is_quick = True
         return self._first(*args)
 
-    def connect(self, engine: llvm.ExecutionEngine):
+    def connect(self, engine: "llvm.ExecutionEngine"):
         """Call the function of optimised code directly from now on."""
         address = engine.get_function_address(self._name)
         self.call = self._signature(address)  # type: ignore[method-assign]  # no choice is left: one call less

@@ -5,7 +5,7 @@ from math import pi, radians
 
 import numpy as np
 
-from gauss.errors import StartWarning
+from gauss.errors import StartWarning, user_level
 from gauss.scene.joint import Joint
 from gauss.scene.loads import Start
 
@@ -30,12 +30,12 @@ def warn_of_start(start: Start, joint: Joint):
         unit = "rad" if angles else "m"
         hint = f" {_in_radians(position[0])}" if angles and low <= radians(position[0]) <= high else ""
         said = f"{what}: {position[0]:g} {unit} is beyond its limits, {low:g} to {high:g} {unit}, where it starts instead."
-        warnings.warn(said + hint, StartWarning, stacklevel=5)
+        warnings.warn(said + hint, StartWarning, stacklevel=user_level())
         return
     for k in angles:
         if position.size > k and abs(position[k]) > LARGEST_ANGLE:
             said = f"{what}: {position[k]:g} rad are {position[k] / (2 * pi):.3g} turns. {_in_radians(position[k])}"
-            warnings.warn(said, StartWarning, stacklevel=5)
+            warnings.warn(said, StartWarning, stacklevel=user_level())
 
 
 def _in_radians(degrees: float) -> str:

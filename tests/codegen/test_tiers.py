@@ -253,6 +253,7 @@ STEPPED = {
     "block_on_incline",
     "box_on_plane_4",
     "painleve_rod",
+    "rolling_ball",
     "slack_rope",
 }  # scenes with friction of contacts, and one rope
 MOTIONS = [(name, "time_stepping" if name in STEPPED else "dop853") for name in shipped()] + [("cardan", "taylor")]
