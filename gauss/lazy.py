@@ -73,9 +73,12 @@ class LazyTable(Mapping[str, Value]):
 
     def __init__(self, sources: dict[str, Source], find: Callable[[Source], Value]):
         self._sources, self._find = sources, find
+        self._found: dict[str, Value] = {}
 
     def __getitem__(self, name: str) -> Value:
-        return self._find(self._sources[name])
+        if name not in self._found:
+            self._found[name] = self._find(self._sources[name])
+        return self._found[name]
 
     def __contains__(self, name: object) -> bool:
         return name in self._sources

@@ -17,6 +17,7 @@ import numpy as np
 CLOCK = time.thread_time  # CPU time of the main thread [s]
 DURATION = 0.2  # of the motion [s]
 RTOL = 1e-9
+STEP = 1e-3  # s, of time stepping
 PARTS = ("import", "read", "build", "trace", "write", "LLVM", "link")
 
 
@@ -55,10 +56,12 @@ def main(name: str, answer: str) -> dict:
     imported = builtins.__import__
     builtins.__import__ = watch.part("import", imported)
     import gauss
-    from benchmarks.latency.scenes import scenes
+    from benchmarks.latency.scenes import STEPPED, scenes
     from gauss.codegen import emit, function, machine
 
     compile_scene, ask = gauss.compile_scene, partial(ANSWERS[answer], gauss)
+    if name in STEPPED:
+        ask = partial(_stepped, gauss)
     write = function.write
     traced = watch.part("trace", write)
     for module in [module for key, module in sys.modules.items() if key.startswith("gauss.")]:
@@ -94,6 +97,10 @@ def _again(ask, system, state) -> float:
 
 def _motion(gauss, system, state) -> np.ndarray:
     return gauss.simulate(system, DURATION, rtol=RTOL, progress=False).q[-1]
+
+
+def _stepped(gauss, system, state) -> np.ndarray:
+    return gauss.simulate(system, DURATION, integrator="time_stepping", step=STEP, progress=False).q[-1]
 
 
 def _accelerations(gauss, system, state) -> np.ndarray:

@@ -11,6 +11,7 @@ ROBOTS = (
     *("talos", "anymal", "a1", "go2", "laikago", "solo12", "hyq", "g1_29dof_rev_1_0", "simple_humanoid", "icub_reduced"),
 )
 ARMS = ROBOTS[:10]  # on the ground; the others are free in space
+STEPPED = ("block_on_incline", "painleve_rod", "rolling_ball")  # with friction of contacts: time stepping moves them
 FEET, SHINS = ("l_ankle", "r_ankle"), ("LLEG_LINK5", "RLEG_LINK5")
 
 
