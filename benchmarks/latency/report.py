@@ -7,7 +7,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-from benchmarks.latency.child import PARTS  # noqa: E402
+from benchmarks.latency.child import BEFORE, PARTS  # noqa: E402
 from gauss.bench.markdown import head, table, when_and_where  # noqa: E402
 from gauss.bench.table import header_of, read_table  # noqa: E402
 
@@ -24,7 +24,12 @@ COLD_LIMITS = {  # what the first motion may take with an empty cache [s]
     "ladder of 40": 2.0,
     "biped, both feet fixed": 1.0,
 }
-SHARES = [part for part in PARTS if part not in ("import", "read")] + ["rest"]
+SERIES = (  # of the chart: label, state of the cache, figure, marker
+    ("cold", "cold", "first", "C0o"),
+    ("warm", "warm", "first", "C1o"),
+    ("later in the same process", "warm", "later", "C2o"),
+)
+SHARES = [part for part in PARTS if part not in BEFORE] + ["rest"]
 
 
 def page(rows: list[dict], conditions: list[str]) -> list[str]:
@@ -40,7 +45,8 @@ def page(rows: list[dict], conditions: list[str]) -> list[str]:
         f"imports and reading of the scene are in neither. Warm goal: {WARM_LIMIT} s everywhere. The least of the rounds.",
     ]
     scales = ["", "CPU time of whole processes:", "", *table(["process", "whole"], scale)] if scale else []
-    return [*head("First answers", conditions), *text, "", *table(titles, lines), *scales, ""]
+    picture = ["", "![CPU time of first and later motions of all scenes](latency.png)"]
+    return [*head("First answers", conditions), *text, *picture, "", *table(titles, lines), *scales, ""]
 
 
 def least(rows: list[dict]) -> dict[tuple, dict]:
@@ -54,23 +60,22 @@ def least(rows: list[dict]) -> dict[tuple, dict]:
 
 
 def chart(folder: Path):
-    """Bars of the first motions, cold by parts and warm, as latency.png."""
+    """First motions, cold and warm, and later ones, as latency.png."""
     path = folder / "latency.csv"
     best, conditions = least(read_table(path)), header_of(path)
     names = [scene for scene, answer, cache in best if (answer, cache) == ("motion", "cold")]
     names = [name for name in names if all(best[name, "motion", cache]["first"] != "" for cache in ("cold", "warm"))]
     names.sort(key=lambda name: best[name, "motion", "cold"]["first"])
-    figure, axes = plt.subplots(figsize=(8, 0.6 + 0.17 * len(names)), layout="constrained")
-    left = [0.0] * len(names)
-    for part in SHARES:
-        widths = [best[name, "motion", "cold"][part] for name in names]
-        axes.barh(names, widths, left=left, label=f"cold: {part}", height=0.7)
-        left = [a + b for a, b in zip(left, widths, strict=True)]
-    axes.plot([best[name, "motion", "warm"]["first"] for name in names], names, "k|", markersize=8, label="warm")
-    axes.plot([best[name, "motion", "warm"]["later"] for name in names], names, "k.", markersize=3, label="later")
-    axes.set(xscale="symlog", xlabel="CPU time to the first motion of 0.2 s [s]", xlim=(0.0, None))
-    axes.set_xscale("symlog", linthresh=0.1)
+    figure, axes = plt.subplots(figsize=(8, 1.2 + 0.16 * len(names)), layout="constrained")
+    for label, cache, figure_of, style in SERIES:
+        axes.plot([best[name, "motion", cache][figure_of] for name in names], names, style, markersize=5, label=label)
+    limited = [name for name in names if name in COLD_LIMITS]
+    axes.plot([COLD_LIMITS[name] for name in limited], limited, "|", color="0.4", markersize=9, label="cold, at most")
+    axes.axvline(WARM_LIMIT, color="0.7", linewidth=0.8, label="warm, at most")
+    axes.set(xscale="log", xlabel="CPU time of a motion of 0.2 s [s]")
+    axes.grid(axis="x", color="0.9")
     axes.tick_params(axis="y", labelsize=6)
+    axes.margins(y=0.01)
     axes.legend(fontsize=7, loc="lower right")
     axes.set_title(when_and_where(conditions), fontsize=8)
     figure.savefig(folder / "latency.png", dpi=150)
