@@ -32,6 +32,7 @@ def outputs(system, drift: Drift) -> dict[str, np.ndarray]:
     return {name: Kernel(function, batch=False)(given) for name, (function, given) in found.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "drift"), [*((name, Drift()) for name in NAMES), ("four_bar", BAUMGARTE)])
 def test_calls_compute_what_one_piece_computes(name, drift, monkeypatch):
     """Loops, redundant rows, couplings, relations, rolling; with projection and with Baumgarte feedback."""

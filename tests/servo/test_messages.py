@@ -35,6 +35,7 @@ def test_an_arm_drawn_out_of_reach(options):
     assert said == pytest.approx((REACH - np.linalg.norm(START)) / SPEED, abs=LOCATED)
 
 
+@pytest.mark.slow
 def test_an_arm_stretched_along_a_relation():
     """The row of that relation vanishes, and its direction is no guide: it is named all the same."""
 

@@ -81,6 +81,7 @@ def said(law) -> bool:
     return any(issubclass(one.category, SwitchingWarning) and "state=motion.state(-1)" in str(one.message) for one in heard)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REMEMBERS)
 def test_a_law_with_a_memory_is_said_in_every_call(name):
     for _ in range(2):

@@ -106,6 +106,7 @@ def test_andrews_squeezer():
     assert np.abs(v[-1] - table["v"][-1]).max() <= 1e-8  # rates of 1000 rad/s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOCKS)
 def test_pendulum_over_many_periods(name):
     """Whittaker, Analytical Dynamics, §44, in 40 digits; g and the times are taken as the doubles that they are."""
