@@ -42,7 +42,7 @@ ITERATION_LIMITS = {
     "scs": ("max_iters", FIRST_ORDER),
 }
 # Beyond what qpbenchmark sets. CVXOPT, KVXOPT and ECOS look at the duality gap by tolerances of their own, which follow
-# like those of others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
+# like those of others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only if a setting asks for it.
 GAPS = dict.fromkeys(("cvxopt", "ecos", "kvxopt"), ("abstol", "reltol"))
 CLOCKS = {"piqp": {"compute_timings": True}, "proxqp": {"compute_timings": True}}
 BEYOND = {

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from gauss.codegen.content_key import PACKAGE, IdentityKey
+from gauss.codegen.content_key import PACKAGE, IdentityKey, named_globals
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 
@@ -235,7 +235,7 @@ def _function(encoder: _Encoder, function: FunctionType):
         return
     ours = (function.__module__ or "").partition(".")[0] == PACKAGE
     closed = tuple(_content(cell) for cell in function.__closure__ or ())
-    seen = {} if ours else _globals(function)
+    seen = {} if ours else named_globals(function)
     encoder.sequence(b"p", (function.__defaults__, function.__kwdefaults__, vars(function), closed, seen))
     encoder.encode(function.__code__)
 
@@ -252,19 +252,6 @@ def _code(encoder: _Encoder, code: CodeType):
         _refused(encoder, code)
     encoder.sequence(b"k", [getattr(code, name) for name in CODE_FIELDS])
     encoder.encode(code.co_consts)
-
-
-def _globals(function: FunctionType) -> dict:
-    """Values of the globals that are named by a function or by one nested in it."""
-    names = sorted(set(_names(function.__code__)) & function.__globals__.keys())
-    return {name: function.__globals__[name] for name in names}
-
-
-def _names(code: CodeType):
-    yield from code.co_names
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _names(constant)
 
 
 def _traced(encoder: _Encoder, function: Function):

@@ -79,13 +79,13 @@ def _function(function: FunctionType, inside) -> tuple:
     if _is_ours(function) and "<locals>" not in function.__qualname__:
         return (IdentityKey(function),)
     closed = [cell.cell_contents if _is_filled(cell) else None for cell in function.__closure__ or ()]
-    found = {} if _is_ours(function) else _globals(function)
+    found = {} if _is_ours(function) else named_globals(function)
     parts = (content_key(part, inside) for part in (function.__defaults__, function.__kwdefaults__, closed, found))
     return function.__code__, IdentityKey(function.__globals__), *parts
 
 
-def _globals(function: FunctionType) -> dict:
-    """Values of the globals named by a function or by one nested in it; modules and classes are compared by identity."""
+def named_globals(function: FunctionType) -> dict:
+    """Values of the globals named by a function or by one nested in it."""
     names = sorted(set(_names(function.__code__)) & function.__globals__.keys())
     return {name: function.__globals__[name] for name in names}
 

@@ -53,8 +53,6 @@ def warn_of_slow_route(system: System, plan: Plan, evaluations: int):
     SlowRouteWarning
         With the elements, the estimated costs, and a remedy.
     """
-    if not plan.rejected:
-        return
     ratio, cost = slowdown(system, plan), evaluation_cost(system, plan)
     if ratio < CLIFF or cost * evaluations < LEAST_WASTE:
         return

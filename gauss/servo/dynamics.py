@@ -113,7 +113,7 @@ class ServoEngine(Engine):
         """Verdict of an instant at or next to which the rank of S is deficient by one."""
         return rank_lost(here, self._active, self.servo.efforts)
 
-    def unmoved(self, here: ServoInstant, rows: np.ndarray) -> Verdict:
+    def without_motion(self, here: ServoInstant, rows: np.ndarray) -> Verdict:
         """Verdict of an instant at or next to which some rows of the relations vanish."""
         return row_lost(here, rows, self._active, self.servo.efforts)
 

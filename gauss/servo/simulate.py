@@ -136,11 +136,11 @@ class ServoRun(PythonRun):
         dynamics, last = self.servo_engine, self.points[1]
         here, first = dynamics.instant(last.state), dynamics.instant(self.points[0].state)
         now, before = (np.linalg.svd(one.cosines, compute_uv=False).min(initial=1.0) for one in (here, first))
-        faded = np.flatnonzero(here.lengths < LOST_RANK * first.lengths)
-        grown = self.system.scale.fastest(last.state.v) > self.system.scale.fastest(self.points[0].state.v) / LOST_RANK
-        if faded.size and grown:
-            verdict = dynamics.unmoved(here, faded)
-            share = (here.lengths[faded] / first.lengths[faded]).min()
+        lost = np.flatnonzero(here.lengths < LOST_RANK * first.lengths)
+        is_faster = self.system.scale.fastest(last.state.v) > self.system.scale.fastest(self.points[0].state.v) / LOST_RANK
+        if lost.size and is_faster:
+            verdict = dynamics.without_motion(here, lost)
+            share = (here.lengths[lost] / first.lengths[lost]).min()
             return (
                 f"t = {last.state.t:.9g} s: {verdict.reason}; the row falls to {share:.1e} of that at the start, and rates "
                 f"grow to {np.abs(last.state.v).max():.1e}. {AVOID}",

@@ -166,7 +166,7 @@ def contact_solver() -> ContactSolver:
         _with_slopes(rough, 9, (0, 1, 5, 2, 3, 6)),
         _with_slopes(set_valued, 4, (0, 1)),
         write(lambda x: [unilateral(x[0])], 1, name="pushing"),
-        write(lambda x: on_disc(x[:2], x[2]), 3, name="rubbing"),
+        write(lambda x: on_disc(x[:2], x[2]), 3, name="coulomb_friction"),
         write(lambda x: [limited(*x)], 2, name="holding"),
         GAUSS_SEIDEL,
         NEWTON_STEPS,

@@ -118,7 +118,7 @@ class ModeSelector:
         )
         driven = {name: energy / units[system.column(link.driven)] for name, link in self.losses.items()}
         self.force_units = driven | dict(zip(self.names, (energy / self.sizes).tolist(), strict=True))
-        self.rubbing = {  # joint friction in gear trains: root, and direction of the joint relative to it
+        self.train_friction = {  # joint friction in gear trains: root, and direction of the joint relative to it
             element.name: (train.root, np.sign(train.rates[element.joint]))
             for element in self.set_valued
             for train in self.trains
@@ -229,14 +229,16 @@ class ModeSelector:
     def _with_train_friction(self, mode: ContactMode) -> ContactMode:
         """Mode with joint friction set consistently with each gear train: opposing its motion, or sticking."""
         set_valued = {
-            name: int(-mode.trains[root] * sign) for name, (root, sign) in self.rubbing.items() if mode.trains[root] != FREE
+            name: int(-mode.trains[root] * sign)
+            for name, (root, sign) in self.train_friction.items()
+            if mode.trains[root] != FREE
         }
         return mode.but(set_valued=set_valued)
 
     def _pivoted(self, at: ModeProblem, mode: ContactMode) -> ModeTrial:
         """Trial with the given modes of gear trains in which no set-valued element violates its law."""
         _, J, D = set_valued_rows(at.whole)
-        free = [name not in self.rubbing or mode.trains[self.rubbing[name][0]] == FREE for name in self.names]
+        free = [name not in self.train_friction or mode.trains[self.train_friction[name][0]] == FREE for name in self.names]
         rests = self.sticks & (np.abs(self.rates(at.state)) <= resting(self.system, at.state.v) * self.sizes)
         for _ in range(MOST_PIVOTS):
             try:

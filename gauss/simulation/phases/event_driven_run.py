@@ -225,8 +225,8 @@ class EventDrivenRun(PythonRun):
         A sliding element that a drive keeps at rest beyond its limit has rates of rounding.
         """
         selector, mode = self.selector, self.phase.mode
-        led = np.array([name in selector.rubbing for name in selector.names], dtype=bool)
-        slipping = np.flatnonzero((self.phase.signs != 0) & selector.sticks & ~led)
+        in_trains = np.array([name in selector.train_friction for name in selector.names], dtype=bool)
+        slipping = np.flatnonzero((self.phase.signs != 0) & selector.sticks & ~in_trains)
         directions = np.array([mode.trains[train.root] for train in selector.trains], dtype=int)
         turning = np.flatnonzero(directions)
         if not slipping.size and not turning.size:
