@@ -4,9 +4,9 @@ from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
-from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, entered, graph_of, reachable
+from gauss.codegen.expression import Expression, Graph, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
-from gauss.codegen.function import Function, write
+from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.intrinsics import copy, external, intrinsic
 from gauss.codegen.ir_blocks import BODY, POINTER, constant_array, counted_loop, endless_loop
@@ -19,7 +19,7 @@ from gauss.codegen.outlining import fresh_symbols, outlined
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
 from gauss.codegen.schedule import schedule
-from gauss.codegen.staging import staged
+from gauss.codegen.staging import entered, staged
 from gauss.codegen.substitute import substitute
 from gauss.codegen.taylor_series import Series
 from gauss.codegen.terminal_line import compile_notice

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, reachable, varying
+from gauss.codegen.expression import Expression, Graph, reachable
 
 # partial derivatives of a node y by its operands; one and zero are constants of its graph
 _PARTIALS: dict[str, Callable[..., tuple]] = {
@@ -29,6 +29,13 @@ _PARTIALS: dict[str, Callable[..., tuple]] = {
     "less_equal": lambda y, one, zero, a, b: (zero, zero),
     "floor": lambda y, one, zero, x: (zero,),
 }
+
+_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # leading operands: locally constant in these
+
+
+def varying(outputs) -> list[Expression]:
+    """Nodes on which the outputs depend differentiably, operands first; conditions are left out."""
+    return reachable(outputs, lambda node: node.operands[_DECIDES.get(node.op, 0) :])
 
 
 def partials(node: Expression) -> tuple:

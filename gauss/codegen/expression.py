@@ -358,14 +358,6 @@ def graph_of(values) -> Graph:
     return found
 
 
-def entered(values, given) -> np.ndarray:
-    """Values as expressions of the graph of given ones: operations on them are traced there; numbers if these are."""
-    values = np.asarray(values)
-    if values.dtype != object or not any(isinstance(value, Expression) for value in np.ravel(given)):
-        return values
-    return np.frompyfunc(graph_of(np.ravel(given)).lift, 1, 1)(values)
-
-
 def _passed(operands: list[Expression]) -> tuple[Expression, ...]:
     """Operands of a call; if the first ones are all results of another call, in order, this call stands for them.
 
@@ -385,19 +377,11 @@ def _is_truth(value) -> bool:
     return traced or isinstance(value, bool | np.bool_)
 
 
-_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # leading operands: locally constant in these
-
-
 def as_number(value) -> float | None:
     """Return a number or constant expression as a float, None for an expression that is not constant."""
     if isinstance(value, Expression):
         return value.value if value.is_constant else None
     return float(value)
-
-
-def varying(outputs) -> list[Expression]:
-    """Nodes on which the outputs depend differentiably, operands first; conditions are left out."""
-    return reachable(outputs, lambda node: node.operands[_DECIDES.get(node.op, 0) :])
 
 
 def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
@@ -411,20 +395,3 @@ def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
             nodes.append(node)
             waiting.extend(operands(node))
     return sorted(nodes, key=lambda node: node.index)
-
-
-def count(outputs) -> dict[str, int]:
-    """Number of operations of each kind in the outputs, those in called functions included."""
-    return tally(reachable(np.ravel(outputs)))
-
-
-def tally(nodes) -> dict[str, int]:
-    """Number of operations of each kind among nodes, those in called functions included."""
-    counts: dict[str, int] = {}
-    for node in nodes:
-        if node.op == "call":
-            for op, number in node.value.operations().items():
-                counts[op] = counts.get(op, 0) + number
-        elif node.op not in ("constant", "symbol", "item"):
-            counts[node.op] = counts.get(node.op, 0) + 1
-    return counts

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, graph_of, reachable, tally
+from gauss.codegen.expression import Expression, Graph, graph_of, reachable
 from gauss.errors import judged_later
 
 
@@ -105,3 +105,20 @@ def traced(graph: Graph, function, *sizes: int, name: str) -> Function:
     flat = [graph.lift(entry) if isinstance(entry, Expression) else entry for entry in flat]
     inputs = [symbol for argument in arguments for symbol in argument]
     return Function(name, [*inputs, *graph.free.values()], flat, tuple(graph.free))
+
+
+def count(outputs) -> dict[str, int]:
+    """Number of operations of each kind in the outputs, those in called functions included."""
+    return tally(reachable(np.ravel(outputs)))
+
+
+def tally(nodes) -> dict[str, int]:
+    """Number of operations of each kind among nodes, those in called functions included."""
+    counts: dict[str, int] = {}
+    for node in nodes:
+        if node.op == "call":
+            for op, number in node.value.operations().items():
+                counts[op] = counts.get(op, 0) + number
+        elif node.op not in ("constant", "symbol", "item"):
+            counts[node.op] = counts.get(node.op, 0) + 1
+    return counts

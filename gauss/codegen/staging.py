@@ -7,7 +7,9 @@ So the same source that traces a function in one piece traces it in two stages.
 
 from collections.abc import Callable, Mapping
 
-from gauss.codegen.expression import COMMUTATIVE, Expression, Graph, reachable
+import numpy as np
+
+from gauss.codegen.expression import COMMUTATIVE, Expression, Graph, graph_of, reachable
 from gauss.codegen.function import Function, traced
 
 REPEATED = ("neg", "less", "less_equal")  # signs fold, and conditions are no numbers: each function evaluates its own
@@ -122,3 +124,11 @@ def staged(
         read = [inner.early_result(node) for node in used.values()]
         written[key] = Function(key, [*read, *part.inputs], part.outputs, part.parameters)
     return first, written
+
+
+def entered(values, given) -> np.ndarray:
+    """Values as expressions of the graph of given ones: operations on them are traced there; numbers if these are."""
+    values = np.asarray(values)
+    if values.dtype != object or not any(isinstance(value, Expression) for value in np.ravel(given)):
+        return values
+    return np.frompyfunc(graph_of(np.ravel(given)).lift, 1, 1)(values)

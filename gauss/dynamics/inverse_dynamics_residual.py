@@ -46,16 +46,41 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
         R, place = motion.R[edge.outer], slice(6 * edge.outer, 6 * edge.outer + 6)
         left = inertial_forces[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
         wrenches[edge.outer] = R @ left[:3], left[3:]
+    along = along_rates(motion, wrenches)
+    for edge in system.structure.tree:
+        place = system.joints[edge.constraint].v
+        residual[place] = applied.P[place] + along[place]
+    return residual
+
+
+def along_rates(motion: Kinematics, wrenches: dict[int, tuple]) -> np.ndarray:
+    """Wrenches on bodies along the rates (n_v,), carried inward along the spanning tree: ±(E_ωᵀ M_P + E_vᵀ F) at joint P.
+
+    The transposed Jacobian (Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 2.10).
+
+    Parameters
+    ----------
+    motion : Kinematics
+        Poses, with the joints.
+    wrenches : dict
+        {body: (moment about the centre of mass, force)}; the others are zero. Wrenches of outer bodies are added to it.
+    """
+    system = motion.system
+    along = np.zeros(
+        system.n_v, dtype=np.result_type(float, *(part for own in wrenches.values() for part in own), *motion.x)
+    )
     for edge in reversed(system.structure.tree):
+        if edge.outer not in wrenches:
+            continue
         joint, at = system.joints[edge.constraint], motion.joints[edge.constraint]
         sign, inner_arm, outer_arm = _sides(edge, joint, at)
         moment, force = wrenches[edge.outer]
         moment = moment - cross(outer_arm, force)  # about the joint point
-        residual[joint.v] = applied.P[joint.v] + sign * (at.E_omega.T @ moment + at.E_v.T @ force)
+        along[joint.v] = sign * (at.E_omega.T @ moment + at.E_v.T @ force)
         if edge.inner >= 0:
-            other = wrenches[edge.inner]
+            other = wrenches.get(edge.inner, (0.0, 0.0))
             wrenches[edge.inner] = other[0] + moment + cross(inner_arm, force), other[1] + force
-    return residual
+    return along
 
 
 def _sides(edge, joint, at):

@@ -1,8 +1,8 @@
 """Loads of a system as generalised forces: Q = P + Σ Jᵀ (F, M), without the equations of motion.
 
-Forces and moments on bodies are summed inward along the spanning tree, τ_j = ±(E_ωᵀ M_P + E_vᵀ F) about the point P of each
-joint (transposed Jacobian: Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 2.10). Traced loads become machine code;
-opaque laws are called by Python between two kernels, of the poses of all bodies and of Jᵀ.
+Forces and moments on bodies are carried inward along the spanning tree
+(:func:`gauss.dynamics.inverse_dynamics_residual.along_rates`). Traced loads become machine code; opaque laws are called by
+Python between two kernels, of the poses of all bodies and of Jᵀ.
 """
 
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ from functools import cached_property
 import numpy as np
 
 from gauss.codegen import Kernel, write
+from gauss.dynamics.inverse_dynamics_residual import along_rates
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.store import cached_on_disk
-from gauss.rotations import cross
 from gauss.scene import GROUND
 from gauss.system import BoundLoad, State, System
 
@@ -36,21 +36,7 @@ def generalised_forces(motion: Kinematics, applied: Applied) -> np.ndarray:
     loaded = {body for body in range(system.structure.n_bodies) if _acts(applied.F[body]) or _acts(applied.M[body])}
     if not loaded:
         return P
-    F, M = list(applied.F), list(applied.M)
-    along = P.astype(np.result_type(P, *(F[body] for body in loaded), *motion.x))
-    for edge in reversed(system.structure.tree):
-        outer, inner = edge.outer, edge.inner
-        if outer not in loaded:
-            continue
-        joint, own = system.joints[edge.constraint], motion.joints[edge.constraint]
-        M_P = M[outer] + cross(motion.x[outer] - own.P, F[outer])
-        force = own.E_omega.T @ M_P + own.E_v.T @ F[outer]
-        along[joint.v] = along[joint.v] + (force if outer == joint.child else -force)
-        if inner >= 0:
-            F[inner] = F[inner] + F[outer]
-            M[inner] = M[inner] + M[outer] + cross(motion.x[outer] - motion.x[inner], F[outer])
-            loaded.add(inner)
-    return along
+    return P + along_rates(motion, {body: (applied.M[body], applied.F[body]) for body in loaded})
 
 
 def _acts(part: np.ndarray) -> bool:

@@ -1,4 +1,4 @@
-"""Prescribed speeds that jump, against closed forms and motions restarted by hand; positions that jump are refused."""
+"""Prescribed speeds that jump, against closed forms and motions restarted by hand."""
 
 from itertools import pairwise
 
@@ -12,9 +12,7 @@ from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.scene.profiles import Move, Polynomial, Ramp, Sine
-from gauss.servo import Motor, Servo
-from gauss.servo import simulate as simulate_servo
-from tests.support import mechanisms, servos
+from tests.support import mechanisms
 
 EXACT = 1e-8  # of the largest coordinate or rate: what a motion with a jump may be off by at rtol 1e-12, or the same step
 BALANCE = 1e-9  # of the largest energy
@@ -278,42 +276,6 @@ def test_a_jump_at_the_start_is_an_impact_there():
                 assert balanced(motion) <= BALANCE
 
 
-def _teleports():
-    step = lambda t: gm.where(t < 1.0, 1.0, 1.5)  # noqa: E731
-    scene = gauss.Scene("two")
-    for name in ("a", "b"):
-        scene.body(name, 1.0, (0.1, 0.1, 0.1), com=(0.5, 0.0, 0.0))
-    scene.prismatic("P", "ground", "a", axis=(1, 0, 0))
-    scene.prismatic("Q", "a", "b", axis=(1, 0, 0))
-    scene.start("Q", position=1.0)
-    return scene, step
-
-
-@pytest.mark.parametrize(
-    "settings", [{}, {"integrator": "rk4", "step": 0.01}, {"integrator": "time_stepping", "step": 0.01}], ids=called
-)
-@pytest.mark.parametrize("kind", ["displacement", "distance", "guide", "constraint", "sawtooth"])
-def test_positions_that_jump_are_refused_before_the_motion(kind, settings):
-    """Name, time and size of the jump are told, and no step is made."""
-    scene, step = _teleports()
-    at = "1"
-    if kind == "displacement":
-        scene.drive("P", displacement=lambda t: step(t) - 1.0)
-    elif kind == "sawtooth":
-        scene.drive("P", displacement=lambda t: 0.5 * (t - np.floor(t)))
-    elif kind == "distance":
-        scene.distance("drive of P", "a", "b", length=step)
-    elif kind == "guide":
-        scene.guide("drive of P", "b", path=lambda t: np.array([step(t), 0.0, 0.0]), along=[(1, 0, 0)])
-    else:
-        scene.constrain("drive of P", position=lambda view: view.coordinate("Q") - step(view.t))
-    if settings.get("integrator") == "time_stepping":
-        scene.stop("P", -10.0, 10.0)
-    with pytest.raises(SimulationError, match=rf"'drive of P'.* 0\.5 .*t = {at} s") as refused:
-        gauss.simulate(scene, 2.0, **settings)
-    assert refused.value.trajectory is None
-
-
 def test_a_guide_and_a_shift_of_gears_are_impacts():
     """A point that is guided along a kink; a velocity constraint whose ratio jumps loses energy, as a clutch does."""
     scene = gauss.Scene("guided", gravity=(0, 0, 0))
@@ -396,21 +358,3 @@ def test_impulses_are_kept_in_files(tmp_path):
     motion = gauss.simulate(slider(speed=lambda t: gm.where(t < 1.0, 0.5, 0.0)), 2.0)
     kept = np.load(gauss.save(motion, tmp_path / "motion.npz"))
     assert kept["event_impulses"][0] == '{"drive of P": [-1.0]}'
-
-
-@pytest.mark.parametrize(
-    "profile",
-    [lambda t: gm.where(t < 0.5, 0.0, 0.1), lambda t: gm.where(t < 0.5, 0.0, 0.1 * (t - 0.5))],
-    ids=["position", "speed"],
-)
-def test_relations_of_servos_that_jump_are_refused(profile):
-    """No finite effort holds what jumps; a relation whose acceleration jumps is held."""
-    held = Servo(servos.cart_pendulum(), [servos.lean(profile)], [Motor("motor", "rail")])
-    with pytest.raises(SimulationError, match=r"t = 0\.5 s.*'lean'.* 0\.1 "):
-        simulate_servo(held, 1.0)
-    smooth = Servo(
-        servos.cart_pendulum(),
-        [servos.lean(lambda t: gm.where(t < 0.5, 0.0, 0.1 * (t - 0.5) ** 2))],
-        [Motor("motor", "rail")],
-    )
-    simulate_servo(smooth, 0.6)
