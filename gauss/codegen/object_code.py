@@ -15,6 +15,7 @@ from itertools import count, islice
 import llvmlite
 import llvmlite.binding as llvm
 
+from gauss.codegen.library_symbols import register_symbols_of
 from gauss.codegen.module_units import ModuleUnits
 
 OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
@@ -129,6 +130,7 @@ def linked(objects: list[bytes]) -> llvm.ExecutionEngine:
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
     )
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    register_symbols_of(objects)
     for content in objects:
         engine.add_object_file(llvm.ObjectFileRef.from_data(content))
     engine.finalize_object()
