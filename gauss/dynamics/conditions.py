@@ -128,7 +128,7 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 def smooth_system(system: System) -> System:
     """The system without unilateral and set-valued elements, built once."""
-    make = lambda: build(phase_scene(system.scene), system.dynamics.anew())  # noqa: E731
+    make = lambda: build(phase_scene(system.scene), system.mechanics.anew())  # noqa: E731
     return cached(system, (smooth_system,), make)
 
 

@@ -38,7 +38,7 @@ def look_at_energies(motion: Kinematics, work) -> np.ndarray:
     gravity = np.array(motion.system.scene.gravity)
     thick = [math.sqrt(mass * sum(Phi[6 * i : 6 * i + 3])) for i, mass in enumerate(Phi[3::6])]  # mass × radius of gyration
     kinetic, potential = kinetic_energy_of_bodies(motion), sum(stored, start=-sum(lifted))
-    magnitude = sum(np.abs(part) for part in (*lifted, *stored)) + math.sqrt(gravity @ gravity) * sum(thick)
+    magnitude = sum(math.abs(part) for part in (*lifted, *stored)) + math.sqrt(gravity @ gravity) * sum(thick)
     return np.array([kinetic, potential, kinetic + potential - work[0] - work[1] + work[2], magnitude])
 
 

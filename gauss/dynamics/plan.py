@@ -75,7 +75,7 @@ def _by_accelerations(ask: Question) -> bool:
 def _beyond_accelerations(ask: Question) -> str:
     """What needs the equations of motion beyond the accelerations of single states; empty if nothing does."""
     method = ask.method
-    if method.implicit if isinstance(method, Library) else method.mechanical:
+    if method is not None and (method.implicit if isinstance(method, Library) else method.mechanical):
         return f"integrator {method.name!r}"
     return "stabilisation 'partitioning'" if ask.drift.partitioned else ""
 

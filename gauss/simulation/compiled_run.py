@@ -82,7 +82,7 @@ class CompiledRun:
         return ()
 
     def _on_demand(self, what: tuple, make: Callable):
-        return self.system.dynamics.on_demand((*what, self.key), make)
+        return self.system.mechanics.on_demand((*what, self.key), make)
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
         """Start from a compiled point if it passes the check or is confirmed, else from a certified one."""

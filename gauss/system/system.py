@@ -84,8 +84,8 @@ class System:
         return made
 
     @property
-    def _supplier(self) -> Dynamics:
-        """Dynamics of the system.
+    def mechanics(self) -> Dynamics:
+        """Its supplier of the mechanics.
 
         Raises
         ------
@@ -282,7 +282,7 @@ class System:
         given = q is not None or v is not None
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
-        return self._supplier.consistent(self, state, kept, keep is not None, least_violation, given)
+        return self.mechanics.consistent(self, state, kept, keep is not None, least_violation, given)
 
     def projected(self, state: State) -> State:
         """Consistent state nearest to a given one, projected onto the constraints in the mass metric.
@@ -301,7 +301,7 @@ class System:
         StateError
             If the state does not fit the system.
         """
-        return self._supplier.consistent(self, self.state(state.q, state.v, state.t))
+        return self.mechanics.consistent(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: Scalar = 0.0) -> State:
         """State of the starts of the scene, consistent or not."""
@@ -335,7 +335,7 @@ class System:
         """
         require(state, (State,), "accelerations")
         refuse_changed(self)
-        return self._supplier.accelerations(self, state, load)
+        return self.mechanics.accelerations(self, state, load)
 
     @property
     def forward_dynamics(self) -> Callable:
@@ -351,7 +351,7 @@ class System:
             If the system cannot be compiled, with the reasons.
         """
         refuse_changed(self)
-        return self._supplier.forward_dynamics(self)
+        return self.mechanics.forward_dynamics(self)
 
     @property
     def inverse_dynamics(self) -> Callable:
@@ -366,7 +366,7 @@ class System:
         SimulationError
             If a law of a load cannot be compiled, with the reason.
         """
-        return self._supplier.inverse_dynamics(self)
+        return self.mechanics.inverse_dynamics(self)
 
     @property
     def loop_constraints(self) -> Callable:
@@ -376,7 +376,7 @@ class System:
         the rates of the tree, those of joints that close loops follow from them.
         """
         refuse_changed(self)
-        return self._supplier.loop_constraints(self)
+        return self.mechanics.loop_constraints(self)
 
     def explain(self) -> str:
         """Report of the system: bodies, freedoms, loops, loads, plans and reduction."""

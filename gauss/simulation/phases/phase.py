@@ -60,7 +60,7 @@ def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places
         cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics()) if links.names else None
         return PhaseParts(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
-    return whole.dynamics.on_demand((PhaseParts, names, mode, tuple(places.items())), make)
+    return whole.mechanics.on_demand((PhaseParts, names, mode, tuple(places.items())), make)
 
 
 class Phase:
