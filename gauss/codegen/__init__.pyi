@@ -4,7 +4,7 @@ from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
-from gauss.codegen.expression import Expression, Graph, Scalar, as_number, graph_of, reachable
+from gauss.codegen.expression import Entry, Expression, Graph, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
@@ -28,6 +28,7 @@ __all__ = [
     "BODY",
     "DOUBLE",
     "EntryCode",
+    "Entry",
     "Expression",
     "FLAGS",
     "Function",

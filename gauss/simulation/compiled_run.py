@@ -7,7 +7,7 @@ the loop stops at a failed check, and the fallback dynamics of the plan continue
 """
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 
@@ -158,7 +158,8 @@ class CompiledRun:
         """
         if not self.system.has_closures:
             return True
-        packed, checked = self.point, (self.control.constraint_residual,)  # the error by which the loop decides
+        packed = self.point
+        checked: Sequence | np.ndarray = (self.control.constraint_residual,)  # the error by which the loop decides
         if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)

@@ -4,7 +4,7 @@ Each imports what it runs: one motion needs one of them.
 """
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from gauss.dynamics import engines
 from gauss.dynamics.conditions import smooth_question
@@ -15,10 +15,13 @@ from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
-from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.handover import finished
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+    from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
 T = TypeVar("T")
 
@@ -53,7 +56,7 @@ def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
     return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
 
-def _compiled_run(problem: Problem) -> CompiledRun:
+def _compiled_run(problem: Problem) -> "CompiledFixedRun | CompiledAdaptiveRun":
     if isinstance(problem.method, FixedStep):
         from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
@@ -96,7 +99,7 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
         return CompiledMoreauRun(problem, smooth_question(problem.question).laws).collect()
     from gauss.simulation.moreau.moreau_jean import MoreauRun
 
-    run = MoreauRun(problem.system, problem.backend, problem.step, problem.end, problem.switching)
+    run = MoreauRun(problem.system, problem.backend, cast(float, problem.step), problem.end, problem.switching)
     return run.collect(problem.start, problem.samples, problem.progress)
 
 

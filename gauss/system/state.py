@@ -1,17 +1,11 @@
 """State of a system: time, joint coordinates and rates."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gauss.codegen import Scalar
+from gauss.codegen import Entry
 from gauss.shapes import Shaped
-
-if TYPE_CHECKING:
-    Time = Any  # a number, or an Expression in traced functions: which of them is as open as the elements of q and v are
-else:
-    Time = Scalar
 
 
 @dataclass(frozen=True)
@@ -28,6 +22,6 @@ class State:
         Joint rates [rad/s, m/s], in the order of ``System.coordinates``.
     """
 
-    t: Time
+    t: Entry
     q: Shaped[np.ndarray, " nq"]
     v: Shaped[np.ndarray, " nv"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss.backends import Backend
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.engines.certified import CertifiedEngine
@@ -39,7 +40,7 @@ class ForceResponses:
         Engine.
     """
 
-    def __init__(self, system: System, backend: str = "auto"):
+    def __init__(self, system: System, backend: str | Backend | type = "auto"):
         self.system = system
         self.solver: CompiledEngine | CertifiedEngine = CertifiedEngine(backend)
         laws = Laws(system)

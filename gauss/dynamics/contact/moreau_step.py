@@ -14,6 +14,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from gauss import math
+from gauss.backends import Backend
 from gauss.codegen import Expression, Scalar, write
 from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
@@ -81,11 +82,11 @@ class MoreauStepper:
     ----------
     system : System
         With unilateral constraints, friction or set-valued elements.
-    backend : str
+    backend : str, Backend or class
         Backend of the free accelerations.
     """
 
-    def __init__(self, system: System, backend: str = "auto"):
+    def __init__(self, system: System, backend: str | Backend | type = "auto"):
         scene = system.scene
         self.system, self.smooth = system, smooth_system(system)
         self.backend, self.kernel = backend, ContactTermsKernel(system)
@@ -381,7 +382,7 @@ def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
     )
 
 
-def moreau_stepper(system: System, backend: str = "auto") -> MoreauStepper:
+def moreau_stepper(system: System, backend: str | Backend | type = "auto") -> MoreauStepper:
     """Stepper of a system, cached."""
     key = backend if isinstance(backend, str) else id(backend)  # kept alive by the stepper
     return cached(system, (MoreauStepper, key), lambda: MoreauStepper(system, backend))

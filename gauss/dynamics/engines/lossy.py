@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends import Backend
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
@@ -141,13 +142,13 @@ class LossyEngine(Engine):
         The same without the rows of the links with losses.
     links : NonIdealRows
         These links.
-    backend : str
+    backend : str, Backend or class
         How accelerations are solved.
     may_compile : bool
         Whether the phase may be compiled.
     """
 
-    def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str, may_compile: bool):
+    def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str | Backend | type, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
         self.certified, self.counted = CertifiedEngine(backend), 0
         self.compiled: CompiledEngine | None = None

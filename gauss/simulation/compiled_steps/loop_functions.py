@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, NativeFunction, Scalar, write
-from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
+from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, CheckedSwitch, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import PartitionedSystem
@@ -153,6 +153,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         return packed, residuals, [*numbers, unseen(x, reached)]
 
     free = not method.mechanical and not program.drift.partitioned
+    step: Function | CheckedSwitch
     if program.may_lose_rank and free:
         step = with_projected_stages(program, steps)
     elif program.has_redundant_rows and free:  # off the constraints, redundant constraints contradict each other

@@ -6,7 +6,6 @@ deep penetration: their treatment and messages are those of :mod:`gauss.dynamics
 
 from dataclasses import replace
 from functools import cached_property
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.handover import finished
 from gauss.simulation.moreau.compiled_step import compiled_steps
-from gauss.simulation.moreau.moreau_jean import MoreauRun, in_words, time_step
+from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 
@@ -70,7 +69,8 @@ class CompiledMoreauRun(CompiledFixedRun):
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         super()._advance(pairs, out)
         while self.control.status == LoopStatus.UNSOLVED:
-            self._python_step(*pairs[int(self.control.sample)], out)
+            t, due = pairs[int(self.control.sample)]
+            self._python_step(t, due, out)
 
     def _python_step(self, t: float, due: float, out: np.ndarray):
         control, run, begin = self.control, self.python_steps, self.layout.point(self.point)
@@ -78,7 +78,7 @@ class CompiledMoreauRun(CompiledFixedRun):
         run.force, h = method_state[:-1], t - begin.state.t
         try:
             rates, share = run.rates_over(begin.state, h)
-            found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
+            found, _ = time_step(KnownRates(run.system, rates, share), begin, h)
             state = run.project(replace(found.state, t=t))
         except GaussError as error:
             self._gather(out)

@@ -332,7 +332,7 @@ class EventDrivenRun(PythonRun):
         places = self._places(state, case[0])
         key = case, tuple(places.items())
         if key not in self.phases:
-            self.phases[key] = Phase(self.selector, *case, places, self.backend)
+            self.phases[key] = Phase(self.selector, case[0], case[1], places, self.backend)
         self.started = self.phases[key]
         state = self.project(state)
         return Point(state, work, self.phase.solver.rates(self.phase.system, state)), jumps
