@@ -9,7 +9,7 @@ from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.intrinsics import copy, external, intrinsic
-from gauss.codegen.ir_blocks import BODY, POINTER, constant_array, counted_loop, endless_loop
+from gauss.codegen.ir_blocks import BODY, POINTER, Buffers, constant_array, counted_loop, endless_loop
 from gauss.codegen.kernel import Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
@@ -42,6 +42,7 @@ __all__ = [
     "LDLT",
     "LEAD",
     "LINE",
+    "Buffers",
     "Lanes",
     "NativeFunction",
     "POINTER",

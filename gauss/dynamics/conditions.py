@@ -8,6 +8,7 @@ from collections.abc import Callable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
+from gauss.integrators import ExplicitPair, FixedStep
 from gauss.system import System, build, phase_scene, sides
 from gauss.system.build import slips
 from gauss.system.elimination_cost import MOST_WORK
@@ -97,6 +98,13 @@ def narrow(ask: Question) -> list[str]:
     """The system is small enough for a compiled step."""
     n_v = ask.system.n_v
     return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST else []
+
+
+def explicit(ask: Question) -> list[str]:
+    """The integrator solves no equations."""
+    method = ask.method
+    found = isinstance(method, ExplicitPair | FixedStep) and not method.mechanical
+    return [] if found else [f"integrator {getattr(method, 'name', method)!r} is implicit"]
 
 
 def large_tree(ask: Question) -> bool:

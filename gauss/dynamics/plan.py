@@ -12,8 +12,9 @@ events              compiled        unilateral constraints, joint friction, limi
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
+compiled loop       tree recursion  large trees, by explicit integrators
 Python loop         call graph      many kinematic loops
-Python loop         tree recursion  large trees
+Python loop         tree recursion  large trees with opaque laws
 Python loop         compiled        opaque laws, and systems too large for a compiled step
 library             certified       all other scenes, by integrators of other libraries
 Python loop         certified       all other scenes
@@ -29,6 +30,7 @@ from gauss.codegen import IdentityKey, content_key
 from gauss.dynamics.conditions import (
     compilable,
     contacts_alone,
+    explicit,
     few_bodies,
     has_contacts,
     large_loops,
@@ -104,6 +106,7 @@ MOTIONS = RuleTable(
         Rule("library", "compiled", "", _library, _WHOLE),
         Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _WHOLE),
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _WHOLE),
+        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), (*_CODE, traced_laws, explicit)),
         Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
         Rule("Python loop", "compiled", "certified", _ALONE, (*_CODE, written_out)),

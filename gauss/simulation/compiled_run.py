@@ -41,9 +41,11 @@ class CompiledRun:
     ----------
     problem : Problem
         Initial value problem whose loads are all traced.
+    program : type
+        Makes the functions of the system.
     """
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, program: type[Program] = Program):
         self.began = time.perf_counter()
         self.problem, self.system, self.start, self.end = problem, problem.system, problem.start, problem.end
         self.samples, self.switching, self.drift = problem.samples, problem.switching, problem.drift
@@ -51,7 +53,7 @@ class CompiledRun:
         self.rows: list[np.ndarray] = []
         self.certified, self.key = CertifiedEngine("auto", self.drift.gains), (self.drift, problem.laws.key)
         self.method_state, size = self._initial_method_state()
-        self.program = self._on_demand((Program, size), lambda: Program(self.system, problem.laws, self.drift, size))
+        self.program = self._on_demand((program, size), lambda: program(self.system, problem.laws, self.drift, size))
         self.layout = self.program.layout
         duration = self.end - self.start.t
         work = max(1, self.system.n_v) ** 2 * problem.method.evaluations
@@ -153,10 +155,10 @@ class CompiledRun:
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion confirms the accelerations at the end.
 
-        It is used for systems with loop, coupling or relation constraints: at both ends of the first run, and later where
-        the check fails. Other systems are checked body by body in machine code, at their last point, too.
+        It is used for large trees and systems with loop, coupling or relation constraints: at both ends of the first run,
+        and later where the check fails. Other systems are checked body by body in machine code, at their last point, too.
         """
-        if not self.system.has_closures:
+        if self.program.checks_bodies:
             return True
         packed = self.point
         checked: Sequence | np.ndarray = (self.control.constraint_residual,)  # the error by which the loop decides
@@ -184,7 +186,7 @@ class CompiledRun:
 
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
-        known = not self.system.has_closures or self.kind in self._certified_loops()
+        known = self.program.checks_bodies or self.kind in self._certified_loops()
         return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECK_ERRORS])
 
     def _certified_loops(self) -> set[Hashable]:

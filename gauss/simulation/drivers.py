@@ -51,19 +51,28 @@ def _constant(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
-    run = _compiled_run(problem)
+    run = _compiled_run(problem, _program(plan))
     run.run()
     return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
 
-def _compiled_run(problem: Problem) -> "CompiledFixedRun | CompiledAdaptiveRun":
+def _program(plan: Plan) -> type[Program]:
+    """Class of the functions of the compiled loop of a plan."""
+    if plan.dynamics == "tree recursion":
+        from gauss.dynamics.tree_program import TreeProgram
+
+        return TreeProgram
+    return Program
+
+
+def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledFixedRun | CompiledAdaptiveRun":
     if isinstance(problem.method, FixedStep):
         from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
-        return CompiledFixedRun(problem)
+        return CompiledFixedRun(problem, program)
     from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
 
-    return CompiledAdaptiveRun(problem)
+    return CompiledAdaptiveRun(problem, program)
 
 
 def _fallback(problem: Problem, plan: Plan) -> Trajectory:

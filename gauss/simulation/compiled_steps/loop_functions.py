@@ -34,8 +34,7 @@ def adaptive(program: Program, method: Controlled, batch: bool = False, shares=N
     else:
         trial, dense, dense_evaluations = _written(program, method, begin, shares)
         sample, project = _sample(program, method, begin, len(dense.outputs)), program.projection()
-    check = write(program.watched_point, size, name="check")
-    return Adaptive(size, layout.row, trial, project, check, dense, sample, dense_evaluations, program.rates)
+    return Adaptive(size, layout.row, trial, project, program.point_check, dense, sample, dense_evaluations, program.rates)
 
 
 def _sample(program: Program, method: Controlled, begin: Callable, count: int) -> Function:
@@ -160,9 +159,8 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         step = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="step")
     else:
         step = write(steps(_equations(program, method)), size, 1, name="step")
-    check = write(program.watched_point, size, name="check")
     project = None if method.state_size else program.projection()
-    return Fixed(size, layout.row, step, project, check, method.evaluations, program.rates)
+    return Fixed(size, layout.row, step, project, program.point_check, method.evaluations, program.rates)
 
 
 def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:

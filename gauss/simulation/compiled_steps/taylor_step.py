@@ -73,7 +73,7 @@ def taylor_step(program: Program, shares=None) -> TaylorStep:
         write(defect, size, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs else None,
         system.n_q,
         project,
-        write(program.watched_point, size, name="check"),
+        program.point_check,
         write(sample, size, 1, n, name="sample"),
         program.rates,
     )
