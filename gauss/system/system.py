@@ -280,6 +280,8 @@ class System:
         """
         refuse_changed(self)
         given = q is not None or v is not None
+        if not given and t == 0.0 and keep is None and not least_violation:
+            return self._supplier.scene_start(self)
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
         return self.mechanics.consistent(self, state, kept, keep is not None, least_violation, given)
@@ -287,7 +289,8 @@ class System:
     def projected(self, state: State) -> State:
         """Consistent state nearest to a given one, projected onto the constraints in the mass metric.
 
-        Unlike :meth:`initial_state`, which takes a rough guess, it tries no other poses.
+        Unlike :meth:`initial_state`, which takes a rough guess, it tries no other poses. A state that meets the constraints
+        to round-off stays as it is.
 
         Parameters
         ----------
@@ -301,7 +304,7 @@ class System:
         StateError
             If the state does not fit the system.
         """
-        return self.mechanics.consistent(self, self.state(state.q, state.v, state.t))
+        return self.mechanics.projected(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: Scalar = 0.0) -> State:
         """State of the starts of the scene, consistent or not."""
