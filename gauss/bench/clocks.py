@@ -84,11 +84,10 @@ def summary(seconds: list[float]) -> dict:
 
 
 def median_times(times: list[Times], seconds: list[float]) -> dict:
-    """Medians of what the library reports [s], in wall time: of an interrupted call no more than the call took."""
-    reported = np.array(times, dtype=float)
-    longest = np.fmax(reported[:, 2], np.fmax(reported[:, 0], reported[:, 1]))
-    reported *= np.fmin(1.0, np.array(seconds) / np.where(longest > 0.0, longest, np.inf))[:, None]
-    setup, solve, total = np.median(reported[1:] if len(times) > 1 else reported, axis=0)
+    """Medians of what the library reports [s], in wall time: of warm calls that took no more than that; nan if all did."""
+    pairs = list(zip(times, seconds, strict=True))
+    told = [one for one, call in pairs[1:] or pairs if not np.fmax.reduce(one) > call]  # interrupted ones are longer
+    setup, solve, total = np.median(np.array(told or [UNKNOWN]), axis=0)
     return {"setup": float(setup), "solve": float(solve), "library": float(total)}
 
 
