@@ -250,8 +250,8 @@ def _shapes(system: System, requests, columns) -> tuple[tuple[int, ...], ...]:
 def _errors(terms: StateTerms, given) -> list:
     """Residual of the state, a sum of all inputs that is finite only if each is, sizes of N and of K N.
 
-    A sum is NaN if one of its terms is. Without independent coordinates the state need not meet the constraints: its residual
-    is that of the quaternions.
+    A sum is NaN if one of its terms is. Without independent coordinates the state need not meet the constraints: its
+    residual is that of the quaternions.
     """
     system, unit = terms.system, terms.system.scale.coordinates
     residual, total = off_unit(system, terms.q), sum(np.abs(part).sum() for part in given)
