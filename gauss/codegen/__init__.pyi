@@ -1,3 +1,4 @@
+from gauss.codegen.batch_code import BatchCode, batch_code
 from gauss.codegen.branches import branches
 from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
@@ -26,6 +27,7 @@ from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
     "BODY",
+    "BatchCode",
     "DOUBLE",
     "EntryCode",
     "Entry",
@@ -52,6 +54,7 @@ __all__ = [
     "Series",
     "Writer",
     "as_number",
+    "batch_code",
     "branches",
     "compile_notice",
     "constant_array",

@@ -24,6 +24,7 @@ from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
+from gauss.system.state_functions import StateFunctions
 from gauss.system.subsystem import Subsystem
 from gauss.versions import FormerAttribute
 
@@ -31,7 +32,7 @@ UNIT_QUATERNION = 1e-6  # error of the length of a quaternion typed with 7 digit
 
 
 @dataclass(frozen=True)
-class System:
+class System(StateFunctions):
     """Mechanism with indices. Made by :func:`gauss.compile_scene`.
 
     Parameters
@@ -79,8 +80,8 @@ class System:
         return rebuilding(self)
 
     def __copy__(self) -> "System":
-        made = object.__new__(System)
-        made.__dict__.update(self.__dict__)  # with what was computed so far
+        made = object.__new__(System)  # with what was computed so far, but for compiled functions
+        made.__dict__.update({name: value for name, value in self.__dict__.items() if name not in vars(StateFunctions)})
         return made
 
     @property
@@ -369,17 +370,16 @@ class System:
         SimulationError
             If a law of a load cannot be compiled, with the reason.
         """
-        return self.mechanics.inverse_dynamics(self)
+        return self.mechanics.inverse_dynamics("inverse_dynamics")
 
     @property
     def loop_constraints(self) -> Callable:
-        """Compiled function ``f(q, v, t=0.0)`` → residual c (r,) [rad, m], Jacobian J (r, n_v), bias γ (r,): J q̈ = γ.
+        """Compiled function ``f(q, v, out=None, t=0.0)`` → residual c (r,) [rad, m], Jacobian J (r, n_v), bias γ (r,).
 
-        Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J multiplies
-        the rates of the tree, those of joints that close loops follow from them.
+        J q̈ = γ. Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J
+        multiplies the rates of the tree, those of joints that close loops follow from them.
         """
-        refuse_changed(self)
-        return self.mechanics.loop_constraints(self)
+        return self.mechanics.loop_constraints("loop_constraints")
 
     def explain(self) -> str:
         """Report of the system: bodies, freedoms, loops, loads, plans and reduction."""

@@ -115,7 +115,7 @@ class Tiered:
             return None
         program = self.programs.setdefault(laws.key, Program(self.system, laws, Drift()))
         operations = cached_on_disk(self.system, (Tiered, laws.key), lambda: sum(program.rates.operations().values()))
-        if self.spent < LEAST_THRESHOLD + PER_OPERATION * operations:
+        if self.spent < LEAST_THRESHOLD + PER_OPERATION * operations and not at_once:
             return None
         kernels = cached_on_disk(self.system, (Program.kernels, program.drift, laws.key), program.kernels)
         return self.made.setdefault(laws.key, kernels)
