@@ -23,7 +23,7 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     SceneError
         If no chain of joints leads to a body, or frames given twice disagree.
     """
-    edges, _ = spanning_tree(scene)
+    edges = spanning_tree(scene)
     index = {name: i for i, name in enumerate(scene.bodies)} | {GROUND: -1}
     joints = _place_joints(scene, index)
     constraints = _constraints(scene, joints)
@@ -145,8 +145,8 @@ def _check_inertia(system: System):
             )
 
 
-def spanning_tree(scene: Scene) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """Tree edges (joint, outer body, inner body), inner bodies first, and the joints that close loops.
+def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
+    """Tree edges (joint, outer body, inner body), inner bodies first.
 
     Joints are taken in the order in which the scene names them: of the joints of a loop the last one is cut.
 
@@ -155,15 +155,15 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[str, str, str]], list[str]]:
     SceneError
         If no chain of joints leads from the ground to some body.
     """
-    reached, edges, loops = {GROUND}, [], []
+    reached, edges = {GROUND}, []
     waiting = list(scene.joints.values())
     while waiting:
         later = []
         for joint in waiting:
             ends = joint.parent in reached, joint.child in reached
             if all(ends):
-                loops.append(joint.name)
-            elif any(ends):
+                continue
+            if any(ends):
                 inner, outer = (joint.parent, joint.child) if ends[0] else (joint.child, joint.parent)
                 reached.add(outer)
                 edges.append((joint.name, outer, inner))
@@ -180,4 +180,4 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[str, str, str]], list[str]]:
         )
     if not scene.bodies:
         raise SceneError(f"scene {scene.name!r} has no bodies; add one with scene.body(...).")
-    return edges, loops
+    return edges
