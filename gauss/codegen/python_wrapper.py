@@ -157,7 +157,7 @@ class PythonWrapper:
         errors = np.empty((count, len(limits)))
         self._rows(count, inputs, [*found, errors] if limits else found)
         if not (errors <= limits).all():
-            for row in np.flatnonzero(~(errors <= limits).all(axis=1)):
+            for row in np.flatnonzero(~(errors <= limits).all(axis=1)).tolist():
                 self._one_of_batch(row, inputs, found)
 
     def _room(self, k: int, shape: Shape, targets, inputs) -> np.ndarray:
