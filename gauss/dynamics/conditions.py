@@ -99,6 +99,11 @@ def narrow(ask: Question) -> list[str]:
     return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST else []
 
 
+def no_held_inputs(ask: Question) -> list[str]:
+    """Inputs are not held between samples: the machine code of the step has none."""
+    return ["its inputs are held between samples"] if ask.held else []
+
+
 def large_tree(ask: Question) -> bool:
     """Whether kernels of links are faster than straight-line code."""
     return is_large(ask.system)

@@ -134,23 +134,27 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     def steps(equations_at):
         return lambda x, h: stepped(equations_at(layout.point(x)), x, h)
 
-    def unseen(x, reached: Point):
-        return program.watch.passes(layout.point(x), reached)
+    def begun(equations, x) -> Point:
+        point = layout.point(x)  # inputs may have changed since its rates were computed
+        return replace(point, rates=equations.evaluate(point.state)) if program.inputs else point
 
     def stepped(equations, x, h):
-        reached, cost = method.step(equations, layout.point(x), h[0])
+        begin = begun(equations, x)
+        reached, cost = method.step(equations, begin, h[0])
+        unseen = program.watch.passes(begin, reached)
+        reached = replace(reached, rates=begin.rates) if program.inputs else reached  # the next step computes its own
         if method.state_size:  # it satisfies the constraints itself, and a projection would spoil its compensated sums
             residual = equations.largest_violation(reached.state)
             return (
                 layout.pack(reached),
                 [residual],
-                [cost.evaluations, cost.factorisations, cost.unsolved, unseen(x, reached)],
+                [cost.evaluations, cost.factorisations, cost.unsolved, unseen],
             )
         reached, residual = _completed(program, equations, reached)
         packed, residuals = layout.pack(reached), [residual]
         packed, residuals = program.projected(packed) if program.projects else (packed, residuals)
         numbers = [cost.evaluations + int(program.projects), cost.factorisations, cost.unsolved]
-        return packed, residuals, [*numbers, unseen(x, reached)]
+        return packed, residuals, [*numbers, unseen]
 
     free = not method.mechanical and not program.drift.partitioned
     if program.may_lose_rank and free:
@@ -159,7 +163,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         step = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="step")
     else:
         step = write(steps(_equations(program, method)), size, 1, name="step")
-    check = write(program.watched_point, size, name="check")
+    check = write(program.held_point if program.inputs else program.watched_point, size, name="check")
     project = None if method.state_size else program.projection()
     return Fixed(size, layout.row, step, project, check, method.evaluations, program.rates)
 

@@ -18,10 +18,12 @@ from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.handover import finished
+from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps
 from gauss.simulation.moreau.moreau_jean import MoreauRun, in_words, time_step
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
+from gauss.system import System
 
 
 class CompiledMoreauRun(CompiledFixedRun):
@@ -58,7 +60,14 @@ class CompiledMoreauRun(CompiledFixedRun):
     @cached_property
     def python_steps(self) -> MoreauRun:
         """Steps in Python."""
-        return MoreauRun(self.whole.system, "auto", self.step, self.end, self.switching)
+        return MoreauRun(self._driven_system(), "auto", self.step, self.end, self.switching)
+
+    def _driven_system(self) -> System:
+        """System with drives by the present inputs."""
+        if self.held is None:
+            return self.whole.system
+        laws = {name: lambda t, k=k: self.inputs[k] for k, name in enumerate(self.held.names)}
+        return driven_as(self.whole.system, laws)
 
     def _initial_method_state(self) -> tuple[np.ndarray, int]:
         size = self.stepper.lossy.size + 1
@@ -83,7 +92,7 @@ class CompiledMoreauRun(CompiledFixedRun):
         except GaussError as error:
             self._gather(out)
             raise SimulationError(str(error), self.trajectory()) from error
-        reached = self.layout.pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
+        reached = self._pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
         if due != Due.STEP:
             out[int(control.rows)] = reached[: self.layout.row]
             control.rows += 1
@@ -94,7 +103,7 @@ class CompiledMoreauRun(CompiledFixedRun):
 
     def _is_confirmed(self) -> bool:
         point = self.layout.point(self.point)
-        self.point = self.layout.pack(replace(point, rates=self._evaluate(point.state)))
+        self.point = self._pack(replace(point, rates=self._evaluate(point.state)))
         return super()._is_confirmed()
 
     def trajectory(self) -> Trajectory:
