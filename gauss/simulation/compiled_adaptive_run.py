@@ -112,7 +112,7 @@ class CompiledAdaptiveRun(CompiledRun):
         self._hold(k)
         self.next_sample += 1
         point = self.layout.point(self.point)
-        self.point = self._pack(replace(point, rates=self._evaluate(point.state)))
+        self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
         first = self._started(point.state.t, point.state.q, point.state.v)[-1]
         self.control.h = max(float(first), self.control.h)
 
@@ -120,7 +120,7 @@ class CompiledAdaptiveRun(CompiledRun):
         """Continue just after a switching time, with the rates there."""
         if self._jumped(t) and self.samples is None:
             self.rows.append(self._row())
-        equations = SimpleNamespace(system=self.system, evaluate=self._evaluate)
+        equations = SimpleNamespace(system=self.system, evaluate=self.evaluated)
         point = crossed_time(equations, self.layout.point(self.point), t)
         self.point, state = self._pack(point), point.state
         self.control.h = max(float(self._started(t, state.q, state.v)[-1]), LEAST_RESTART_STEP * (self.end - self.start.t))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen.kernels import Due, Fixed, LoopStatus
+from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus
 from gauss.dynamics.plan import method_key
 from gauss.integrators import FixedStep, Point
 from gauss.simulation.compiled_run import CompiledRun
@@ -29,13 +29,17 @@ class CompiledFixedRun(CompiledRun):
         assert self.problem.step is not None
         return self.problem.step
 
+    def prepared(self) -> Loop:
+        """Machine code of the steps."""
+        return self._loop_of(method_key(self.method), lambda: self._functions().compile())
+
     def run(self):
         """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`."""
         method, step = self.method, self.step
-        loop = self._loop_of(method_key(method), lambda: self._functions().compile())
+        loop = self.prepared()
         if self.held is not None:
             self.inputs = self.held.at(0, self.start.t, self.start.q.copy(), self.start.v.copy())
-        point = self._pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.method_state))
+        point = self._pack(Point(self.start, np.zeros(3), self.evaluated(self.start), self.method_state))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = steps_per_check(method.evaluations)
         pairs = grid_of(method, self.start.t, self.end, step, self.samples, self.switching)
@@ -57,7 +61,7 @@ class CompiledFixedRun(CompiledRun):
     def _is_confirmed(self) -> bool:
         if self.held is not None:  # the rates of a point are those at the begin of its last step
             point = self.layout.point(self.point)
-            self.point = self._pack(replace(point, rates=self._evaluate(point.state)))
+            self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
         return super()._is_confirmed()
 
     def _functions(self) -> Fixed:
@@ -89,7 +93,7 @@ class CompiledFixedRun(CompiledRun):
             self._hold(self.holds[until])
         if int(control.sample) == until and until in self.renewed:  # the method state holds accelerations from before
             point = self.layout.point(self.point)
-            rates = self._evaluate(point.state)
+            rates = self.evaluated(point.state)
             self.point = self._pack(replace(point, rates=rates, method_state=rates.acceleration))
         if control.status == LoopStatus.DONE and control.sample < len(pairs):
             control.status = LoopStatus.PAUSED

@@ -106,7 +106,7 @@ class CompiledRun:
         """Present time, state and work as one row of the trajectory."""
         return self.point[None, : self.layout.row].copy()
 
-    def _evaluate(self, state: State) -> Rates:
+    def evaluated(self, state: State) -> Rates:
         """Rates by machine code."""
         found = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v, self.inputs]))
         n_v = self.system.n_v
@@ -145,7 +145,7 @@ class CompiledRun:
         if found is not None:
             self.events.append(found.event)
             confirmed = self.confirmed[0] == self.point[0]
-            rates = self._evaluate(found.state)
+            rates = self.evaluated(found.state)
             self.point = self._pack(Point(found.state, found.work, rates, self.method_state))
             self.confirmed = self.point.copy() if confirmed else self.confirmed
         return found
@@ -195,7 +195,7 @@ class CompiledRun:
         if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
-            packed = self._pack(Point(state, point.work, self._evaluate(state), point.method_state))
+            packed = self._pack(Point(state, point.work, self.evaluated(state), point.method_state))
             checked = self.loop.evaluate("check", packed)
         if self._is_enough(checked):
             return True

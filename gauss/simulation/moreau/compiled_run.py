@@ -82,17 +82,12 @@ class CompiledMoreauRun(CompiledFixedRun):
             self._python_step(*pairs[int(self.control.sample)], out)
 
     def _python_step(self, t: float, due: float, out: np.ndarray):
-        control, run, begin = self.control, self.python_steps, self.layout.point(self.point)
-        method_state = method_state_of(begin)
-        run.force, h = method_state[:-1], t - begin.state.t
+        control = self.control
         try:
-            rates, share = run.rates_over(begin.state, h)
-            found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
-            state = run.project(replace(found.state, t=t))
+            reached = self.repeated(self.point, t)
         except GaussError as error:
             self._gather(out)
             raise SimulationError(str(error), self.trajectory()) from error
-        reached = self._pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
         if due != Due.STEP:
             out[int(control.rows)] = reached[: self.layout.row]
             control.rows += 1
@@ -101,14 +96,31 @@ class CompiledMoreauRun(CompiledFixedRun):
         control.sample, control.constraint_residual = control.sample + 1, np.inf  # unchecked
         control.status = LoopStatus.PAUSED
 
+    def repeated(self, packed: np.ndarray, t: float) -> np.ndarray:
+        """Point after a step from a point to a time [s], in Python.
+
+        Raises
+        ------
+        GaussError
+            If the motion cannot continue.
+        """
+        run, begin = self.python_steps, self.layout.point(packed)
+        method_state = method_state_of(begin)
+        run.force, h = method_state[:-1], t - begin.state.t
+        rates, share = run.rates_over(begin.state, h)
+        found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
+        state = run.project(replace(found.state, t=t))
+        return self._pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
+
     def _is_confirmed(self) -> bool:
         point = self.layout.point(self.point)
-        self.point = self._pack(replace(point, rates=self._evaluate(point.state)))
+        self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
         return super()._is_confirmed()
 
     def trajectory(self) -> Trajectory:
         """Motion so far."""
         found = super().trajectory()
         relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
-        method = in_words(self.step, float(self.point[-1]), relaxed, found.stats.method)
+        error = float(method_state_of(self.layout.point(self.point))[-1])
+        method = in_words(self.step, error, relaxed, found.stats.method)
         return replace(found, system=self.whole.system, stats=found.stats._replace(method=method), step=self.step)
