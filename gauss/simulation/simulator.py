@@ -5,6 +5,7 @@ The step loops are those of :func:`gauss.simulate`: a step of this module is, bi
 
 import ctypes
 from collections.abc import Callable
+from dataclasses import replace
 from math import isfinite
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, one_tier, write
-from gauss.codegen.kernels import LoopStatus, address
+from gauss.codegen.kernels import Due, LoopStatus, address
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.switching import Switching
@@ -37,7 +38,7 @@ FAILURES = {
 }
 
 
-class Snapshot(NamedTuple):
+class SimulatorState(NamedTuple):
     """State of a simulator, opaque.
 
     Attributes
@@ -126,7 +127,7 @@ class Simulator:
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
         n_u = len(self.inputs)
         self._u = self._point[run.layout.size - n_u :]
-        self._out, self._grid = np.empty((0, run.layout.row)), np.zeros((1, 2))
+        self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps = 0.0, 0
         self._measure: Kernel | None = None
@@ -216,13 +217,17 @@ class Simulator:
             self._u[:] = checked_inputs(u, self.inputs, self.t)
         if not isfinite(self._u @ self._u):
             checked_inputs(self._u.copy(), self.inputs, self.t)
+        if self._run.method.starts_from_accelerations:  # its method state holds those under the inputs before
+            point = self._layout.point(self._point)
+            rates = self._run.evaluated(point.state)
+            self._point[:] = self._layout.pack(replace(point, rates=rates, method_state=rates.acceleration), self._u.copy())
 
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
         if n < 1:
             raise SimulationError(f"n: expected a positive number of steps, got {n!r}.")
         if n > len(self._grid):
-            self._grid = np.zeros((n, 2))
+            self._grid = _unchecked(n)
             self._bind()
         self._times[:n] = self._begun + self.step_size * np.arange(self._steps + 1, self._steps + n + 1)
         self._steps += n
@@ -275,11 +280,11 @@ class Simulator:
             self._measure = _output_kernel(self._run, self.system)
         return self._measure(self._point)
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> SimulatorState:
         """Present state of the simulator, to the last bit; of the same scene and step, any simulator can restore it."""
-        return Snapshot(self._point.tobytes(), bytes(self._run.control), self._begun, self._steps)
+        return SimulatorState(self._point.tobytes(), bytes(self._run.control), self._begun, self._steps)
 
-    def restore(self, snapshot: Snapshot):
+    def restore(self, snapshot: SimulatorState):
         """Continue from a snapshot.
 
         Raises
@@ -301,6 +306,11 @@ def _run_of(problem: Problem) -> CompiledFixedRun:
     if problem.method.nonsmooth:
         return CompiledMoreauRun(problem, smooth_question(problem.question).laws)
     return CompiledFixedRun(problem)
+
+
+def _unchecked(n: int) -> np.ndarray:
+    """Grid (n, 2) of steps that are checked every few steps, not where a call ends."""
+    return np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
 
 
 def _zero(count: int) -> Callable:
