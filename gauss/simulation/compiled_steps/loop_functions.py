@@ -178,4 +178,4 @@ def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
         return begun, [program.residual(point.state)], program.energies(x)
 
     states = slice(1, 1 + layout.n_q + layout.n_v)
-    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states)
+    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states, len(program.inputs))
