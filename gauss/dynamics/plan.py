@@ -48,7 +48,7 @@ from gauss.dynamics.conditions import (
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.dynamics.store import cached
-from gauss.integrators import METHODS, FixedStep, Library, Taylor
+from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Library, Taylor
 from gauss.system import System
 
 Condition = Callable[[Question], list[str]]  # question → violations in words
@@ -202,5 +202,6 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
-    ours = METHODS.get(method.name) is method  # immutable: identity stands for content
+    known = (*LIBRARIES, *IMPLICIT) if isinstance(method, Library) else (METHODS.get(method.name),)
+    ours = any(method is one for one in known)  # immutable: identity stands for content
     return IdentityKey(method) if ours else content_key(method)
