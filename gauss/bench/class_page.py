@@ -6,7 +6,7 @@ from gauss.bench.classes import problems_of, story_of
 from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time
 from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.markdown import head, number, share, table
-from gauss.bench.measure import OURS, middle
+from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
 from gauss.bench.structured import COULOMB
@@ -15,12 +15,12 @@ from gauss.bench.verdicts import is_false, stated, truth
 
 MAIN = "high"  # level of leaderboards, sentences and charts
 HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
-acceleration of a body or joint, is at most {RIGHT:g}; of a problem without a solution, its proven verdict is stated.
-**Kept**: residuals and gap are within the tolerance asked for. **Claimed, beyond**: success was claimed, and a
-residual or the gap is above the tolerance and above rounding. **False verdict**: a problem is called infeasible or
-unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and quadprog. Error of multipliers: of the
-solver's own, row by row or constraint by constraint, without the directions that redundant rows leave open; a solver
-that gives none is off by 1. Errors are medians over all problems.
+acceleration of a body or joint, is at most {RIGHT:g}, that of multipliers at most {WRONG:g}; of a problem without a
+solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for. **Claimed,
+beyond**: success was claimed, and a residual or the gap is above the tolerance and above rounding. **False verdict**:
+a problem is called infeasible or unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and
+quadprog. Error of multipliers: of the solver's own, row by row or constraint by constraint, without the directions
+that redundant rows leave open; a solver that gives none is off by 1. Errors are medians over all problems.
 
 Times are CPU times of calls from Python on a ready problem, set-up included: shifted geometric means over all
 problems, a problem that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least. Library:

@@ -7,7 +7,7 @@ import numpy as np
 from gauss.bench.levels import OWN
 from gauss.bench.measure import middle
 from gauss.bench.problems import SOLVABLE
-from gauss.bench.summary import complete, mean_time
+from gauss.bench.summary import complete, is_without_multipliers, mean_time
 from gauss.bench.verdicts import truth
 
 FORM = "F2s"  # of what is asked; programmes of files have their own
@@ -34,8 +34,8 @@ def in_time(row) -> bool:
 
 
 def error_of(row) -> float:
-    """Error of an answer; nan where there is none."""
-    return row["error"] if in_time(row) else np.nan
+    """Error of an answer; nan where there is none, or one without its multipliers."""
+    return row["error"] if in_time(row) and not is_without_multipliers(row) else np.nan
 
 
 def fronts(rows) -> tuple[list[str], dict[str, FrontPoint], dict[str, dict[str, FrontPoint]]]:

@@ -38,11 +38,11 @@ error of an answer is the largest relative error of a body's or joint's accelera
 tolerances of residuals and duality gap: low 1e-3, mid 1e-6, high 1e-9, tightest 1e-12 (HiGHS 1e-10). An answer after
 {LIMIT:g} s of CPU time is none.
 
-Two rules, the same for all. **Right**: the error is at most {RIGHT:g}, whoever answered and whatever a certificate says.
-**Kept**: primal and dual residual and gap are within the tolerance that was asked for, as qpbenchmark judges; a solver
-that promised a residual is held to that, and its error is another column. **Claimed, beyond**: success was claimed, and a
-residual or the gap is above the tolerance and above ten times the rounding of its own terms, where forces of 1e9 leave no
-other choice.
+Two rules, the same for all. **Right**: the error is at most {RIGHT:g}, that of multipliers at most {WRONG:g}, whoever
+answered and whatever a certificate says. **Kept**: primal and dual residual and gap are within the tolerance that was
+asked for, as qpbenchmark judges; a solver that promised a residual is held to that, and its error is another column.
+**Claimed, beyond**: success was claimed, and a residual or the gap is above the tolerance and above ten times the
+rounding of its own terms, where forces of 1e9 leave no other choice.
 
 Times are medians of calls from Python, set-up included, on a problem in the form that the solver takes; making that form
 is not timed. They are wall times, or CPU times of the process where these are less, so that a busy machine adds nothing.

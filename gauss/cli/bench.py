@@ -242,7 +242,8 @@ def chart(
         typer.echo(f"  {', '.join(methods)}: {reason}")
     typer.echo("Pareto front:")
     for one in front(done):
-        typer.echo(f"  {one.error:.1e} m in {1e3 * one.seconds:.3g} ms by {one.method} with {one.setting:.2g}")
+        error = f"{one.error:.1e} m" if one.error else "the reference to the last bit"
+        typer.echo(f"  {error} in {1e3 * one.seconds:.3g} ms by {one.method}, {one.setting:.2g}")
     name = found.name or scene
     title, note = f"What a digit costs: {name}, {duration:g} s", f"reference: {against.source}"
     plot_precision({name: done}, output, title, note, {name: against.uncertainty})

@@ -99,7 +99,7 @@ def four_bar() -> Instance:
     [
         ("Perfect", "answered", True, False),
         ("LiarInX", "answered", False, True),
-        ("LiarInY", "answered", True, True),
+        ("LiarInY", "answered", False, True),
         ("NotANumber", "not finite", False, True),
         ("Raises", "refused", False, False),
     ],
