@@ -87,7 +87,7 @@ def _by_level(rows, names: list[str]) -> list[str]:
     return [
         "## By level",
         "",
-        f"Tolerances: {words}. {len(common)} problems, asked at each. Right, kept; claimed, beyond where that is not none. "
+        f"Tolerances: {words}. Asked at each: {len(common)} problems. Right, kept; claimed, beyond where that is not none. "
         "Then shifted geometric means of times in ms.",
         "",
         *table(["solver", *levels, *(f"{level} [ms]" for level in levels)], _lines_by_level(rows, names, levels, common)),

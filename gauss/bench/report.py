@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gauss.bench import compiled
+from gauss.bench.clocks import AROUND
 from gauss.bench.instances import FILE as FILE_FORM
 from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.markdown import head, in_time, number, share, table
@@ -22,6 +23,7 @@ from gauss.bench.summary import (
     clocks,
     groups,
     is_broken,
+    is_kept,
     is_right,
     is_wrong,
     sensitivity,
@@ -79,7 +81,8 @@ def _errors(rows) -> list[str]:
         f"## Errors, {FORM}, level {LEVEL}",
         "",
         "In brackets: not certified. Bold: claimed, beyond. –: refused, or no finite "
-        f"answer; {compiled.NAME}, which has no certificate: errors of joints alone.",
+        f"answer; {compiled.NAME}, which has no certificate: errors of joints alone. Kept: residuals are within the "
+        "tolerance, of a problem without a reference.",
         "",
         *table(
             ["backend", *problems], ([name, *(_cell(cells.get((name, p))) for p in problems)] for name in backends(rows))
@@ -99,6 +102,8 @@ def _cell(row) -> str:
         return ""
     if row["outcome"] in ("crashed", "timed out"):
         return row["outcome"]
+    if row["outcome"] == "answered" and np.isnan(row["error"]):  # nothing is known of it but its residuals
+        return "kept" if is_kept(row) else "**claimed**" if is_broken(row) else "not kept"
     if not np.isfinite(row["error"]):
         return "**not finite**" if row["claimed"] else "–"
     text = number(row["error"])
@@ -178,10 +183,10 @@ def _times(rows) -> list[str]:
         if group == INCONSISTENT or not names:
             continue
         lines += [
-            f"## Times, class {group}, {FORM}, level {LEVEL}",
+            f"## Times, class {group}, {_form_of(rows, group)}, level {LEVEL}",
             "",
             "Microseconds of right answers: call from Python / reported by the library, – where it reports none (of "
-            "cvxopt, highs, qpax and quadprog: around the call of the library).",
+            f"{', '.join(AROUND)}: around the call of the library).",
             "",
             *table(["problem", *names], ([p, *(_both(cells.get((name, p))) for name in names)] for p in problems)),
             "",
@@ -192,6 +197,12 @@ def _times(rows) -> list[str]:
             "",
         ]
     return lines
+
+
+def _form_of(rows, group: str) -> str:
+    """Form of a class in tables that show one: of programmes of files their own."""
+    forms = {row["form"] for row in rows if row["group"] == group}
+    return FILE_FORM if FILE_FORM in forms else FORM
 
 
 CLOCKS = ("backend", "right", "cold / warm", "spread", "library / call", "set-up / library")
@@ -217,7 +228,7 @@ def _means(rows) -> list[str]:
         if group == INCONSISTENT or not found:
             continue
         lines += [
-            f"## What means hinge on, class {group}, {FORM}, level {LEVEL}",
+            f"## What means hinge on, class {group}, {_form_of(rows, group)}, level {LEVEL}",
             "",
             "Shifted geometric means by shift and by what a problem costs that is not solved right; in brackets the rank.",
             "",
@@ -273,7 +284,8 @@ def _beside(line: dict) -> list[str]:
 def _honesty(rows) -> list[str]:
     """Promises and certificates: the same questions to all who answered."""
     asked = [r for r in rows if r["group"] != INCONSISTENT and r["backend"] != compiled.NAME]
-    claims = [_claims(level, [r for r in asked if r["level"] == level and r["claimed"]]) for level in LEVELS]
+    levels = [level for level in LEVELS if any(r["level"] == level for r in asked)]
+    claims = [_claims(level, [r for r in asked if r["level"] == level and r["claimed"]]) for level in levels]
     foreign = _certified("QP solvers", [r for r in asked if r["level"] in LEVELS])
     return [
         "## Honesty",
