@@ -53,7 +53,7 @@ def compare_class(
     return compare(folder, instances=_instances(kind, wanted), name=name_of(kind), **how)
 
 
-def expanded(kinds: Iterable[str]) -> list[str]:
+def classes_named(kinds: Iterable[str]) -> list[str]:
     """Classes by name, with those that a name stands for in its place, each once."""
     return list(dict.fromkeys(one for kind in kinds for one in TOGETHER.get(kind, (kind,))))
 

@@ -284,8 +284,8 @@ def _beside(line: dict) -> list[str]:
 def _honesty(rows) -> list[str]:
     """Promises and certificates: the same questions to all who answered."""
     asked = [r for r in rows if r["group"] != INCONSISTENT and r["backend"] != compiled.NAME]
-    levels = [level for level in LEVELS if any(r["level"] == level for r in asked)]
-    claims = [_claims(level, [r for r in asked if r["level"] == level and r["claimed"]]) for level in levels]
+    by_level = {level: [r for r in asked if r["level"] == level] for level in LEVELS}
+    claims = [_claims(level, found) for level, found in by_level.items() if found]
     foreign = _certified("QP solvers", [r for r in asked if r["level"] in LEVELS])
     return [
         "## Honesty",
@@ -297,7 +297,8 @@ def _honesty(rows) -> list[str]:
     ]
 
 
-def _claims(level: str, claims: list[dict]) -> str:
+def _claims(level: str, asked: list[dict]) -> str:
+    claims = [r for r in asked if r["claimed"]]
     broken, wrong = [r for r in claims if is_broken(r)], [r for r in claims if is_wrong(r)]
     return (
         f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with a residual or a gap above the "

@@ -111,12 +111,12 @@ def _import_from_here():
 
 def _compare_classes(output: Path, kinds: list[str], **how):
     """Tables and pages of classes, whose solvers stay in the same processes."""
-    from gauss.bench.classes import compare_class, expanded
+    from gauss.bench.classes import classes_named, compare_class
     from gauss.bench.publish import publish_class
     from gauss.bench.worker import Workers
 
     with Workers() as workers:
-        for kind in expanded(kinds):
+        for kind in classes_named(kinds):
             table = compare_class(output, kind, workers=workers, **how)
             _report(table, publish_class(output, kind, table.path))
 

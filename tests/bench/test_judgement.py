@@ -12,7 +12,7 @@ from scipy import io, sparse
 
 from gauss.backends.programme import FORMS, Outcome
 from gauss.bench.class_page import class_page, sentence
-from gauss.bench.classes import expanded
+from gauss.bench.classes import classes_named
 from gauss.bench.clocks import FEWEST, ROUNDS, timed
 from gauss.bench.export import export
 from gauss.bench.folders import of_folder
@@ -399,7 +399,7 @@ def test_answers_without_a_reference_are_named_by_their_residuals():
 
 
 def test_names_stand_for_several_classes():
-    assert expanded(["friction", "mpc", "cones"]) == ["cones", "coulomb", "mpc"]
+    assert classes_named(["friction", "mpc", "cones"]) == ["cones", "coulomb", "mpc"]
 
 
 def test_levels_stand_side_by_side_where_several_were_asked():
