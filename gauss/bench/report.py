@@ -284,15 +284,14 @@ def _beside(line: dict) -> list[str]:
 def _honesty(rows) -> list[str]:
     """Promises and certificates: the same questions to all who answered."""
     asked = [r for r in rows if r["group"] != INCONSISTENT and r["backend"] != compiled.NAME]
-    by_level = {level: [r for r in asked if r["level"] == level] for level in LEVELS}
-    claims = [_claims(level, found) for level, found in by_level.items() if found]
-    foreign = _certified("QP solvers", [r for r in asked if r["level"] in LEVELS])
+    by_level = {level: [r for r in asked if r["level"] == level] for level in (*LEVELS, OWN)}
+    ours = by_level.pop(OWN)
     return [
         "## Honesty",
         "",
-        *claims,
-        foreign,
-        _certified("gauss's own methods", [r for r in asked if r["level"] == OWN]),
+        *(_claims(level, found) for level, found in by_level.items() if found),
+        _certified("QP solvers", [r for found in by_level.values() for r in found]),
+        _certified("gauss's own methods", ours),
         "",
     ]
 
