@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
-from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time
+from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time, of_special_form
 from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.markdown import head, number, share, table
 from gauss.bench.measure import OURS, WRONG, middle
@@ -62,7 +62,7 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     lines += [BY_CLASS[kind], ""] if kind in BY_CLASS else []
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
     lines += _board("Leaderboard", mine, solvable) + _sentences(list(mine), mine, *fronts(rows)[1:])
-    special = _special(rows, set(mine))
+    special = of_special_form(rows, set(mine))
     lines += _special_board(special, set(mine), solvable)
     if set(OURS) & set(mine):
         lines += [OWN_TIMES, ""]
@@ -120,12 +120,6 @@ def _mean(found: list[dict]) -> str:
 def ordered(mine: dict[str, list[dict]]) -> dict[str, list[dict]]:
     """Solvers by rank: the share that is right, then the mean time."""
     return dict(sorted(mine.items(), key=lambda item: (-sum(map(is_right, item[1])), mean_time(item[1]))))
-
-
-def _special(rows, general: set[str]) -> list[dict]:
-    """Rows of the problems that solvers of a special form were asked, with those of all others."""
-    problems = {row["problem"] for row in rows if row["backend"] not in (*OURS, *general)}
-    return [row for row in rows if row["problem"] in problems]
 
 
 def _special_board(rows: list[dict], general: set[str], solvable: bool) -> list[str]:
