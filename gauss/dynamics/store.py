@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
-from gauss.codegen import compile_notice, from_disk, gc_pause
+from gauss.codegen import compile_notice, content_digest, from_disk, gc_pause
 from gauss.system import System
 
 T = TypeVar("T")
@@ -76,4 +76,5 @@ def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> 
     *beside
         What else the entry depends on, where the system is a part of another.
     """
-    return cached(system, key, lambda: from_disk((system, *key, *beside), make))
+    digest = lambda: cached(system, (content_digest,), lambda: content_digest(system))  # noqa: E731
+    return cached(system, key, lambda: from_disk((system, *key, *beside), make, digest()))
