@@ -35,14 +35,17 @@ class Store:
         make : callable
             () → the entry.
         """
-        if key not in self._made:
-            with self._lock:
-                being_made = self._being_made.setdefault(key, RLock())
-            with being_made:  # a lock for each key: making one entry may request others
-                if key not in self._made:
-                    with gc_pause(), compile_notice():
-                        self._made[key] = make()
-                    self._being_made.pop(key, None)
+        found = self._made.get(key, self)  # the key is hashed once; no entry is the store itself
+        return self._make(key, make) if found is self else found
+
+    def _make(self, key: Key, make: Callable[[], T]) -> T:
+        with self._lock:
+            being_made = self._being_made.setdefault(key, RLock())
+        with being_made:  # a lock for each key: making one entry may request others
+            if key not in self._made:
+                with gc_pause(), compile_notice():
+                    self._made[key] = make()
+                self._being_made.pop(key, None)
         return self._made[key]
 
 

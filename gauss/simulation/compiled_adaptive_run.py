@@ -91,10 +91,10 @@ class CompiledAdaptiveRun(CompiledRun):
 
     def _started(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Packed point of a state, its check, and its first step, by machine code."""
-        tolerance = self.problem.tolerance
-        return self.loop.evaluate(
-            "start", np.concatenate([[t], q, v, [tolerance.rtol, tolerance.atol, tolerance.atol_rates]])
-        )
+        tolerance, given = self.problem.tolerance, np.empty(4 + q.size + v.size)
+        given[0], given[1 : 1 + q.size], given[1 + q.size : -3] = t, q, v
+        given[-3], given[-2], given[-1] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
+        return self.loop.evaluate("start", given)
 
     def _cross(self, t: float):
         """Continue just after a switching time, with the rates there."""

@@ -1,7 +1,6 @@
 """Simulation of a motion: check the arguments, select the plan, and let its driver compute the trajectory."""
 
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -157,10 +156,10 @@ def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: 
         found = verified(found, problem, partial(_again, problem, plan)) if verify else found
     except (SimulationError, KeyboardInterrupt) as error:
         reached = found if found is not None else getattr(error, "trajectory", None)
-        recorded = None if reached is None else _recorded(reached, settings, plan.ran(run.ran))
+        recorded = None if reached is None else reached.with_settings(settings, plan.ran(run.ran))
         error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
         raise
-    return _recorded(found, settings, plan.ran(run.ran))
+    return found.with_settings(settings, plan.ran(run.ran))
 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
@@ -180,8 +179,3 @@ def _again(problem: Problem, plan: Plan, step, tolerance, samples, mesh=()) -> T
     if len(mesh):
         switching = switching._replace(times=switching.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
     return _motion(problem._replace(step=step, tolerance=tolerance, samples=samples, switching=switching), plan)
-
-
-def _recorded(found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
-    """Trajectory with its settings and its plan."""
-    return replace(found, settings=settings, stats=found.stats._replace(plan=plan))
