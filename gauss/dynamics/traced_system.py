@@ -31,6 +31,7 @@ from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.shared_elimination import SharedElimination
 from gauss.dynamics.stabilisation import Drift
+from gauss.dynamics.store import cached_on_disk
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
 
@@ -175,6 +176,11 @@ class Program:
         check = write(self.check, self.layout.size, self.system.n_v, name="check")
         project = Kernel(self.projected_rates, batch=False) if self.projects else None
         return Kernels(self.forward(), Kernel(check, batch=False), project)
+
+    @property
+    def cached_kernels(self) -> Kernels:
+        """The same, cached with the system, and by their content on disk."""
+        return cached_on_disk(self.system, (Program.kernels, self.drift, self.laws.key), self.kernels)
 
     def residual(self, state: State):
         """Constraint residual of a state, in position and velocity, relative; of all constraints of the system."""

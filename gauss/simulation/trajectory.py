@@ -196,6 +196,12 @@ class Trajectory:
         span = f"{self.t[0]:.6g} … {self.t[-1]:.6g} s" if len(self) else "empty"
         return f"Trajectory({self.system.scene.name!r}, {len(self)} samples, {span})"
 
+    def with_settings(self, settings: dict, plan: Plan) -> "Trajectory":
+        """Trajectory with the arguments of the simulation, and with its plan."""
+        made = object.__new__(Trajectory)  # a fifth of the time of dataclasses.replace
+        made.__dict__.update(vars(self), settings=settings, stats=self.stats._replace(plan=plan))
+        return made
+
     def state(self, index: int) -> State:
         """State of one sample; the last one is -1.
 
