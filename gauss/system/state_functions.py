@@ -192,7 +192,7 @@ class StateFunctions:
         StateError
             If there is no such frame or joint, or the coordinates cannot be independent.
         """
-        return self._supplier.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
+        return self.mechanics.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
 
     def evaluate(
         self, names, q, v=None, acceleration=None, *, t=0.0, reference=LOCAL_WORLD_ALIGNED, independent=None
@@ -211,4 +211,4 @@ class StateFunctions:
             As of :meth:`function`.
         """
         given = {"q": q, "v": v, "acceleration": acceleration}
-        return self._supplier.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]
+        return self.mechanics.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]

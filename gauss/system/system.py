@@ -282,7 +282,7 @@ class System(StateFunctions):
         refuse_changed(self)
         given = q is not None or v is not None
         if not given and t == 0.0 and keep is None and not least_violation:
-            return self._supplier.scene_start(self)
+            return self.mechanics.scene_start(self)
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
         return self.mechanics.consistent(self, state, kept, keep is not None, least_violation, given)
@@ -370,7 +370,7 @@ class System(StateFunctions):
         SimulationError
             If a law of a load cannot be compiled, with the reason.
         """
-        return self.mechanics.inverse_dynamics("inverse_dynamics")
+        return self.function("inverse_dynamics")
 
     @property
     def loop_constraints(self) -> Callable:
@@ -379,7 +379,7 @@ class System(StateFunctions):
         J q̈ = γ. Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J
         multiplies the rates of the tree, those of joints that close loops follow from them.
         """
-        return self.mechanics.loop_constraints("loop_constraints")
+        return self.function("loop_constraints")
 
     def explain(self) -> str:
         """Report of the system: bodies, freedoms, loops, loads, plans and reduction."""
