@@ -32,7 +32,7 @@ class Servo:
         Forces of the servos.
     weights : dict, optional
         Weight of each effort, by its name, where there are more efforts than relations: the sum of
-        weight · (effort − preload)² is made least. 1 when not given.
+        weight · (effort − preload)² is minimised. 1 when not given.
     preload : dict, optional
         Effort from which that sum is measured, by name [N, N m]; 0 when not given.
 
