@@ -8,7 +8,6 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from gauss import math
 from gauss.codegen import Function, write
 from gauss.codegen.kernels import ENERGY_SAMPLE, Correction, RowCode, RowFunction
 from gauss.dynamics.energies import energy_sample, least_magnitude, stored_energies
@@ -64,7 +63,7 @@ class TreeProgram(Program):
 
         def stored(t, q, v):
             energies = stored_energies(Kinematics(self.system, State(t[0], q, v)))
-            return [sum(energies, 0.0), sum(map(math.abs, energies), 0.0)]
+            return [sum(energies, 0.0), sum(map(abs, energies), 0.0)]
 
         return write(stored, 1, self.system.n_q, self.system.n_v, name="stored")
 

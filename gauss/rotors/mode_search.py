@@ -1,7 +1,7 @@
 """Mode search: sticking or slipping, backlash sides and directions of power flow that are consistent at one instant.
 
-Positions and speeds determine a part of the mode; sticking follows from a linear complementarity problem (projected Gauss–Seidel),
-directions of power from the sign of the torques; the two alternate until the mode repeats (fixed point).
+Positions and speeds determine a part of the mode; sticking follows from a linear complementarity problem (projected
+Gauss–Seidel), directions of power from the sign of the torques; the two alternate until the mode repeats (fixed point).
 """
 
 from dataclasses import replace

@@ -150,7 +150,7 @@ class NetworkPhase:
         return max(sizes) or 1.0
 
     def link_torques(self, found: NetworkInstant) -> np.ndarray:
-        """Q_em (n_l,) [N m]; those of power loops and of trains stuck at rest, which are not unique, are one admissible set."""
+        """Q_em (n_l,) [N m]; one admissible set where power loops, or trains stuck at rest, leave them undetermined."""
         torque = self.reduced.split(found.torque).copy()
         for lock in self.locks:
             if lock.kind == "group":

@@ -1,4 +1,4 @@
-"""Realisability of servo-constraints at one instant: rank of S = G N H_N⁻¹ Nᵀ Wᵀ, and the relations and efforts that contradict each other."""
+"""Realisability of servo-constraints at one instant: rank of S = G N H_N⁻¹ Nᵀ Wᵀ; relations and efforts in contradiction."""
 
 from dataclasses import dataclass
 
