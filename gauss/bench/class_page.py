@@ -3,10 +3,10 @@
 import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
-from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time
+from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time, of_special_form
 from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.markdown import head, number, share, table
-from gauss.bench.measure import OURS, middle
+from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
 from gauss.bench.structured import COULOMB
@@ -15,12 +15,12 @@ from gauss.bench.verdicts import is_false, stated, truth
 
 MAIN = "high"  # level of leaderboards, sentences and charts
 HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
-acceleration of a body or joint, is at most {RIGHT:g}; of a problem without a solution, its proven verdict is stated.
-**Kept**: residuals and gap are within the tolerance asked for. **Claimed, beyond**: success was claimed, and a
-residual or the gap is above the tolerance and above rounding. **False verdict**: a problem is called infeasible or
-unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and quadprog. Error of multipliers: of the
-solver's own, row by row or constraint by constraint, without the directions that redundant rows leave open; a solver
-that gives none is off by 1. Errors are medians over all problems.
+acceleration of a body or joint, is at most {RIGHT:g}, that of multipliers at most {WRONG:g}; of a problem without a
+solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for. **Claimed,
+beyond**: success was claimed, and a residual or the gap is above the tolerance and above rounding. **False verdict**:
+a problem is called infeasible or unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and
+quadprog. Error of multipliers: of the solver's own, row by row or constraint by constraint, without the directions
+that redundant rows leave open; a solver that gives none is off by 1. Errors are medians over all problems.
 
 Times are CPU times of calls from Python on a ready problem, set-up included: shifted geometric means over all
 problems, a problem that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least. Library:
@@ -61,13 +61,14 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
     lines += [BY_CLASS[kind], ""] if kind in BY_CLASS else []
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
-    lines += _board("Leaderboard", mine, solvable) + _sentences(mine, *fronts(rows)[1:])
-    lines += _special_board(rows, set(mine), solvable)
+    lines += _board("Leaderboard", mine, solvable) + _sentences(list(mine), mine, *fronts(rows)[1:])
+    special = of_special_form(rows, set(mine))
+    lines += _special_board(special, set(mine), solvable)
     if set(OURS) & set(mine):
         lines += [OWN_TIMES, ""]
     elif kind != COULOMB:
         lines += [NONE_OF_OURS, ""]
-    return "\n".join(lines + _by_level(every, list(mine)) + _by_problem(problems, mine)) + "\n"
+    return "\n".join(lines + _by_level(every, list(mine)) + _by_problem(problems, mine | _added(special, mine))) + "\n"
 
 
 def at_main_level(rows) -> list[dict]:
@@ -80,17 +81,18 @@ def at_main_level(rows) -> list[dict]:
 def _by_level(rows, names: list[str]) -> list[str]:
     """What each solver kept, had right and took at every level, on the problems that were asked at all of them."""
     levels = [level for level in LEVELS if any(row["level"] == level for row in rows)]
-    if len(levels) < 2:
+    common = set.intersection(*({row["problem"] for row in rows if row["level"] == level} for level in levels or [OWN]))
+    found = _lines_by_level(rows, names, levels, common)
+    if len(levels) < 2 or not found:
         return []
-    common = set.intersection(*({row["problem"] for row in rows if row["level"] == level} for level in levels))
     words = "; ".join(f"{level} {LEVELS[level]:g}" for level in levels)
     return [
         "## By level",
         "",
-        f"Tolerances: {words}. {len(common)} problems, asked at each. Right, kept; claimed, beyond where that is not none. "
+        f"Tolerances: {words}. Asked at each: {len(common)} problems. Right, kept; claimed, beyond where that is not none. "
         "Then shifted geometric means of times in ms.",
         "",
-        *table(["solver", *levels, *(f"{level} [ms]" for level in levels)], _lines_by_level(rows, names, levels, common)),
+        *table(["solver", *levels, *(f"{level} [ms]" for level in levels)], found),
         "",
     ]
 
@@ -120,15 +122,19 @@ def ordered(mine: dict[str, list[dict]]) -> dict[str, list[dict]]:
     return dict(sorted(mine.items(), key=lambda item: (-sum(map(is_right, item[1])), mean_time(item[1]))))
 
 
-def _special_board(rows, general: set[str], solvable: bool) -> list[str]:
-    """Leaderboard of the problems that solvers of a special form were asked, beside all others; none if there are none."""
-    asked = {(row["backend"], row["problem"]) for row in rows if row["backend"] not in (*OURS, *general)}
-    problems = {problem for _, problem in asked}
-    if not problems:
+def _special_board(rows: list[dict], general: set[str], solvable: bool) -> list[str]:
+    """Leaderboard of the problems that solvers of a special form take, and sentences about these; none without any."""
+    if not rows:
         return []
-    mine = ordered(cells([row for row in rows if row["problem"] in problems]))
-    title = f"Leaderboard of the {len(problems)} problems that solvers of a special form take"
-    return _board(title, mine, solvable)
+    mine, overall, panels = ordered(cells(rows)), *fronts(rows)[1:]
+    title = f"Leaderboard of the {len(set(row['problem'] for row in rows))} problems that solvers of a special form take"
+    named = [name for name in mine if name not in general]
+    return _board(title, mine, solvable) + _sentences(named, mine, overall, panels)[2:]
+
+
+def _added(rows: list[dict], general: dict[str, list[dict]]) -> dict[str, list[dict]]:
+    """Cells of solvers of a special form."""
+    return {name: found for name, found in ordered(cells(rows)).items() if name not in general}
 
 
 def _board(title: str, mine: dict[str, list[dict]], solvable: bool) -> list[str]:
@@ -158,7 +164,7 @@ def _in_library(found: list[dict]) -> str:
     """Median share of the times of right answers that the library itself reports: of set-up and solve, or of solve alone."""
     times = [(row["seconds"], row["library"], row.get("solve", np.nan)) for row in found if is_right(row)]
     shares = [(whole if np.isfinite(whole) else solve) / call for call, whole, solve in times]
-    return f"{np.median(shares):.0%}" if np.isfinite(shares).any() else "–"
+    return f"{np.nanmedian(shares):.0%}" if np.isfinite(shares).any() else "–"
 
 
 def _factor(value: float) -> str:
@@ -171,9 +177,11 @@ def _warm(found: list[dict]) -> str:
     return f"{np.median(shares):.2g}" if shares else "takes no start"
 
 
-def _sentences(mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]) -> list[str]:
+def _sentences(
+    names: list[str], mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]
+) -> list[str]:
     lines = ["## What each is good for", ""]
-    lines += [f"* **{name}** {sentence(name, mine, overall, panels)}" for name in mine]
+    lines += [f"* **{name}** {sentence(name, mine, overall, panels)}" for name in names]
     return [*lines, ""]
 
 
@@ -219,12 +227,14 @@ def _by_problem(problems: list[str], mine: dict[str, list[dict]]) -> list[str]:
         "Error, and in brackets that of the multipliers; the verdict where one is stated. Bold: claimed, beyond, or a false "
         "verdict. –: no answer.",
         "",
-        *table(["problem", *mine], ([problem, *(_cell(at[name, problem]) for name in mine)] for problem in problems)),
+        *table(["problem", *mine], ([problem, *(_cell(at.get((name, problem))) for name in mine)] for problem in problems)),
         "",
     ]
 
 
 def _cell(row) -> str:
+    if row is None:  # not asked
+        return ""
     if row["outcome"] in ("crashed", "timed out"):
         return row["outcome"]
     verdict = stated(row)

@@ -14,6 +14,7 @@ from gauss.bench.suite_instances import SUITE, of_suite, suite_class
 from gauss.bench.table import ResultTable
 
 FEW = 8  # problems of a class in a quick run, evenly spread
+TOGETHER = {"friction": ("cones", "coulomb")}  # names of several classes
 STORIES = {
     "equality": "Accelerations of open and closed mechanisms: equality rows alone.",
     "inequality": "Joints at stops and boxes on points.",
@@ -50,6 +51,11 @@ def compare_class(
     if quick and not problems:
         wanted = spread(wanted)
     return compare(folder, instances=_instances(kind, wanted), name=name_of(kind), **how)
+
+
+def classes_named(kinds: Iterable[str]) -> list[str]:
+    """Classes by name, with those that a name stands for in its place, each once."""
+    return list(dict.fromkeys(one for kind in kinds for one in TOGETHER.get(kind, (kind,))))
 
 
 def problems_of(kind: str) -> tuple[str, ...]:

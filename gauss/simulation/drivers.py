@@ -10,6 +10,7 @@ from gauss.dynamics import engines
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.load_forces import LoadForces
+from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
@@ -56,6 +57,18 @@ def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
     return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
 
+def _samples(problem: Problem, plan: Plan) -> Trajectory:
+    from gauss.simulation.held_motion import held_motion
+
+    chosen: list[Plan] = []
+
+    def drive(alone: Problem) -> Trajectory:
+        chosen[:] = chosen or [plan_of(alone.question)]
+        return DRIVERS[chosen[0].driver](alone, chosen[0])
+
+    return held_motion(problem, drive)
+
+
 def _program(plan: Plan) -> type[Program]:
     """Class of the functions of the compiled loop of a plan."""
     if plan.dynamics == "tree recursion":
@@ -65,7 +78,7 @@ def _program(plan: Plan) -> type[Program]:
     return Program
 
 
-def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledFixedRun | CompiledAdaptiveRun":
+def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledAdaptiveRun | CompiledFixedRun":
     if isinstance(problem.method, FixedStep):
         from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
@@ -81,6 +94,10 @@ def _fallback(problem: Problem, plan: Plan) -> Trajectory:
         raise SimulationError(
             f"Integrator {problem.method.name!r} needs the equations of motion in machine code; use 'dop853' here."
         )
+    if problem.held is not None:
+        from gauss.simulation.held_motion import held_motion
+
+        return held_motion(problem, lambda alone: _stepped(alone, plan.fallback))
     return _stepped(problem, plan.fallback)
 
 
@@ -138,6 +155,7 @@ DRIVERS: dict[str, Callable[[Problem, Plan], Trajectory]] = {
     "library": _library,
     "compiled loop": _compiled_loop,
     "Python loop": _python_loop,
+    "samples": _samples,
 }
 
 

@@ -11,7 +11,8 @@ import qpsolvers
 from scipy import io, sparse
 
 from gauss.backends.programme import FORMS, Outcome
-from gauss.bench.class_page import sentence
+from gauss.bench.class_page import class_page, sentence
+from gauss.bench.classes import classes_named
 from gauss.bench.clocks import FEWEST, ROUNDS, timed
 from gauss.bench.export import export
 from gauss.bench.folders import of_folder
@@ -19,7 +20,8 @@ from gauss.bench.fronts import FrontPoint, front, fronts
 from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_problem, of_selection
 from gauss.bench.levels import LIMIT
 from gauss.bench.measure import measure
-from gauss.bench.problems import INCONSISTENT, make_problem
+from gauss.bench.problems import INCONSISTENT, SOLVABLE, make_problem
+from gauss.bench.report import markdown
 from gauss.bench.suite.instance import INFEASIBLE, UNBOUNDED
 from gauss.bench.suite_instances import SUITE, of_suite
 from gauss.bench.summary import complete, is_broken, is_kept, is_right, mean_time, profile, sensitivity, totals, verdict
@@ -99,7 +101,7 @@ def four_bar() -> Instance:
     [
         ("Perfect", "answered", True, False),
         ("LiarInX", "answered", False, True),
-        ("LiarInY", "answered", True, True),
+        ("LiarInY", "answered", False, True),
         ("NotANumber", "not finite", False, True),
         ("Raises", "refused", False, False),
     ],
@@ -383,3 +385,27 @@ def test_the_documented_solver_works(tmp_path, monkeypatch, four_bar):
     monkeypatch.syspath_prepend(tmp_path)
     row = measure(four_bar, "mysolver:RangeSpace", "F2s", "high") | {"level": "high"}
     assert is_right(row) and is_kept(row) and row["certified"]
+
+
+def test_answers_without_a_reference_are_named_by_their_residuals():
+    """No error is known of them, which is no fault of the answer."""
+    instance = of_arrays("plain", "mine", np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], None, None)
+    found = {solver: measure(instance, solver, FILE, "high") for solver in ("daqp", f"{__name__}:LiarInY")}
+    key = {"problem": "plain", "form": FILE, "level": "high", "group": "mine", "verdict": SOLVABLE}
+    text = markdown([row | key | {"backend": name} for name, row in found.items()], [], ["date: today"])
+    errors = text[text.index("## Errors") : text.index("## Class")]
+    assert "| daqp | kept |" in errors and "LiarInY | **claimed** |" in errors
+    assert "class mine, file" in text and "Level low" not in text
+
+
+def test_names_stand_for_several_classes():
+    assert classes_named(["friction", "mpc", "cones"]) == ["cones", "coulomb", "mpc"]
+
+
+def test_levels_stand_side_by_side_where_several_were_asked():
+    """Of the problems that were asked at all levels; the rest of a page is about level high."""
+    row = GOOD | {"group": "mpc", "library": 1e-4}
+    asked = [("a", "high"), ("b", "high"), ("a", "low")]
+    text = class_page("mpc", [row | {"problem": problem, "level": level} for problem, level in asked], [], "")
+    assert "Asked at each: 1 problems" in text and "| 1 | one | 2/2 |" in text
+    assert "## By level" not in class_page("mpc", [row | {"problem": "a", "level": "high"}], [], "")
