@@ -5,7 +5,7 @@ Integrator loops and engines are compiled from them. Points are vectors (:class:
 
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.store import cached_on_disk
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
+
+if TYPE_CHECKING:
+    from gauss.codegen.kernels import RowFunction
 
 POSITION_STEPS = 2  # Newton steps in position after an integration step, on one factorisation
 FINITE_SUM = 1e300  # largest sum that counts as finite
@@ -105,7 +108,7 @@ class Program:
         return self.drift.projects and self.system.closes
 
     @cached_property
-    def rates(self) -> Function:
+    def rates(self) -> "Function | RowFunction":
         """Function (t, q, v) → (q̈, power of the loads, …); that of :attr:`monitored_rates` where these are needed, too."""
         monitored = self.may_lose_rank
         return self.monitored_rates if monitored else write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
@@ -251,7 +254,7 @@ class Program:
         return self.check(x), self.energies(x)
 
     @cached_property
-    def point_check(self) -> Function:
+    def point_check(self) -> "Function | RowFunction":
         """Function of a point → its check, and its energies."""
         return write(self.held_point if self.inputs else self.watched_point, self.layout.size, name="check")
 
