@@ -22,6 +22,8 @@ call. A function that is kept, ``f = system.mass_matrix``, is called by Python w
 | momentum about the centre of mass | ``momentum(q, v)`` | ``computeCentroidalMomentum`` | ``subtree_angmom`` |
 | accelerations | ``forward_dynamics(q, v, load)`` | ``aba`` | ``mj_forward`` |
 | efforts | ``inverse_dynamics(q, v, acceleration)`` | ``rnea`` | ``mj_inverse`` |
+| ∂q̈/∂(q, v, τ) | ``acceleration_derivatives(q, v, load)`` | ``computeABADerivatives`` | – |
+| ∂τ/∂(q, v) | ``inverse_dynamics_derivatives(q, v, acceleration)`` | ``computeRNEADerivatives`` | – |
 
 Where joints close loops, coordinates and rates of all joints are arguments, terms are those of the spanning tree, and
 columns of joints outside the tree are zero. ``independent=`` names as many joints, or rates such as "U.angle1", as there are
@@ -43,12 +45,12 @@ class CompiledFunction:
     ----------
     doc : str
         Its description.
-    of_frame : bool
-        Whether it is a function of a frame.
+    of_frame, has_loads : bool
+        Whether it is a function of a frame; whether laws of loads, which may change, are part of it.
     """
 
-    def __init__(self, doc: str, of_frame: bool = False):
-        self.__doc__, self.of_frame = doc, of_frame
+    def __init__(self, doc: str, of_frame: bool = False, has_loads: bool = False):
+        self.__doc__, self.of_frame, self.has_loads = doc, of_frame, has_loads
 
     def __set_name__(self, owner: type, name: str):
         """Keep the name of the attribute."""
@@ -58,6 +60,8 @@ class CompiledFunction:
         """The function of a system."""
         if system is None:
             return self
+        if self.has_loads:
+            return system.function(self.name)
         if self.of_frame:
             made: Callable = FrameFunction(system, self.name)
         elif system.has_closures:
@@ -166,13 +170,24 @@ class StateFunctions:
         "``f(q, independent=…, out=None, t=0.0)``: N (…, n_v, k), v = N ẏ for the rates ẏ of k independent coordinates."
     )
 
+    acceleration_derivatives = CompiledFunction(
+        "``f(q, v, load, out=None, t=0.0)``: derivatives of the accelerations by displacements along the rates, rates and "
+        "by generalised forces, each (…, n_v, n_v), under the loads of the scene; with loops along the constraints.",
+        has_loads=True,
+    )
+    inverse_dynamics_derivatives = CompiledFunction(
+        "``f(q, v, acceleration, out=None, t=0.0)``: derivatives of the generalised forces of inverse dynamics by "
+        "displacements along the rates and by rates, each (…, n_v, n_v); that by accelerations is the mass matrix.",
+        has_loads=True,
+    )
+
     def function(self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None) -> Callable:
         """Compiled function of a state; several names give one function of all, which computes common operations once.
 
         Parameters
         ----------
         *names : str
-            Names of functions of this table, "inverse_dynamics", "loop_constraints"; those of frames with the frame, as in
+            Names of these functions, "inverse_dynamics" or "loop_constraints"; those of frames with the frame, as in
             "jacobian:hand".
         reference : str
             Axes and point of Jacobians: "local_world_aligned", "world" or "local".
@@ -195,7 +210,16 @@ class StateFunctions:
         return self._supplier.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
 
     def evaluate(
-        self, names, q, v=None, acceleration=None, *, t=0.0, reference=LOCAL_WORLD_ALIGNED, independent=None
+        self,
+        names,
+        q,
+        v=None,
+        acceleration=None,
+        load=None,
+        *,
+        t=0.0,
+        reference: str = LOCAL_WORLD_ALIGNED,
+        independent=None,
     ) -> dict:
         """Results of several functions of one state, or of a batch, by their names; see :meth:`function`.
 
@@ -203,12 +227,12 @@ class StateFunctions:
         ----------
         names : sequence of str
             Names of functions.
-        q, v, acceleration : array_like, shape (…, n_q), (…, n_v), (…, n_v)
-            Coordinates, rates, accelerations; those that the functions need.
+        q, v, acceleration, load : array_like, shape (…, n_q), (…, n_v), (…, n_v), (…, n_v)
+            Coordinates, rates, accelerations, generalised forces; those that the functions need.
         t : float or array_like
             Time [s].
         reference, independent
             As of :meth:`function`.
         """
-        given = {"q": q, "v": v, "acceleration": acceleration}
+        given = {"q": q, "v": v, "acceleration": acceleration, "load": load}
         return self._supplier.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]

@@ -184,6 +184,35 @@ def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(n
     assert relative(J_rate, rate(lambda q: system.jacobian(q, frame, **which))) <= 1e-6
 
 
+DIFFERENTIATED = {
+    "tree of all kinds": lambda: gauss.load("random_tree", n=4, seed=1),
+    "damped": lambda: gauss.load("cart_pole"),
+    "four-bar": lambda: gauss.load("four_bar"),
+    "coupled": lambda: gauss.load("gear_pair"),
+}
+
+
+@pytest.mark.parametrize("name", DIFFERENTIATED)
+def test_derivatives_agree_with_those_of_one_state(name):
+    system = gauss.compile_scene(DIFFERENTIATED[name]())
+    (state, *_), (load, *_) = mechanisms.consistent_states(system)
+    found = system.acceleration_derivatives(state.q, state.v, load, t=state.t)
+    expected = gauss.derivatives(system, state, load)
+    for part, other in zip(found, (expected.q, expected.v, expected.load), strict=True):
+        assert relative(part, other) <= 1e-11 or not other.any()
+
+
+def test_derivatives_of_inverse_dynamics_undo_those_of_the_accelerations():
+    system = gauss.compile_scene(TREES["tree of all kinds"]())
+    state = random_state(system, np.random.default_rng(4))
+    load = np.linspace(-1.0, 1.0, system.n_v)
+    by_q, by_v, by_load = system.acceleration_derivatives(state.q, state.v, load)
+    efforts = system.inverse_dynamics_derivatives(state.q, state.v, system.accelerations(state, load))
+    M = system.mass_matrix(state.q)
+    assert relative(M @ by_load, np.eye(system.n_v)) <= 1e-10
+    assert relative(-M @ by_q, efforts[0]) <= 1e-10 and relative(-M @ by_v, efforts[1]) <= 1e-10
+
+
 class Foreign:
     """Array of another library on the CPU: its memory is shared by DLPack alone."""
 
