@@ -58,7 +58,8 @@ class LoadedMechanism:
         moving = np.concatenate([self.q, self.v])
         along = [np.concatenate([coordinate_rates(self.system, self.q, dq), dv]) for dq, dv in directions]
         outputs, ends = np.concatenate(parts), np.cumsum([part.size for part in parts])[:-1]
-        return [tuple(np.split(forward(outputs, moving, direction), ends)) for direction in along]
+        changes = (np.split(forward(outputs, moving, direction), ends) for direction in along)
+        return [(force, rows, following) for force, rows, following in changes]
 
 
 def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

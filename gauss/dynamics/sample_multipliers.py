@@ -59,7 +59,7 @@ def sample_multipliers(system: System, t, q, v) -> tuple[np.ndarray, np.ndarray]
     run = cached(system, key, lambda: cached_on_disk(system, key, make).entry())
     found, errors = np.empty((len(t), system.structure.n_rows)), np.empty((len(t), 2))
     run(len(t), [np.ascontiguousarray(part, dtype=float) for part in (q, v, t)], [found, errors])
-    return found, (errors <= interface.limits).all(axis=1)
+    return found, np.logical_and.reduce(errors <= interface.limits, axis=1)
 
 
 def _written(system: System, laws: Laws) -> Function:
