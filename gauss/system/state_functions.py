@@ -31,45 +31,34 @@ degrees of freedom: v = N ẏ for their rates ẏ, and terms are projected on th
 """
 
 from collections.abc import Callable
-from typing import Any
+from functools import cached_property
 
 from gauss.errors import ArgumentError
 
 LOCAL_WORLD_ALIGNED = "local_world_aligned"
 
 
-class CompiledFunction:
+class CompiledFunction(cached_property):
     """Attribute of a system: a compiled function, made when it is first asked for and kept with the system.
 
     Parameters
     ----------
     doc : str
         Its description.
-    of_frame, has_loads : bool
-        Whether it is a function of a frame; whether laws of loads, which may change, are part of it.
+    of_frame : bool
+        Whether it is a function of a frame.
     """
 
-    def __init__(self, doc: str, of_frame: bool = False, has_loads: bool = False):
-        self.__doc__, self.of_frame, self.has_loads = doc, of_frame, has_loads
+    def __init__(self, doc: str, of_frame: bool = False):
+        super().__init__(self._made)
+        self.__doc__, self.of_frame = doc, of_frame
 
-    def __set_name__(self, owner: type, name: str):
-        """Keep the name of the attribute."""
-        self.name = name
-
-    def __get__(self, system, owner: type | None = None) -> Any:
+    def _made(self, system) -> Callable:
         """The function of a system."""
-        if system is None:
-            return self
-        if self.has_loads:
-            return system.function(self.name)
+        name = str(self.attrname)
         if self.of_frame:
-            made: Callable = FrameFunction(system, self.name)
-        elif system.has_closures:
-            made = ConstrainedFunction(system, self.name)
-        else:
-            made = system.function(self.name)
-        system.__dict__[self.name] = made
-        return made
+            return FrameFunction(system, name)
+        return ConstrainedFunction(system, name) if system.has_closures else system.function(name)
 
 
 class ConstrainedFunction:
@@ -170,16 +159,22 @@ class StateFunctions:
         "``f(q, independent=…, out=None, t=0.0)``: N (…, n_v, k), v = N ẏ for the rates ẏ of k independent coordinates."
     )
 
-    acceleration_derivatives = CompiledFunction(
-        "``f(q, v, load, out=None, t=0.0)``: derivatives of the accelerations by displacements along the rates, rates and "
-        "by generalised forces, each (…, n_v, n_v), under the loads of the scene; with loops along the constraints.",
-        has_loads=True,
-    )
-    inverse_dynamics_derivatives = CompiledFunction(
-        "``f(q, v, acceleration, out=None, t=0.0)``: derivatives of the generalised forces of inverse dynamics by "
-        "displacements along the rates and by rates, each (…, n_v, n_v); that by accelerations is the mass matrix.",
-        has_loads=True,
-    )
+    @property
+    def acceleration_derivatives(self) -> Callable:
+        """Compiled function ``f(q, v, load, out=None, t=0.0)``: derivatives of the accelerations, three (…, n_v, n_v).
+
+        By displacements along the rates, by rates and by generalised forces, under the loads of the scene as they are now;
+        with loops along the constraints.
+        """
+        return self.function("acceleration_derivatives")
+
+    @property
+    def inverse_dynamics_derivatives(self) -> Callable:
+        """Compiled function ``f(q, v, acceleration, out=None, t=0.0)``: derivatives of inverse dynamics, two (…, n_v, n_v).
+
+        By displacements along the rates and by rates; that by accelerations is the mass matrix.
+        """
+        return self.function("inverse_dynamics_derivatives")
 
     def function(self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None) -> Callable:
         """Compiled function of a state; several names give one function of all, which computes common operations once.

@@ -1,9 +1,12 @@
 """Functions of a state agree with Pinocchio and MuJoCo, with each other, with derivatives; batches with single states."""
 
+import copy
+
 import numpy as np
 import pytest
 
 import gauss
+from gauss.codegen import content_digest
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import ArgumentError, StateError
 from gauss.system import State, random_state, retract
@@ -272,6 +275,14 @@ def test_arrays_of_any_strides_types_and_libraries_give_the_same(arm):
     frame = list(arm.frames)[-1]
     assert arm.forward_kinematics(Q, frame, out=parts) is parts
     assert all(np.array_equal(*pair) for pair in zip(parts, arm.forward_kinematics(Q, frame), strict=True))
+
+
+def test_functions_that_a_system_keeps_leave_its_content_known():
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    q, before = system.initial_state().q, content_digest(system)
+    system.mass_matrix(q), system.jacobian(q, "coupler"), system.null_space(q, independent="A")  # noqa: B018
+    assert before is not None and content_digest(system) == before
+    assert not {"mass_matrix", "jacobian", "null_space"} & vars(copy.copy(system)).keys()
 
 
 def test_quaternions_are_normalised_or_refused(arm):
