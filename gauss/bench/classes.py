@@ -10,7 +10,7 @@ from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.qp import NAME, compare
 from gauss.bench.suite import CLASSES, recipes
-from gauss.bench.suite_instances import SUITE, of_suite
+from gauss.bench.suite_instances import SUITE, of_suite, suite_class
 from gauss.bench.table import ResultTable
 
 FEW = 8  # problems of a class in a quick run, evenly spread
@@ -56,7 +56,7 @@ def problems_of(kind: str) -> tuple[str, ...]:
     """Names of the problems of a class."""
     if kind in GROUPS:
         return tuple(name for name in SELECTION if group_of(make_problem(name)) == kind)
-    return tuple(recipe.name for recipe in recipes(kind))
+    return tuple(recipe.name for recipe in recipes(suite_class(kind)))
 
 
 def spread(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -72,7 +72,7 @@ def name_of(kind: str) -> str:
 
 def story_of(kind: str) -> str:
     """What is in a class."""
-    return STORIES.get(kind) or CLASSES[kind]
+    return STORIES.get(kind) or CLASSES[suite_class(kind)]
 
 
 def _instances(kind: str, names: tuple[str, ...]) -> Iterator[Instance]:

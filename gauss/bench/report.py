@@ -36,7 +36,7 @@ HOW = f"""Every backend gets the same quadratic programmes of mechanisms, in a p
 error of an answer is the largest relative error of a body's or joint's acceleration against a reference with residuals of
 50 digits. F2: accelerations of the bodies, in their units; F2s: scaled by Φ^½, rows of unit length. Levels are absolute
 tolerances of residuals and duality gap: low 1e-3, mid 1e-6, high 1e-9, tightest 1e-12 (HiGHS 1e-10). An answer after
-{LIMIT:g} s is none.
+{LIMIT:g} s of CPU time is none.
 
 Two rules, the same for all. **Right**: the error is at most {RIGHT:g}, whoever answered and whatever a certificate says.
 **Kept**: primal and dual residual and gap are within the tolerance that was asked for, as qpbenchmark judges; a solver
@@ -45,8 +45,9 @@ residual or the gap is above the tolerance and above ten times the rounding of i
 other choice.
 
 Times are medians of calls from Python, set-up included, on a problem in the form that the solver takes; making that form
-is not timed. The time of the library is what it reports of itself. Those of gauss's own methods include making their
-matrices in Python. Means are shifted geometric means over all problems of a class (shift {1e3 * SHIFT:g} ms), a problem
+is not timed. They are wall times, or CPU times of the process where these are less, so that a busy machine adds nothing.
+The time of the library is what it reports of itself. Those of gauss's own methods include making their matrices in
+Python. Means are shifted geometric means over all problems of a class (shift {1e3 * SHIFT:g} ms), a problem
 that is not solved right counting as {LIMIT:g} s. The machine may be shared: times side by side compare, single ones are
 no records. Errors of multipliers are those of the solver's own, constraint by constraint, without what redundant rows leave
 open; a solver that gives none is off by 1."""

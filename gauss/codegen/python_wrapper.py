@@ -157,8 +157,8 @@ class PythonWrapper:
         errors = np.empty((count, len(limits)))
         self._rows(count, inputs, [*found, errors] if limits else found)
         if not (errors <= limits).all():
-            for row in np.flatnonzero(~(errors <= limits).all(axis=1)):
-                self._one_of_batch(int(row), inputs, found)
+            for row in np.flatnonzero(~(errors <= limits).all(axis=1)).tolist():
+                self._one_of_batch(row, inputs, found)
 
     def _room(self, k: int, shape: Shape, targets, inputs) -> np.ndarray:
         """Array for a result: the given one where rows can be written to it."""

@@ -4,8 +4,11 @@ The recursive Newton–Euler algorithm (Luh, Walker, Paul 1980) on the bodies of
 an independent check of compiled forward dynamics.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from gauss.backends.structure import Edge
 from gauss.dynamics.assemble import impressed
 from gauss.dynamics.constraint_rows import joint_rows
 from gauss.dynamics.kinematics import Kinematics
@@ -54,10 +57,34 @@ def body_residuals(motion: Kinematics, applied: Applied, rates) -> dict[int, tup
     dict
         {body: (moment about the centre of mass, force)} in world axes.
     """
-    system, inertial_forces = motion.system, impressed(motion, applied)
-    accelerations, wrenches = {-1: (np.zeros(3), np.zeros(3))}, {}
-    for edge in system.structure.tree:
-        joint, at = system.joints[edge.constraint], motion.joints[edge.constraint]
+    system, inertial_forces, wrenches = motion.system, impressed(motion, applied), {}
+    for edge, outer, moved in outward_accelerations(motion, rates):
+        R, place = motion.R[edge.outer], slice(6 * edge.outer, 6 * edge.outer + 6)
+        left = inertial_forces[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
+        wrenches[edge.outer] = R @ left[:3], left[3:]
+    return wrenches
+
+
+def outward_accelerations(motion: Kinematics, rates) -> Iterator[tuple[Edge, np.ndarray, np.ndarray]]:
+    """Accelerations of the bodies, A a + B q̈ = D outward along the spanning tree; numbers or expressions.
+
+    Parameters
+    ----------
+    motion : Kinematics
+        Poses and velocities, with the joints.
+    rates : ndarray, shape (n_v,)
+        Joint accelerations.
+
+    Yields
+    ------
+    edge : Edge
+        Edge of the tree to the body.
+    alpha, acceleration : ndarray, shape (3,)
+        Angular acceleration, and acceleration of the centre of mass, in world axes.
+    """
+    accelerations = {-1: (np.zeros(3), np.zeros(3))}
+    for edge in motion.system.structure.tree:
+        joint, at = motion.system.joints[edge.constraint], motion.joints[edge.constraint]
         _, (B,), D = joint_rows(motion, joint, at)
         sign, inner_arm, outer_arm = joint_sides_of(edge, joint, at)
         alpha, linear = accelerations[edge.inner]
@@ -65,10 +92,7 @@ def body_residuals(motion: Kinematics, applied: Applied, rates) -> dict[int, tup
         outer = alpha + across[:3]
         moved = linear - cross(inner_arm, alpha) + across[3:] + cross(outer_arm, outer)
         accelerations[edge.outer] = outer, moved
-        R, place = motion.R[edge.outer], slice(6 * edge.outer, 6 * edge.outer + 6)
-        left = inertial_forces[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
-        wrenches[edge.outer] = R @ left[:3], left[3:]
-    return wrenches
+        yield edge, outer, moved
 
 
 def along_rates(motion: Kinematics, wrenches: dict[int, tuple]) -> np.ndarray:

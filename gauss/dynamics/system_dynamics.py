@@ -89,6 +89,20 @@ class SystemDynamics(Store):
         with judged_later():
             return consistent(system, state, kept, required, least_violation, rough)
 
+    def scene_start(self, system: System) -> State:
+        """Consistent start of the scene at time 0; see :func:`gauss.dynamics.initial_states.scene_start`."""
+        from gauss.dynamics.initial_states import scene_start
+
+        with judged_later():
+            return scene_start(system)
+
+    def projected(self, system: System, state: State) -> State:
+        """State projected onto the constraints; see :func:`gauss.dynamics.initial_states.projected`."""
+        from gauss.dynamics.initial_states import projected
+
+        with judged_later():
+            return projected(system, state)
+
     def mobility(self, system: System):
         """Freedoms and redundant constraints at the start of the scene."""
         from gauss.dynamics.mobility import mobility

@@ -60,5 +60,11 @@ class Dynamics(Protocol):
     ) -> State:
         """Consistent state near the given one; joints in ``kept`` keep their coordinates if possible, or must."""
 
+    def scene_start(self, system: "System") -> State:
+        """Consistent start of the scene at time 0."""
+
+    def projected(self, system: "System", state: State) -> State:
+        """State projected onto the constraints; one that meets them to round-off stays as it is."""
+
     def mobility(self, system: "System"):
         """Freedoms and redundant constraints at the start of the scene; its ``str`` says them in words."""

@@ -202,7 +202,7 @@ class StateFunctions:
         StateError
             If there is no such frame or joint, or the coordinates cannot be independent.
         """
-        return self._supplier.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
+        return self.mechanics.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
 
     def evaluate(
         self,
@@ -230,4 +230,4 @@ class StateFunctions:
             As of :meth:`function`.
         """
         given = {"q": q, "v": v, "acceleration": acceleration, "load": load}
-        return self._supplier.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]
+        return self.mechanics.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]

@@ -85,8 +85,8 @@ class System(StateFunctions):
         return made
 
     @property
-    def _supplier(self) -> Dynamics:
-        """Dynamics of the system.
+    def mechanics(self) -> Dynamics:
+        """Its supplier of the mechanics.
 
         Raises
         ------
@@ -281,14 +281,17 @@ class System(StateFunctions):
         """
         refuse_changed(self)
         given = q is not None or v is not None
+        if not given and t == 0.0 and keep is None and not least_violation:
+            return self.mechanics.scene_start(self)
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
-        return self._supplier.consistent(self, state, kept, keep is not None, least_violation, given)
+        return self.mechanics.consistent(self, state, kept, keep is not None, least_violation, given)
 
     def projected(self, state: State) -> State:
         """Consistent state nearest to a given one, projected onto the constraints in the mass metric.
 
-        Unlike :meth:`initial_state`, which takes a rough guess, it tries no other poses.
+        Unlike :meth:`initial_state`, which takes a rough guess, it tries no other poses. A state that meets the constraints
+        to round-off stays as it is.
 
         Parameters
         ----------
@@ -302,7 +305,7 @@ class System(StateFunctions):
         StateError
             If the state does not fit the system.
         """
-        return self._supplier.consistent(self, self.state(state.q, state.v, state.t))
+        return self.mechanics.projected(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: Scalar = 0.0) -> State:
         """State of the starts of the scene, consistent or not."""
@@ -336,7 +339,7 @@ class System(StateFunctions):
         """
         require(state, (State,), "accelerations")
         refuse_changed(self)
-        return self._supplier.accelerations(self, state, load)
+        return self.mechanics.accelerations(self, state, load)
 
     @property
     def forward_dynamics(self) -> Callable:
@@ -352,7 +355,7 @@ class System(StateFunctions):
             If the system cannot be compiled, with the reasons.
         """
         refuse_changed(self)
-        return self._supplier.forward_dynamics(self)
+        return self.mechanics.forward_dynamics(self)
 
     @property
     def inverse_dynamics(self) -> Callable:

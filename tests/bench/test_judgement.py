@@ -2,6 +2,7 @@
 
 import re
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from gauss.bench.suite.instance import INFEASIBLE, UNBOUNDED
 from gauss.bench.suite_instances import SUITE, of_suite
 from gauss.bench.summary import complete, is_broken, is_kept, is_right, mean_time, profile, sensitivity, totals, verdict
 from gauss.bench.verdicts import is_false, said
+from gauss.bench.worker import Worker
 from gauss.errors import BackendError, FileError
 from gauss.view.fronts import ZERO, height
 
@@ -323,7 +325,7 @@ def test_verdicts_in_the_words_of_solvers(words, verdict):
 
 @pytest.mark.slow
 def test_every_class_is_asked_and_sequences_start_at_the_step_before():
-    assert set(SUITE) == {*SMALLEST_OF, "infeasible", "unbounded", "sequences", "large", "cones", "coulomb"}
+    assert set(SUITE) == {*SMALLEST_OF, "independent", "infeasible", "unbounded", "sequences", "large", "cones", "coulomb"}
     first, second = of_suite("sequences", ["sequence falling chain 00", "sequence falling chain 01"])
     assert first.start is None and second.start == pytest.approx(first.known.x, rel=1e-15)
     row = measure(second, "osqp", FILE, "high")
@@ -345,15 +347,31 @@ def test_fronts_hold_what_no_other_beats():
     assert height(0.0) == ZERO < height(1e-300) < height(1e-12)
 
 
+def computed(seconds: float):
+    """Nothing, after so much CPU time [s]."""
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
 def test_clocks_run_a_cold_call_and_some_warm_ones():
     calls = []
     found, seconds = timed(lambda: calls.append(None), LIMIT)
     assert len(calls) == len(found) == len(seconds) == 1 + ROUNDS
-    found, seconds = timed(lambda: time.sleep(0.02), 0.01)
+    found, seconds = timed(lambda: computed(0.02), 0.01)
     assert len(seconds) == 1  # late already
-    found, seconds = timed(lambda: time.sleep(0.02), 0.01, compiles=True)
+    found, seconds = timed(lambda: computed(0.02), 0.01, compiles=True)
     assert len(seconds) == 2
-    assert len(timed(lambda: time.sleep(0.06), LIMIT)[1]) > FEWEST
+    assert len(timed(lambda: computed(0.06), LIMIT)[1]) > FEWEST
+    assert timed(lambda: time.sleep(0.02), LIMIT)[1][0] < 0.02  # waiting costs a solver nothing
+
+
+def test_a_call_that_takes_too_much_cpu_time_ends_with_its_process():
+    """No setting of a library is needed, and the next call is answered by a new process."""
+    with Worker() as worker:
+        late = worker.call(timed, partial(computed, 10.0), 0.1, timeout=60.0)
+        assert (late.outcome, late.value) == ("timed out", None)
+        assert worker.call(timed, partial(computed, 0.01), 0.1, timeout=60.0).outcome == "answered"
 
 
 def test_the_documented_solver_works(tmp_path, monkeypatch, four_bar):
