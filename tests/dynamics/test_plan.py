@@ -41,6 +41,12 @@ def _long() -> Scene:
     return gauss.load("n_pendulum", n=LARGE_TREE_BODIES + 1)
 
 
+def _driven() -> Scene:
+    scene = _long()
+    scene.drive("J1", torque=lambda t: float(t))
+    return scene
+
+
 def _mesh() -> Scene:
     return gauss.load("n_four_bar", n=50)
 
@@ -58,7 +64,8 @@ CASES = {
     ),
     "an opaque law": (_opaque, {}, ("Python loop", "compiled"), ["compiled loop"]),
     "a law that asks": (_asking, {}, ("Python loop", "compiled"), ["compiled loop"]),
-    "a large tree": (_long, {}, ("Python loop", "tree recursion"), ["compiled loop"]),
+    "a large tree": (_long, {}, ("compiled loop", "tree recursion"), ["compiled loop"]),
+    "a large tree, an opaque law": (_driven, {}, ("Python loop", "tree recursion"), ["compiled loop"] * 2),
     "many loops": (_mesh, {}, ("Python loop", "call graph"), ["compiled loop"]),
     "a library": (lambda: mechanisms.rods(2), {"integrator": "scipy_dop853"}, ("library", "compiled"), []),
     "a library, a law": (_opaque, {"integrator": "scipy_dop853"}, ("library", "certified"), ["library"]),
