@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Function, Kernel, write
+from gauss.codegen import Function, Kernel, NativeFunction, write
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.energies import look_at_energies
 from gauss.dynamics.error_scale import (
@@ -96,7 +96,7 @@ class Program:
         return self.drift.projects and self.system.closes
 
     @cached_property
-    def rates(self) -> Function:
+    def rates(self) -> Function | NativeFunction:
         """Function (t, q, v) → (q̈, power of the loads, …); that of :attr:`monitored_rates` where these are needed, too."""
         monitored = self.may_lose_rank
         return self.monitored_rates if monitored else write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
@@ -234,7 +234,7 @@ class Program:
         return self.check(x), self.energies(x)
 
     @cached_property
-    def point_check(self) -> Function:
+    def point_check(self) -> Function | NativeFunction:
         """Function of a point → its check, and its energies."""
         return write(self.watched_point, self.layout.size, name="check")
 

@@ -63,7 +63,7 @@ class TreeProgram(Program):
 
         def stored(t, q, v):
             energies = stored_energies(Kinematics(self.system, State(t[0], q, v)))
-            return [sum(energies, 0.0), sum(map(np.abs, energies), 0.0)]
+            return [sum(energies, 0.0), sum((abs(energy) for energy in energies), 0.0)]
 
         return write(stored, 1, self.system.n_q, self.system.n_v, name="stored")
 

@@ -44,11 +44,11 @@ class Adaptive:
     row: int
     trial: Function | NativeFunction
     project: Function | NativeFunction | None
-    check: Function
+    check: Function | NativeFunction
     dense: Function | NativeFunction
     sample: Function | NativeFunction
     dense_evaluations: int
-    rates: Function
+    rates: Function | NativeFunction
 
     def compile(self, start: Function | NativeFunction) -> Loop:
         """Machine code of the loop, and of ``start``, which is called by name."""

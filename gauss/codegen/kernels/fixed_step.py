@@ -7,7 +7,7 @@ samples do not change the motion, and have the order of the method.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from gauss.codegen import INTEGER, Function, Writer
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import LoopStatus
@@ -48,11 +48,11 @@ class Fixed:
 
     size: int
     row: int
-    step: Function
+    step: Function | NativeFunction
     project: Function | None
-    check: Function
+    check: Function | NativeFunction
     evaluations: int
-    rates: Function
+    rates: Function | NativeFunction
 
     def compile(self) -> Loop:
         """Machine code of the loop; its budget is the number of pairs in the grid."""

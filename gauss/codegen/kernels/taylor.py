@@ -56,9 +56,9 @@ class TaylorStep:
     defect: Function | None
     rates_at: int
     project: Function | None
-    check: Function
+    check: Function | NativeFunction
     sample: Function
-    rates: Function
+    rates: Function | NativeFunction
 
     def compile(self, start: Function | NativeFunction) -> Loop:
         """Machine code of the loop, and of ``start``, which is called by name."""
