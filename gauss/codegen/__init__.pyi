@@ -1,10 +1,11 @@
+from gauss.codegen.batch_code import BatchCode, batch_code
 from gauss.codegen.branches import branches
 from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
-from gauss.codegen.expression import Expression, Graph, Scalar, as_number, graph_of, reachable
+from gauss.codegen.expression import Entry, Expression, Graph, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
@@ -26,8 +27,10 @@ from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
     "BODY",
+    "BatchCode",
     "DOUBLE",
     "EntryCode",
+    "Entry",
     "Expression",
     "FLAGS",
     "Function",
@@ -51,6 +54,7 @@ __all__ = [
     "Series",
     "Writer",
     "as_number",
+    "batch_code",
     "branches",
     "compile_notice",
     "constant_array",

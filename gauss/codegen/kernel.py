@@ -17,7 +17,7 @@ class Kernel:
 
     Parameters
     ----------
-    function : Function
+    function : Function or NativeFunction
         Traced function, or one that emits its own code.
     batch : bool
         Whether many states will be given at once: SIMD code is then compiled as well.

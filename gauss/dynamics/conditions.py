@@ -107,6 +107,11 @@ def explicit(ask: Question) -> list[str]:
     return [] if found else [f"integrator {getattr(method, 'name', method)!r} is implicit"]
 
 
+def no_held_inputs(ask: Question) -> list[str]:
+    """Inputs are not held between samples: the machine code of the step has none."""
+    return ["its inputs are held between samples"] if ask.held else []
+
+
 def large_tree(ask: Question) -> bool:
     """Whether kernels of links are faster than straight-line code."""
     return is_large(ask.system)
@@ -136,7 +141,7 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 def smooth_system(system: System) -> System:
     """The system without unilateral and set-valued elements, built once."""
-    make = lambda: build(phase_scene(system.scene), system.dynamics.anew())  # noqa: E731
+    make = lambda: build(phase_scene(system.scene), system.mechanics.anew())  # noqa: E731
     return cached(system, (smooth_system,), make)
 
 

@@ -37,7 +37,7 @@ def look_at_energies(motion: Kinematics, work) -> np.ndarray:
     """
     lifted, stored = _lifted(motion), stored_energies(motion)
     potential = sum(stored, start=-sum(lifted))
-    magnitude = sum(np.abs(part) for part in (*lifted, *stored)) + least_magnitude(motion.system)
+    magnitude = sum(math.abs(part) for part in (*lifted, *stored)) + least_magnitude(motion.system)
     return energy_sample(kinetic_energy_of_bodies(motion), potential, magnitude, work)
 
 

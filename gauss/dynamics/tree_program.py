@@ -33,12 +33,12 @@ class TreeProgram(Program):
     checks_bodies = False  # the check is by inverse dynamics in link frames
 
     @cached_property
-    def rates(self) -> NativeFunction:
+    def rates(self) -> NativeFunction:  # type: ignore[override]  # compiled loops take either kind
         """Function (t, q, v) → (q̈, power of the loads)."""
         return RowFunction("rates", 1 + self.system.n_q + self.system.n_v, self.system.n_v + 3, self._emit_rates)
 
     @cached_property
-    def point_check(self) -> NativeFunction:
+    def point_check(self) -> NativeFunction:  # type: ignore[override]  # compiled loops take either kind
         """Function of a point → (error of its accelerations, 0, energy sample)."""
         return RowFunction("check", self.layout.size, 2 + ENERGY_SAMPLE, self._emit_check)
 
@@ -63,7 +63,7 @@ class TreeProgram(Program):
 
         def stored(t, q, v):
             energies = stored_energies(Kinematics(self.system, State(t[0], q, v)))
-            return [sum(energies, 0.0), sum((abs(energy) for energy in energies), 0.0)]
+            return [sum(energies, 0.0), sum(map(abs, energies), 0.0)]
 
         return write(stored, 1, self.system.n_q, self.system.n_v, name="stored")
 
