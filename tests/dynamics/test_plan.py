@@ -42,6 +42,12 @@ def _long() -> Scene:
     return gauss.load("n_pendulum", n=LARGE_TREE_BODIES + 1)
 
 
+def _controlled() -> Scene:
+    scene = gauss.load("friction_oscillator")
+    scene.input("u", "rail", limits=(-1.0, 1.0))
+    return scene
+
+
 def _driven() -> Scene:
     scene = _long()
     scene.drive("J1", torque=lambda t: float(t))
@@ -80,6 +86,12 @@ CASES = {
     "a law that asks": (_asking, {}, ("Python loop", "compiled"), ["compiled loop"]),
     "a large tree": (_long, {}, ("compiled loop", "tree recursion"), ["compiled loop"]),
     "a large tree, an opaque law": (_driven, {}, ("Python loop", "tree recursion"), ["compiled loop"] * 2),
+    "held inputs, friction": (
+        _controlled,
+        {"control": lambda t, q, v: 0.5, "rate": 1000.0},
+        ("samples", "compiled"),
+        ["events", "events"],
+    ),
     "many loops": (_mesh, {}, ("Python loop", "call graph"), ["compiled loop"]),
     "a library": (lambda: mechanisms.rods(2), {"integrator": "scipy_dop853"}, ("library", "compiled"), []),
     "a library, a law": (_opaque, {"integrator": "scipy_dop853"}, ("library", "certified"), ["library"]),
