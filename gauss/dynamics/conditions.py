@@ -18,7 +18,7 @@ LARGE_TREE_BODIES = (
 )
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
 MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops are slower
-WIDEST = 128  # rates up to which the whole step is compiled; beyond, Python forms the step from compiled accelerations
+WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
 
@@ -95,9 +95,9 @@ def written_out(ask: Question) -> list[str]:
 
 
 def narrow(ask: Question) -> list[str]:
-    """The system is small enough for a compiled step."""
-    n_v = ask.system.n_v
-    return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST else []
+    """The step is explicit, or the system is small enough for a compiled one."""
+    n_v, is_explicit = ask.system.n_v, not (explicit(ask) or ask.drift.partitioned)
+    return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST and not is_explicit else []
 
 
 def explicit(ask: Question) -> list[str]:
