@@ -23,7 +23,7 @@ class MechanismEnv(gymnasium.Env):
         Fixed-step method, see :class:`gauss.Simulator`.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012 (as Gymnasium declares it)
+    metadata: dict = {"render_modes": []}  # noqa: RUF012 (as Gymnasium declares it)
 
     def __init__(self, task: Task, integrator: str | None = None):
         self.task, self.simulator = task, Simulator(task.scene, task.step, integrator)

@@ -55,10 +55,9 @@ class MechanismVectorEnv(VectorEnv):
             raise SimulationError(f"scene {task.scene.name!r} has laws of time or state; use SyncVectorEnv of MechanismEnv.")
         with one_tier():
             program, key = Program(system, laws, inputs=True), (integrator, laws.key)
-            make = lambda: fixed_batch(program, method)  # noqa: E731
-            self._loop = cached_on_disk(system, (MechanismVectorEnv, "steps", *key), make)
-            make = lambda: Kernel(output_function(program, task.scene))  # noqa: E731
-            self._measure = cached_on_disk(system, (MechanismVectorEnv, "outputs", *key), make)
+            self._loop = cached_on_disk(system, (fixed_batch, *key), lambda: fixed_batch(program, method))
+            measure = lambda: Kernel(output_function(program, task.scene))  # noqa: E731
+            self._measure = cached_on_disk(system, (output_function, *key), measure)
         self._start = system.initial_state()
         self._batch = FixedStepBatch(self._loop, np.tile(self._packed(self._start)[:, None], num_envs))
         self.single_action_space = task.action_space

@@ -177,7 +177,7 @@ class Simulator:
             Point(start, np.zeros(3), rates, run.method_state), self._u if self.inputs else None
         )
         self._confirmed[:] = self._point
-        self._begun, self._steps = float(start.t), 0
+        self._begun, self._steps = float(self._point[0]), 0
         run.control.steps = run.control.status = 0.0
         return self.state
 
