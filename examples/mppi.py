@@ -1,7 +1,4 @@
-"""Sampling control (MPPI; Williams, Aldrich, Theodorou, J. Guidance 40, 2017): a cart-pole swings up, a Panda reaches.
-
-The next plan is the mean of sampled plans with the weights exp(−cost / λ).
-"""
+"""Sampling control (MPPI; Williams, Aldrich, Theodorou, J. Guidance 40, 2017): a cart-pole swings up, a Panda reaches."""
 
 import sys
 import time
