@@ -12,8 +12,9 @@ events              compiled        unilateral constraints, joint friction, limi
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
+compiled loop       tree recursion  large trees, by explicit integrators
 Python loop         call graph      many kinematic loops
-Python loop         tree recursion  large trees
+Python loop         tree recursion  large trees with opaque laws
 Python loop         compiled        opaque laws, and systems too large for a compiled step
 library             certified       all other scenes, by integrators of other libraries
 samples             compiled        inputs held between samples of a control law, where no rule of machine code applies
@@ -30,6 +31,7 @@ from gauss.codegen import IdentityKey, content_key
 from gauss.dynamics.conditions import (
     compilable,
     contacts_alone,
+    explicit,
     few_bodies,
     has_contacts,
     large_loops,
@@ -46,7 +48,7 @@ from gauss.dynamics.conditions import (
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.dynamics.store import cached
-from gauss.integrators import METHODS, FixedStep, Library, Taylor
+from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Library, Taylor
 from gauss.system import System
 
 Condition = Callable[[Question], list[str]]  # question → violations in words
@@ -86,7 +88,7 @@ def _by_accelerations(ask: Question) -> bool:
 def _beyond_accelerations(ask: Question) -> str:
     """What needs the equations of motion beyond the accelerations of single states; empty if nothing does."""
     method = ask.method
-    if method.implicit if isinstance(method, Library) else method.mechanical:
+    if method is not None and (method.implicit if isinstance(method, Library) else method.mechanical):
         return f"integrator {method.name!r}"
     return "stabilisation 'partitioning'" if ask.drift.partitioned else ""
 
@@ -104,8 +106,8 @@ _CODE = own_backend, compilable
 _WHOLE = *_CODE, written_out, traced_laws, narrow
 _STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
 _ALONE = _both(_smooth, _by_accelerations)
-
 _LOOP = *_WHOLE, no_inputs_of_series
+_TREE_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
 
 MOTIONS = RuleTable(
     (
@@ -117,6 +119,7 @@ MOTIONS = RuleTable(
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
         Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _LOOP),
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _LOOP),
+        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _TREE_LOOP),
         Rule("samples", "compiled", "certified", _both(_held, _by_accelerations)),
         Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
@@ -199,5 +202,6 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
-    ours = METHODS.get(method.name) is method  # immutable: identity stands for content
+    known = (*LIBRARIES, *IMPLICIT) if isinstance(method, Library) else (METHODS.get(method.name),)
+    ours = any(method is one for one in known)  # immutable: identity stands for content
     return IdentityKey(method) if ours else content_key(method)

@@ -123,6 +123,11 @@ class Program:
         return self.projects and not self.has_full_rank
 
     @property
+    def checks_bodies(self) -> bool:
+        """Whether the check of accelerations is by inverse dynamics of all bodies, independent of link frames."""
+        return not self.system.has_closures
+
+    @property
     def may_lose_rank(self) -> bool:
         """Whether the loop constraints of what is projected lose rank at singular configurations only."""
         return self.projects and self.has_full_rank
@@ -238,6 +243,11 @@ class Program:
     def watched_point(self, x):
         """Check of a point, and its energies: what loops evaluate at intervals."""
         return self.check(x), self.energies(x)
+
+    @cached_property
+    def point_check(self) -> Function:
+        """Function of a point → its check, and its energies."""
+        return write(self.held_point if self.inputs else self.watched_point, self.layout.size, name="check")
 
     def held_point(self, x):
         """Check of a point, and its energies, with the rates under its inputs instead of those that it holds."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, cast
 
 from gauss.arguments import named_arguments, named_methods
 from gauss.errors import SceneError, did_you_mean
@@ -20,6 +21,10 @@ from gauss.scene.relation import Relation
 from gauss.scene.set_valued import LimitedDrive, SetValued
 from gauss.scene.unilateral import Unilateral
 from gauss.versions import FormerAttribute
+
+if TYPE_CHECKING:
+    from gauss.scene.clutches import JointLink
+    from gauss.scene.losses import LossyGear
 
 GROUND = "ground"
 LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
@@ -293,9 +298,10 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
         self.shapes[shape.name] = shape
 
     @property
-    def losses(self) -> dict[str, Relation]:
+    def losses(self) -> "dict[str, LossyGear | JointLink]":
         """Non-ideal links that lose power: gears, then set-valued elements."""
-        return {name: link for name, link in (self.relations | self.set_valued).items() if link.loses}
+        links = {name: link for name, link in (self.relations | self.set_valued).items() if link.loses}
+        return cast("dict[str, LossyGear | JointLink]", links)  # no other kinds are non-ideal
 
     @property
     def backlashes(self) -> dict[str, ElasticLink]:

@@ -4,10 +4,8 @@ import numpy as np
 
 from gauss import integrators
 from gauss.backends import Backend, ready
-from gauss.codegen import from_disk
 from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
-from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
@@ -115,19 +113,7 @@ def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.
 
 def _start(system: System) -> State:
     """Initial state of the scene, cached."""
-    return cached(system, (_start,), lambda: _assembled(system) if system.has_closures else system.initial_state())
-
-
-def _assembled(system: System) -> State:
-    """Initial state of a scene with loops, from disk unless there is something to be warned of."""
-    found: list[State] = []
-
-    def make():
-        found.append(system.initial_state())
-        return found[0], not violations(system, found[0])
-
-    state, is_met = from_disk((_assembled, system), make)
-    return state if found or is_met else system.initial_state()
+    return cached(system, (_start,), system.initial_state)
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:

@@ -111,6 +111,7 @@ class CompiledAdaptiveRun(CompiledRun):
     def _renew(self):
         """Set the inputs of a sample of the control law that begins at the present point, and the rates under them."""
         k = self.next_sample
+        assert self.held is not None  # asked for motions with held inputs only
         if k == len(self.held.times) or self.held.times[k] - self.point[0] > 4.0 * APART * abs(self.end):
             return
         self._hold(k)

@@ -7,7 +7,7 @@ the loop stops at a failed check, and the fallback dynamics of the plan continue
 """
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 
@@ -43,9 +43,11 @@ class CompiledRun:
     ----------
     problem : Problem
         Initial value problem whose loads are all traced.
+    program : type
+        Makes the functions of the system.
     """
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, program: type[Program] = Program):
         self.began = time.perf_counter()
         self.problem, self.system, self.start, self.end = problem, problem.system, problem.start, problem.end
         self.samples, self.switching, self.drift = problem.samples, problem.switching, problem.drift
@@ -55,8 +57,8 @@ class CompiledRun:
         self.certified = CertifiedEngine("auto", self.drift.gains)
         self.key = (self.drift, problem.laws.key, self.held is not None)
         self.method_state, size = self._initial_method_state()
-        make = lambda: Program(self.system, problem.laws, self.drift, size, inputs=self.held is not None)  # noqa: E731
-        self.program = self._on_demand((Program, size), make)
+        make = lambda: program(self.system, problem.laws, self.drift, size, inputs=self.held is not None)  # noqa: E731
+        self.program = self._on_demand((program, size), make)
         self.layout = self.program.layout
         self.inputs = np.zeros(len(self.layout.parameters))
         self.input_forces = InputForces(self.system) if self.held else None
@@ -89,7 +91,7 @@ class CompiledRun:
         return ()
 
     def _on_demand(self, what: tuple, make: Callable):
-        return self.system.dynamics.on_demand((*what, self.key), make)
+        return self.system.mechanics.on_demand((*what, self.key), make)
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
         """Start from a compiled point if it passes the check or is confirmed, else from a certified one."""
@@ -186,12 +188,13 @@ class CompiledRun:
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion confirms the accelerations at the end.
 
-        It is used for systems with loop, coupling or relation constraints: at both ends of the first run, and later where
-        the check fails. Other systems are checked body by body in machine code, at their last point, too.
+        It is used for large trees and systems with loop, coupling or relation constraints: at both ends of the first run,
+        and later where the check fails. Other systems are checked body by body in machine code, at their last point, too.
         """
-        if not self.system.has_closures:
+        if self.program.checks_bodies:
             return True
-        packed, checked = self.point, (self.control.constraint_residual,)  # the error by which the loop decides
+        packed = self.point
+        checked: Sequence | np.ndarray = (self.control.constraint_residual,)  # the error by which the loop decides
         if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
@@ -217,7 +220,7 @@ class CompiledRun:
 
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
-        known = not self.system.has_closures or self.kind in self._certified_loops()
+        known = self.program.checks_bodies or self.kind in self._certified_loops()
         return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECK_ERRORS])
 
     def _certified_loops(self) -> set[Hashable]:

@@ -72,7 +72,7 @@ def _asked(piece: Trajectory, samples: np.ndarray | None, later: bool) -> Trajec
         rows[0] = not later
     else:
         rows[-1] = bool((samples == piece.t[-1]).any())
-    return replace(piece, **{name: getattr(piece, name)[rows] for name in ("t", "q", "v", "work")})
+    return replace(piece, t=piece.t[rows], q=piece.q[rows], v=piece.v[rows], work=piece.work[rows])
 
 
 def _joined(pieces: list[Trajectory]) -> Trajectory:
@@ -81,6 +81,6 @@ def _joined(pieces: list[Trajectory]) -> Trajectory:
     sums = ("evaluations", "steps", "rejected", "factorisations", "wall_time", "rescued", "unseen")
     whole = last.stats._replace(**{name: sum(getattr(one, name) for one in stats) for name in sums})
     whole = whole._replace(worst_error=max(one.worst_error for one in stats))
-    rows = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("t", "q", "v", "work")}
+    t, q, v, work = (np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("t", "q", "v", "work"))
     events = tuple(event for piece in pieces for event in piece.events)
-    return replace(last, stats=whole, events=events, energies=None, **rows)
+    return replace(last, stats=whole, events=events, energies=None, t=t, q=q, v=v, work=work)

@@ -154,8 +154,9 @@ def simulate(
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)
     history.warn(found)
-    if plan is None and found.stats.plan.rejected and not own_backend(problem.question):
-        warn_of_slow_route(problem.system, found.stats.plan, found.stats.evaluations)
+    chosen = found.stats.plan
+    if plan is None and chosen is not None and chosen.rejected and not own_backend(problem.question):
+        warn_of_slow_route(problem.system, chosen, found.stats.evaluations)
     return found
 
 

@@ -260,7 +260,7 @@ class Trajectory:
         def traced(t, q, v):
             return function(kinematics(system, State(t[0], q, v)))
 
-        kernel = system.dynamics.on_demand(
+        kernel = system.mechanics.on_demand(
             (trace, name, content_key(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
         )
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Function, Graph, Kernel, forward, jacobian
+from gauss.codegen import Function, Graph, Kernel, forward, from_disk, jacobian
 from gauss.codegen.expression import reachable
 from gauss.errors import GaussError, SceneError, SimulationError
 from gauss.scene.values import is_scalar
@@ -73,7 +73,7 @@ class Relations:
     @cached_property
     def kernel(self) -> Kernel:
         """Machine code of all rows."""
-        return Kernel(self.function, batch=False)
+        return from_disk((Kernel, self.function), lambda: Kernel(self.function, batch=False))
 
     @cached_property
     def asks_time(self) -> bool:

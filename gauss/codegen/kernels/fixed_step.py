@@ -7,7 +7,7 @@ samples do not change the motion, and have the order of the method.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from gauss.codegen import INTEGER, Function, Writer
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import LoopStatus
@@ -34,7 +34,7 @@ class Fixed:
     ----------
     size, row : int
         Length of a point, and of a sample.
-    step : Function
+    step : Function or NativeFunction
         (point, h) → (point after, constraint residual, evaluations, factorisations, unsolved equations, switching surfaces
         passed undetected).
     project : Function or None
@@ -49,7 +49,7 @@ class Fixed:
 
     size: int
     row: int
-    step: Function
+    step: Function | NativeFunction
     project: Function | None
     check: Function
     evaluations: int

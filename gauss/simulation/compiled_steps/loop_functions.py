@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, NativeFunction, Scalar, write
-from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
+from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, CheckedSwitch, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import PartitionedSystem
@@ -34,8 +34,7 @@ def adaptive(program: Program, method: Controlled, batch: bool = False, shares=N
     else:
         trial, dense, dense_evaluations = _written(program, method, begin, shares)
         sample, project = _sample(program, method, begin, len(dense.outputs)), program.projection()
-    check = write(program.watched_point, size, name="check")
-    return Adaptive(size, layout.row, trial, project, check, dense, sample, dense_evaluations, program.rates)
+    return Adaptive(size, layout.row, trial, project, program.point_check, dense, sample, dense_evaluations, program.rates)
 
 
 def _sample(program: Program, method: Controlled, begin: Callable, count: int) -> Function:
@@ -157,15 +156,15 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         return packed, residuals, [*numbers, unseen]
 
     free = not method.mechanical and not program.drift.partitioned
+    step: Function | CheckedSwitch
     if program.may_lose_rank and free:
         step = with_projected_stages(program, steps)
     elif program.has_redundant_rows and free:  # off the constraints, redundant constraints contradict each other
         step = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="step")
     else:
         step = write(steps(_equations(program, method)), size, 1, name="step")
-    check = write(program.held_point if program.inputs else program.watched_point, size, name="check")
     project = None if method.state_size else program.projection()
-    return Fixed(size, layout.row, step, project, check, method.evaluations, program.rates)
+    return Fixed(size, layout.row, step, project, program.point_check, method.evaluations, program.rates)
 
 
 def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:

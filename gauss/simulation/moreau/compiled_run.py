@@ -6,7 +6,6 @@ deep penetration: their treatment and messages are those of :mod:`gauss.dynamics
 
 from dataclasses import replace
 from functools import cached_property
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.handover import finished
 from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps
-from gauss.simulation.moreau.moreau_jean import MoreauRun, in_words, time_step
+from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
@@ -79,7 +78,8 @@ class CompiledMoreauRun(CompiledFixedRun):
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         super()._advance(pairs, out)
         while self.control.status == LoopStatus.UNSOLVED:
-            self._python_step(*pairs[int(self.control.sample)], out)
+            t, due = pairs[int(self.control.sample)]
+            self._python_step(t, due, out)
 
     def _python_step(self, t: float, due: float, out: np.ndarray):
         control = self.control
@@ -108,7 +108,7 @@ class CompiledMoreauRun(CompiledFixedRun):
         method_state = method_state_of(begin)
         run.force, h = method_state[:-1], t - begin.state.t
         rates, share = run.rates_over(begin.state, h)
-        found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
+        found, _ = time_step(KnownRates(run.system, rates, share), begin, h)
         state = run.project(replace(found.state, t=t))
         return self._pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
 
