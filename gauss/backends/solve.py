@@ -82,7 +82,8 @@ def automatic(compulsion: Compulsion, tolerance: float, settings: dict) -> Solut
         if compulsion.h.size:
             solution = refined(solution, tolerance)
         if solution.status.certified:
-            return replace(solution, status=replace(solution.status, rescued="; ".join(failed)))
+            rescued = "; ".join(failed)
+            return replace(solution, status=replace(solution.status, rescued=rescued)) if rescued else solution
         failed.append(f"{name}: {solution.status.reason}")
         solutions.append(solution)
     first, others = solutions[0], f"; nor by {', '.join(names[1:])}" if names[1:] else ""

@@ -34,11 +34,11 @@ class _CtypesCall:
     """Machine code called through ctypes."""
 
     def __init__(self, code: machine.MachineCode, outputs: int):
-        self.outputs, self._run = outputs, code.entry("run", SIGNATURE)
+        self.outputs, self.run = outputs, code.entry("run", SIGNATURE)
 
     def __call__(self, given: np.ndarray) -> np.ndarray:
         found = np.empty(self.outputs)
-        self._run.call(1, given.ctypes.data, 1, found.ctypes.data, 1)
+        self.run.call(1, given.ctypes.data, 1, found.ctypes.data, 1)
         return found
 
 

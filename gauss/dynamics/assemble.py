@@ -111,7 +111,8 @@ def _state_residual(motion: Kinematics, compulsion: Compulsion) -> Scalar:
 
 
 def _largest(values) -> Scalar:
-    return reduce(math.maximum, np.abs(values), 0.0)
+    sizes = np.abs(values)
+    return reduce(math.maximum, sizes, 0.0) if sizes.dtype == object else np.fmax.reduce(sizes, initial=0.0)
 
 
 def closure_distances(motion: Kinematics) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss.codegen import Kernel, from_disk, write
+from gauss.codegen import Kernel, write
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.consistent_states import consistent, violations
 from gauss.dynamics.engines.tiering import TieredFunction
@@ -32,7 +32,7 @@ def scene_start(system: System) -> State:
         found.append(find())
         return found[0], not violations(system, found[0])
 
-    state, is_met = cached(system, (scene_start,), lambda: from_disk((scene_start, system), make))
+    state, is_met = cached_on_disk(system, (scene_start,), make)
     if not (found or is_met):
         return find()
     return State(state.t, state.q.copy(), state.v.copy())  # the caller may write to it

@@ -34,17 +34,35 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
         Zero for the accelerations of a tree without loop constraints. Loop joints exert no force here, and their coordinates
         are left out.
     """
-    system, inertial_forces, wrenches = motion.system, impressed(motion, applied), {}
-    residual = np.zeros(system.n_v, dtype=np.result_type(float, inertial_forces, rates))
-    for edge, outer, moved in outward_accelerations(motion, rates):
-        R, place = motion.R[edge.outer], slice(6 * edge.outer, 6 * edge.outer + 6)
-        left = inertial_forces[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
-        wrenches[edge.outer] = R @ left[:3], left[3:]
+    system, wrenches = motion.system, body_residuals(motion, applied, rates)
+    parts = [part for wrench in wrenches.values() for part in wrench]
+    residual = np.zeros(system.n_v, dtype=np.result_type(float, applied.P, rates, *parts))
     along = along_rates(motion, wrenches)
     for edge in system.structure.tree:
         place = system.joints[edge.constraint].v
         residual[place] = applied.P[place] + along[place]
     return residual
+
+
+def body_residuals(motion: Kinematics, applied: Applied, rates) -> dict[int, tuple]:
+    """Loads, gravity and inertia of each body under joint accelerations (n_v,): what its joints balance, with their drives.
+
+    Parameters
+    ----------
+    motion, applied, rates
+        As of :func:`inverse_dynamics_residual`.
+
+    Returns
+    -------
+    dict
+        {body: (moment about the centre of mass, force)} in world axes.
+    """
+    system, inertial_forces, wrenches = motion.system, impressed(motion, applied), {}
+    for edge, outer, moved in outward_accelerations(motion, rates):
+        R, place = motion.R[edge.outer], slice(6 * edge.outer, 6 * edge.outer + 6)
+        left = inertial_forces[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
+        wrenches[edge.outer] = R @ left[:3], left[3:]
+    return wrenches
 
 
 def outward_accelerations(motion: Kinematics, rates) -> Iterator[tuple[Edge, np.ndarray, np.ndarray]]:
@@ -68,7 +86,7 @@ def outward_accelerations(motion: Kinematics, rates) -> Iterator[tuple[Edge, np.
     for edge in motion.system.structure.tree:
         joint, at = motion.system.joints[edge.constraint], motion.joints[edge.constraint]
         _, (B,), D = joint_rows(motion, joint, at)
-        sign, inner_arm, outer_arm = _sides(edge, joint, at)
+        sign, inner_arm, outer_arm = joint_sides_of(edge, joint, at)
         alpha, linear = accelerations[edge.inner]
         across = sign * (D - B @ rates[joint.v])
         outer = alpha + across[:3]
@@ -97,7 +115,7 @@ def along_rates(motion: Kinematics, wrenches: dict[int, tuple]) -> np.ndarray:
         if edge.outer not in wrenches:
             continue
         joint, at = system.joints[edge.constraint], motion.joints[edge.constraint]
-        sign, inner_arm, outer_arm = _sides(edge, joint, at)
+        sign, inner_arm, outer_arm = joint_sides_of(edge, joint, at)
         moment, force = wrenches[edge.outer]
         moment = moment - cross(outer_arm, force)  # about the joint point
         along[joint.v] = sign * (at.E_omega.T @ moment + at.E_v.T @ force)
@@ -107,6 +125,6 @@ def along_rates(motion: Kinematics, wrenches: dict[int, tuple]) -> np.ndarray:
     return along
 
 
-def _sides(edge, joint, at):
+def joint_sides_of(edge, joint, at):
     """Sign +1 if the tree goes from parent to child, else −1; levers of the joint point on the inner and outer body."""
     return (1.0, at.s, at.r) if edge.outer == joint.child else (-1.0, at.r, at.s)

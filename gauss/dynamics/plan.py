@@ -54,13 +54,16 @@ from gauss.system import System
 Condition = Callable[[Question], list[str]]  # question → violations in words
 
 
-def is_time_stepping(ask: Question) -> bool:
-    """Whether the integrator is Moreau–Jean time stepping."""
+_KEYS: dict[int, IdentityKey] = {}  # of built-in methods, by their address
+
+
+def is_time_stepping(ask) -> bool:
+    """Whether the integrator of a question, or of a problem, is Moreau–Jean time stepping."""
     return isinstance(ask.method, FixedStep) and ask.method.nonsmooth
 
 
 def _is_nonsmooth(ask: Question) -> bool:
-    return bool(ask.system.scene.nonsmooth) and not is_time_stepping(ask)
+    return bool(ask.system.nonsmooth) and not is_time_stepping(ask)
 
 
 def _smooth(ask: Question) -> bool:
@@ -202,6 +205,10 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
-    known = (*LIBRARIES, *IMPLICIT) if isinstance(method, Library) else (METHODS.get(method.name),)
-    ours = any(method is one for one in known)  # immutable: identity stands for content
-    return IdentityKey(method) if ours else content_key(method)
+    key = _KEYS.get(id(method))
+    if key is None:
+        known = (*LIBRARIES, *IMPLICIT) if isinstance(method, Library) else (METHODS.get(method.name),)
+        if not any(method is one for one in known):
+            return content_key(method)
+        key = _KEYS[id(method)] = IdentityKey(method)  # immutable: identity stands for content
+    return key

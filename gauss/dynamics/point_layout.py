@@ -4,6 +4,7 @@ A state, the work up to it, the rates there, the state of the method, and, for a
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -31,12 +32,12 @@ class PointLayout:
     memory: int = 0
     parameters: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def row(self) -> int:
         """Numbers of (t, q, v, work)."""
         return 1 + self.n_q + self.n_v + 3
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Numbers of a point."""
         return self.row + self.n_v + 3 + self.memory + len(self.parameters)

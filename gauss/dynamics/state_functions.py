@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Interface, PythonWrapper, batch_code, entry_code, fastcall, write
+from gauss.dynamics.acceleration_derivatives import acceleration_derivatives, inverse_dynamics_derivatives
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.laws.traced_laws import Laws
@@ -26,8 +27,9 @@ DOC = """Terms of one state, or of a batch (n, …) of states, in machine code.
 
 Parameters
 ----------
-q, v, acceleration : array_like, shape (…, n_q), (…, n_v), (…, n_v)
-    Coordinates (quaternions of unit length), rates, accelerations of all joints; those that the function takes.
+q, v, acceleration, load : array_like, shape (…, n_q), (…, n_v), (…, n_v), (…, n_v)
+    Coordinates (quaternions of unit length), rates, accelerations of all joints, generalised forces added to the loads of
+    the scene; those that the function takes.
 out : ndarray, optional
     Array of doubles for the result, a tuple of arrays for several.
 t : float or array_like
@@ -40,7 +42,7 @@ StateError
 """
 LARGEST_RATIO = 1e8  # of a rate to an independent one, in units of the scene: beyond, that one does not determine it
 NULL_SPACE_RESIDUAL = 1e-6  # K N, relative to the scales of the rows: where rates are not determined it is of order one
-ARGUMENTS = "q", "v", "acceleration"  # in this order
+ARGUMENTS = "q", "v", "acceleration", "load"  # in this order
 
 
 class Term(NamedTuple):
@@ -49,13 +51,14 @@ class Term(NamedTuple):
     Attributes
     ----------
     arguments : str
-        Its arguments, of q, v, a (acceleration).
+        Its arguments, of q, v, a (acceleration), l (load).
     shapes : tuple of str
         Shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints.
     trace : callable
-        (terms, request, acceleration) → its results.
-    of_frame, has_reference, is_reduced : bool
-        Whether it is a function of a frame; in axes to be chosen; whether it exists for independent coordinates.
+        (terms, request, acceleration or load) → its results.
+    of_frame, has_reference, is_reduced, has_loads : bool
+        Whether it is a function of a frame; in axes to be chosen; whether it exists for independent coordinates; whether it
+        depends on the loads of the scene.
     """
 
     arguments: str
@@ -64,6 +67,7 @@ class Term(NamedTuple):
     of_frame: bool = False
     has_reference: bool = False
     is_reduced: bool = True
+    has_loads: bool = False
 
 
 class Request(NamedTuple):
@@ -75,9 +79,16 @@ class Request(NamedTuple):
 
 
 def _inverse_dynamics(terms: StateTerms, _, acceleration):
-    system, state = terms.system, State(terms.t, terms.q, terms.v)
-    own, on_bodies, _ = applied_loads(system, _traced_loads(system).traced, state)
-    return inverse_dynamics(system, terms.q, terms.v, acceleration, own, on_bodies, terms.t)
+    loads = _traced_loads(terms.system).traced
+    own, on_bodies, _ = applied_loads(terms.system, loads, State(terms.t, terms.q, terms.v))
+    return inverse_dynamics(terms.system, terms.q, terms.v, acceleration, own, on_bodies, terms.t)
+
+
+def _slopes(function: Callable) -> Callable:
+    """Derivatives of a function of the loaded system."""
+    return lambda terms, _, given: function(
+        terms.system, _traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given
+    )
 
 
 TERMS = {
@@ -96,7 +107,13 @@ TERMS = {
     "kinetic_energy": Term("qv", ("",), lambda terms, *_: terms.kinetic_energy),
     "potential_energy": Term("q", ("",), lambda terms, *_: terms.potential_energy),
     "null_space": Term("q", ("Vv",), lambda terms, *_: terms.null_space),
-    "inverse_dynamics": Term("qva", ("V",), _inverse_dynamics, is_reduced=False),
+    "inverse_dynamics": Term("qva", ("V",), _inverse_dynamics, is_reduced=False, has_loads=True),
+    "inverse_dynamics_derivatives": Term(
+        "qva", ("VV", "VV"), _slopes(inverse_dynamics_derivatives), is_reduced=False, has_loads=True
+    ),
+    "acceleration_derivatives": Term(
+        "qvl", ("VV", "VV", "VV"), _slopes(acceleration_derivatives), is_reduced=False, has_loads=True
+    ),
     "loop_constraints": Term(
         "qv",
         ("r", "rV", "r"),
@@ -128,7 +145,7 @@ def state_function(system: System, names: Sequence[str], reference: str = REFERE
         raise ArgumentError("null_space: expected the names of independent joints, independent=(…).")
     if columns is not None or "loop_constraints" in names:
         refuse_changed(system)
-    laws = _traced_loads(system).key if "inverse_dynamics" in names else ""
+    laws = _traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""
     key = state_function, requests, columns, laws
     return cached(system, key, lambda: _compiled(system, requests, columns, key))
 
@@ -216,7 +233,7 @@ def _compiled(system: System, requests, columns, key) -> Callable:
         arguments = dict(zip(names, given[:-1], strict=True))
         q, v, (t,) = arguments["q"], arguments.get("v", np.zeros(system.n_v)), given[-1]
         terms = StateTerms(system, q, v, t) if columns is None else ConstrainedTerms(system, q, v, t, columns)
-        found = (TERMS[one.name].trace(terms, one, arguments.get("acceleration")) for one in requests)
+        found = (_traced(TERMS[one.name], terms, one, arguments) for one in requests)
         results = [part for result in found for part in (result if isinstance(result, tuple) else (result,))]
         return *results, _errors(terms, given)
 
@@ -238,6 +255,11 @@ def _compiled(system: System, requests, columns, key) -> Callable:
     last = PythonWrapper(normalised, replace(interface, limits=()), outputs, None, name, DOC)
     run = fastcall(entry, interface, last, name, DOC, batch)
     return run
+
+
+def _traced(term: Term, terms: StateTerms, one: Request, arguments: dict):
+    """Results of a term over symbols."""
+    return term.trace(terms, one, arguments.get("load" if "l" in term.arguments else "acceleration"))
 
 
 def _shapes(system: System, requests, columns) -> tuple[tuple[int, ...], ...]:

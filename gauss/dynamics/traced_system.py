@@ -5,7 +5,7 @@ Integrator loops and engines are compiled from them. Points are vectors (:class:
 
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,8 +31,12 @@ from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.shared_elimination import SharedElimination
 from gauss.dynamics.stabilisation import Drift
+from gauss.dynamics.store import cached_on_disk
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
+
+if TYPE_CHECKING:
+    from gauss.codegen.kernels import RowFunction
 
 POSITION_STEPS = 2  # Newton steps in position after an integration step, on one factorisation
 FINITE_SUM = 1e300  # largest sum that counts as finite
@@ -104,7 +108,7 @@ class Program:
         return self.drift.projects and self.system.closes
 
     @cached_property
-    def rates(self) -> Function:
+    def rates(self) -> "Function | RowFunction":
         """Function (t, q, v) → (q̈, power of the loads, …); that of :attr:`monitored_rates` where these are needed, too."""
         monitored = self.may_lose_rank
         return self.monitored_rates if monitored else write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
@@ -176,6 +180,11 @@ class Program:
         project = Kernel(self.projected_rates, batch=False) if self.projects else None
         return Kernels(self.forward(), Kernel(check, batch=False), project)
 
+    @property
+    def cached_kernels(self) -> Kernels:
+        """The same, cached with the system, and by their content on disk."""
+        return cached_on_disk(self.system, (Program.kernels, self.drift, self.laws.key), self.kernels)
+
     def residual(self, state: State):
         """Constraint residual of a state, in position and velocity, relative; of all constraints of the system."""
         residual = off_unit(self.system, state.q)
@@ -245,7 +254,7 @@ class Program:
         return self.check(x), self.energies(x)
 
     @cached_property
-    def point_check(self) -> Function:
+    def point_check(self) -> "Function | RowFunction":
         """Function of a point → its check, and its energies."""
         return write(self.held_point if self.inputs else self.watched_point, self.layout.size, name="check")
 

@@ -8,7 +8,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from gauss.codegen import Function, NativeFunction, write
+from gauss.codegen import Function, write
 from gauss.codegen.kernels import ENERGY_SAMPLE, Correction, RowCode, RowFunction
 from gauss.dynamics.energies import energy_sample, least_magnitude, stored_energies
 from gauss.dynamics.error_scale import acceleration_scale
@@ -33,12 +33,12 @@ class TreeProgram(Program):
     checks_bodies = False  # the check is by inverse dynamics in link frames
 
     @cached_property
-    def rates(self) -> NativeFunction:  # type: ignore[override]  # compiled loops take either kind
+    def rates(self) -> RowFunction:
         """Function (t, q, v) → (q̈, power of the loads)."""
         return RowFunction("rates", 1 + self.system.n_q + self.system.n_v, self.system.n_v + 3, self._emit_rates)
 
     @cached_property
-    def point_check(self) -> NativeFunction:  # type: ignore[override]  # compiled loops take either kind
+    def point_check(self) -> RowFunction:
         """Function of a point → (error of its accelerations, 0, energy sample)."""
         return RowFunction("check", self.layout.size, 2 + ENERGY_SAMPLE, self._emit_check)
 

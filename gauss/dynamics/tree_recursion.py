@@ -64,14 +64,13 @@ def _recursion(system: System, name: str, steps: Callable, vectors, per_link: in
     names = sorted(set(kinds), key=kinds.index)
     parameters, built, record = _built(steps, joints, kinds, names, [link_numbers(links[edge.outer]) for edge in edges])
     place = {edge.outer: i for i, edge in enumerate(edges)} | {-1: -1}
-    passes = list(zip(*built.values(), strict=True))
     starts = {vector: _starts(joints, vector) for vector in vectors}
     starts["result"] = per_link * np.arange(len(joints)) if per_link else _starts(joints, "result")
     return TreeRecursion(
         name,
         {vector: system.n_q if vector == "q" else system.n_v for vector in vectors} | {"base": 6},
         per_link * len(joints) or system.n_v,
-        [({k: step for k, (step, _) in enumerate(found)}, found[0][1]) for found in passes],
+        _passes(built),
         np.array([names.index(kind) for kind in kinds]),
         np.array([place[edge.inner] for edge in edges]),
         starts,
@@ -79,6 +78,12 @@ def _recursion(system: System, name: str, steps: Callable, vectors, per_link: in
         record,
         [(ACCELERATION + k, "base", k) for k in range(6)],
     )
+
+
+def _passes(built: dict) -> list[tuple[dict, bool]]:
+    """Step of every kind of link in each pass, and whether the pass runs inward."""
+    passes = zip(*built.values(), strict=True)
+    return [({kind: step for kind, (step, _) in enumerate(found)}, found[0][1]) for found in passes]
 
 
 def _starts(joints, vector: str) -> np.ndarray:

@@ -51,11 +51,11 @@ def checked_problem(
         made = ready(backend)
         backend = backend if isinstance(backend, str) else made
     system = scene if isinstance(scene, System) else compile_scene(scene)
-    check_arguments(duration, integrator, step, rtol, atol)
+    method = check_arguments(duration, integrator, step, rtol, atol)
     refuse_changed(system)
     start = _start(system) if state is None else system.projected(state)
     samples = sample_times(times, start.t, duration)
-    method, known_breaks = chosen(integrator), check_breaks(breaks, start.t, duration)
+    known_breaks = check_breaks(breaks, start.t, duration)
     constraint_drift, laws, end = drift(system, stabilisation, start), Laws(system), start.t + duration
     problem = Problem(
         system,
@@ -158,12 +158,19 @@ def chosen(integrator: str | Integrator) -> Integrator:
     return integrator
 
 
-def check_arguments(duration, integrator, step, rtol, atol):
-    """Raise a SimulationError if an argument of a simulation is invalid."""
+def check_arguments(duration, integrator, step, rtol, atol) -> Integrator:
+    """Integrator of a simulation.
+
+    Raises
+    ------
+    SimulationError
+        If an argument is invalid.
+    """
     method = chosen(integrator)
     check_tolerances(duration=duration, rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
     if isinstance(method, FixedStep) and step is None:
         raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
+    return method
 
 
 def sample_times(times, start: float, duration: float):

@@ -103,10 +103,12 @@ class CompiledAdaptiveRun(CompiledRun):
 
     def _started(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Packed point of a state, its check, and its first step, by machine code."""
-        tolerance = self.problem.tolerance
-        return self.loop.evaluate(
-            "start", np.concatenate([[t], q, v, [tolerance.rtol, tolerance.atol, tolerance.atol_rates], self.inputs])
-        )
+        tolerance, rates, inputs = self.problem.tolerance, 1 + q.size, 1 + q.size + v.size
+        given = np.empty(inputs + 3 + self.inputs.size)
+        given[0], given[1:rates], given[rates:inputs] = t, q, v
+        given[inputs : inputs + 3] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
+        given[inputs + 3 :] = self.inputs
+        return self.loop.evaluate("start", given)
 
     def _renew(self):
         """Set the inputs of a sample of the control law that begins at the present point, and the rates under them."""

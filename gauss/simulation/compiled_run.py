@@ -8,6 +8,7 @@ the loop stops at a failed check, and the fallback dynamics of the plan continue
 
 import time
 from collections.abc import Callable, Hashable, Sequence
+from operator import attrgetter
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from gauss.simulation.step_limits import BUDGET, smallest_step
 from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
 from gauss.system import State
 
+recorded_energies = attrgetter(*ENERGY_RECORD)
 CHECK_ERRORS = 2  # entries of a check before those of the energies
 # rates² · evaluations of a step up to which BUDGET steps take less than about a tenth of a second
 BUDGET_WORK = 16 * 16 * 12
@@ -242,5 +244,5 @@ class CompiledRun:
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
             unseen=int(control.unseen),
         )
-        energies = EnergyRecord(*(getattr(control, name) for name in ENERGY_RECORD))
+        energies = EnergyRecord(*recorded_energies(control))
         return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), energies=energies)

@@ -40,7 +40,7 @@ def grid_of(method: FixedStep, begin: float, end: float, step: float, samples, s
 
 
 def contact_grid(begin: float, end: float, step: float, samples, switching: Switching) -> np.ndarray:
-    """Pairs of Moreau–Jean time stepping, which evaluates loads at the begin of a step or in its middle.
+    """Pairs of Moreau–Jean time stepping, which evaluates loads at the start of a step or in its middle.
 
     A step therefore ends just after a switching time: the nearest time of the grid is moved there, or a time is added where
     that one is a sample. At jumps of prescribed velocities steps end before and after, as with other methods.

@@ -195,5 +195,5 @@ def _again(problem: Problem, plan: Plan, step, tolerance, samples, mesh=()) -> T
 
 def _recorded(problem: Problem, found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
     """Trajectory with its settings and its plan, and with the system of its inputs."""
-    system = found.system if problem.held is None else problem.held.recorded()
-    return replace(found, system=system, settings=settings, stats=found.stats._replace(plan=plan))
+    found = found.with_settings(settings, plan)
+    return found if problem.held is None else replace(found, system=problem.held.recorded())

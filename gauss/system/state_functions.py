@@ -22,6 +22,8 @@ call. A function that is kept, ``f = system.mass_matrix``, is called by Python w
 | momentum about the centre of mass | ``momentum(q, v)`` | ``computeCentroidalMomentum`` | ``subtree_angmom`` |
 | accelerations | ``forward_dynamics(q, v, load)`` | ``aba`` | ``mj_forward`` |
 | efforts | ``inverse_dynamics(q, v, acceleration)`` | ``rnea`` | ``mj_inverse`` |
+| ∂q̈/∂(q, v, τ) | ``acceleration_derivatives(q, v, load)`` | ``computeABADerivatives`` | – |
+| ∂τ/∂(q, v) | ``inverse_dynamics_derivatives(q, v, acceleration)`` | ``computeRNEADerivatives`` | – |
 
 Where joints close loops, coordinates and rates of all joints are arguments, terms are those of the spanning tree, and
 columns of joints outside the tree are zero. ``independent=`` names as many joints, or rates such as "U.angle1", as there are
@@ -29,14 +31,14 @@ degrees of freedom: v = N ẏ for their rates ẏ, and terms are projected on th
 """
 
 from collections.abc import Callable
-from typing import Any
+from functools import cached_property
 
 from gauss.errors import ArgumentError
 
 LOCAL_WORLD_ALIGNED = "local_world_aligned"
 
 
-class CompiledFunction:
+class CompiledFunction(cached_property):
     """Attribute of a system: a compiled function, made when it is first asked for and kept with the system.
 
     Parameters
@@ -48,24 +50,15 @@ class CompiledFunction:
     """
 
     def __init__(self, doc: str, of_frame: bool = False):
+        super().__init__(self._made)
         self.__doc__, self.of_frame = doc, of_frame
 
-    def __set_name__(self, owner: type, name: str):
-        """Keep the name of the attribute."""
-        self.name = name
-
-    def __get__(self, system, owner: type | None = None) -> Any:
+    def _made(self, system) -> Callable:
         """The function of a system."""
-        if system is None:
-            return self
+        name = str(self.attrname)
         if self.of_frame:
-            made: Callable = FrameFunction(system, self.name)
-        elif system.has_closures:
-            made = ConstrainedFunction(system, self.name)
-        else:
-            made = system.function(self.name)
-        system.__dict__[self.name] = made
-        return made
+            return FrameFunction(system, name)
+        return ConstrainedFunction(system, name) if system.has_closures else system.function(name)
 
 
 class ConstrainedFunction:
@@ -166,13 +159,30 @@ class StateFunctions:
         "``f(q, independent=…, out=None, t=0.0)``: N (…, n_v, k), v = N ẏ for the rates ẏ of k independent coordinates."
     )
 
+    @property
+    def acceleration_derivatives(self) -> Callable:
+        """Compiled function ``f(q, v, load, out=None, t=0.0)``: derivatives of the accelerations, three (…, n_v, n_v).
+
+        By displacements along the rates, by rates and by generalised forces, under the loads of the scene as they are now;
+        with loops along the constraints.
+        """
+        return self.function("acceleration_derivatives")
+
+    @property
+    def inverse_dynamics_derivatives(self) -> Callable:
+        """Compiled function ``f(q, v, acceleration, out=None, t=0.0)``: derivatives of inverse dynamics, two (…, n_v, n_v).
+
+        By displacements along the rates and by rates; that by accelerations is the mass matrix.
+        """
+        return self.function("inverse_dynamics_derivatives")
+
     def function(self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None) -> Callable:
         """Compiled function of a state; several names give one function of all, which computes common operations once.
 
         Parameters
         ----------
         *names : str
-            Names of functions of this table, "inverse_dynamics", "loop_constraints"; those of frames with the frame, as in
+            Names of these functions, "inverse_dynamics" or "loop_constraints"; those of frames with the frame, as in
             "jacobian:hand".
         reference : str
             Axes and point of Jacobians: "local_world_aligned", "world" or "local".
@@ -195,7 +205,16 @@ class StateFunctions:
         return self.mechanics.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
 
     def evaluate(
-        self, names, q, v=None, acceleration=None, *, t=0.0, reference=LOCAL_WORLD_ALIGNED, independent=None
+        self,
+        names,
+        q,
+        v=None,
+        acceleration=None,
+        load=None,
+        *,
+        t=0.0,
+        reference: str = LOCAL_WORLD_ALIGNED,
+        independent=None,
     ) -> dict:
         """Results of several functions of one state, or of a batch, by their names; see :meth:`function`.
 
@@ -203,12 +222,12 @@ class StateFunctions:
         ----------
         names : sequence of str
             Names of functions.
-        q, v, acceleration : array_like, shape (…, n_q), (…, n_v), (…, n_v)
-            Coordinates, rates, accelerations; those that the functions need.
+        q, v, acceleration, load : array_like, shape (…, n_q), (…, n_v), (…, n_v), (…, n_v)
+            Coordinates, rates, accelerations, generalised forces; those that the functions need.
         t : float or array_like
             Time [s].
         reference, independent
             As of :meth:`function`.
         """
-        given = {"q": q, "v": v, "acceleration": acceleration}
+        given = {"q": q, "v": v, "acceleration": acceleration, "load": load}
         return self.mechanics.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]

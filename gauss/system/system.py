@@ -118,6 +118,11 @@ class System(StateFunctions):
         return tuple(self.scene.losses)
 
     @cached_property
+    def nonsmooth(self) -> tuple[str, ...]:
+        """Names of unilateral and set-valued elements, losses and backlash: a motion then has events between phases."""
+        return tuple(self.scene.nonsmooth)
+
+    @cached_property
     def is_flat(self) -> bool:
         """Whether no coordinate is part of a quaternion: rates are then derivatives of coordinates."""
         return not self.quaternions

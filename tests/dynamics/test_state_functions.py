@@ -1,9 +1,12 @@
 """Functions of a state agree with Pinocchio and MuJoCo, with each other, with derivatives; batches with single states."""
 
+import copy
+
 import numpy as np
 import pytest
 
 import gauss
+from gauss.codegen import content_digest
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import ArgumentError, StateError
 from gauss.system import State, random_state, retract
@@ -184,6 +187,35 @@ def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(n
     assert relative(J_rate, rate(lambda q: system.jacobian(q, frame, **which))) <= 1e-6
 
 
+DIFFERENTIATED = {
+    "tree of all kinds": lambda: gauss.load("random_tree", n=4, seed=1),
+    "damped": lambda: gauss.load("cart_pole"),
+    "four-bar": lambda: gauss.load("four_bar"),
+    "coupled": lambda: gauss.load("gear_pair"),
+}
+
+
+@pytest.mark.parametrize("name", DIFFERENTIATED)
+def test_derivatives_agree_with_those_of_one_state(name):
+    system = gauss.compile_scene(DIFFERENTIATED[name]())
+    (state, *_), (load, *_) = mechanisms.consistent_states(system)
+    found = system.acceleration_derivatives(state.q, state.v, load, t=state.t)
+    expected = gauss.derivatives(system, state, load)
+    for part, other in zip(found, (expected.q, expected.v, expected.load), strict=True):
+        assert relative(part, other) <= 1e-11 or not other.any()
+
+
+def test_derivatives_of_inverse_dynamics_undo_those_of_the_accelerations():
+    system = gauss.compile_scene(TREES["tree of all kinds"]())
+    state = random_state(system, np.random.default_rng(4))
+    load = np.linspace(-1.0, 1.0, system.n_v)
+    by_q, by_v, by_load = system.acceleration_derivatives(state.q, state.v, load)
+    efforts = system.inverse_dynamics_derivatives(state.q, state.v, system.accelerations(state, load))
+    M = system.mass_matrix(state.q)
+    assert relative(M @ by_load, np.eye(system.n_v)) <= 1e-10
+    assert relative(-M @ by_q, efforts[0]) <= 1e-10 and relative(-M @ by_v, efforts[1]) <= 1e-10
+
+
 class Foreign:
     """Array of another library on the CPU: its memory is shared by DLPack alone."""
 
@@ -243,6 +275,14 @@ def test_arrays_of_any_strides_types_and_libraries_give_the_same(arm):
     frame = list(arm.frames)[-1]
     assert arm.forward_kinematics(Q, frame, out=parts) is parts
     assert all(np.array_equal(*pair) for pair in zip(parts, arm.forward_kinematics(Q, frame), strict=True))
+
+
+def test_functions_that_a_system_keeps_leave_its_content_known():
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    q, before = system.initial_state().q, content_digest(system)
+    system.mass_matrix(q), system.jacobian(q, "coupler"), system.null_space(q, independent="A")  # noqa: B018
+    assert before is not None and content_digest(system) == before
+    assert not {"mass_matrix", "jacobian", "null_space"} & vars(copy.copy(system)).keys()
 
 
 def test_quaternions_are_normalised_or_refused(arm):

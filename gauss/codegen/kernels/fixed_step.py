@@ -39,11 +39,11 @@ class Fixed:
         passed undetected).
     project : Function or None
         Point → (projected point, constraint residual), one Newton step by one evaluation; None without projection.
-    check : Function
+    check : Function or NativeFunction
         Point → (error of its accelerations, residual of the loop constraints, energy sample).
     evaluations : int
         Approximate number of evaluations in a step.
-    rates : Function
+    rates : Function or NativeFunction
         Equations of motion: (t, q, v) → rates.
     """
 
@@ -51,9 +51,9 @@ class Fixed:
     row: int
     step: Function | NativeFunction
     project: Function | None
-    check: Function
+    check: Function | NativeFunction
     evaluations: int
-    rates: Function
+    rates: Function | NativeFunction
 
     def compile(self) -> Loop:
         """Machine code of the loop; its budget is the number of pairs in the grid."""

@@ -114,7 +114,7 @@ class LoopCode:
         """Pointer to the next sample in ``out``."""
         return self.b.gep(self.pointer["out"], [self.b.mul(self.index("rows"), INTEGER(size))])
 
-    def check(self, function: Function, point, error):
+    def check(self, function: Function | NativeFunction, point, error):
         """Check the accelerations of a point; record the largest error, the constraint residual and the energies."""
         self.call(function, point, error)
         found, worst = self.b.load(error), self.get("worst")

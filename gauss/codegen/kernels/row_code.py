@@ -70,7 +70,7 @@ class RowCode:
         self.motions.store(value, pointer, self._place(offset))
 
     def _place(self, offset):
-        """Distance of an entry, an integer or a value, from the begin of its array."""
+        """Distance of an entry, an integer or a value, from the start of its array."""
         if isinstance(offset, int):
             return INTEGER(offset * self.width)
         return offset if self.width == 1 else self.b.mul(offset, INTEGER(self.width))

@@ -48,7 +48,7 @@ class ForceResponses:
         if plan.dynamics == "tree recursion":
             self.solver = CompiledEngine(system, tree_recursion_kernels(system), LoadForces(system, (), laws))
         elif plan.dynamics == "compiled":
-            self.solver = CompiledEngine(system, Program(system, laws, Drift()).kernels())
+            self.solver = CompiledEngine(system, Program(system, laws, Drift()).cached_kernels)
 
     @property
     def compiled(self) -> bool:

@@ -117,8 +117,7 @@ class Tiered:
         operations = cached_on_disk(self.system, (Tiered, laws.key), lambda: sum(program.rates.operations().values()))
         if self.spent < LEAST_THRESHOLD + PER_OPERATION * operations and not at_once:
             return None
-        kernels = cached_on_disk(self.system, (Program.kernels, program.drift, laws.key), program.kernels)
-        return self.made.setdefault(laws.key, kernels)
+        return self.made.setdefault(laws.key, program.cached_kernels)
 
 
 def tiered(system: System) -> Tiered:

@@ -92,7 +92,7 @@ class Jumps:
         return found, names
 
     def at_start(self, begin: float, end: float) -> float | None:
-        """Time just after the begin of a motion [s], if velocities may jump there."""
+        """Time just after the start of a motion [s], if velocities may jump there."""
         after = begin + APART * max(abs(begin), abs(end))
         return after if self.within(begin, after) else None
 

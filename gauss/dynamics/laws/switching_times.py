@@ -66,7 +66,7 @@ class Timetable:
         return int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())
 
     def stops(self, begin: float, end: float) -> list[tuple[float, float]]:
-        """Pairs (end of a step, begin of the next one) after ``begin``, ascending; the last is (``end``, ``end``).
+        """Pairs (end of a step, start of the next one) after ``begin``, ascending; the last is (``end``, ``end``).
 
         At a switching time they differ by a few units in the last place, so that no evaluation falls upon it.
         """
