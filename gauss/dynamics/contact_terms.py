@@ -8,7 +8,7 @@ import numpy as np
 from gauss.codegen import Kernel, forward, jacobian, write
 from gauss.dynamics.kinematics import kinematics
 from gauss.system import State, System, coordinate_rates, guards, sides
-from gauss.system.build import slips
+from gauss.system.contact_gaps import slips
 from gauss.system.relations import place_residuals
 
 

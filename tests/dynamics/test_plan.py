@@ -11,7 +11,7 @@ from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS, MOTIONS, moti
 from gauss.dynamics.rules import Question
 from gauss.errors import ArgumentError, SimulationError
 from gauss.scene import Scene
-from tests.support import mechanisms
+from tests.support import free_bodies, mechanisms
 
 SAME = 1e-9  # of motions by two plans
 RUN = {"integrator": "rk4", "step": 1e-3, "progress": False}
@@ -79,6 +79,12 @@ CASES = {
         lambda: gauss.load("box_on_plane_4"),
         {"integrator": "time_stepping", "step": 1e-3, "backend": "kkt"},
         ("time stepping", "certified"),
+        ["time stepping"],
+    ),
+    "steps of many contacts": (
+        lambda: free_bodies.stack(2),
+        {"integrator": "time_stepping", "step": 1e-3},
+        ("time stepping", "free bodies"),
         ["time stepping"],
     ),
     "Baumgarte": (mechanisms.four_bar, {"stabilisation": "baumgarte"}, ("compiled loop", "compiled"), []),

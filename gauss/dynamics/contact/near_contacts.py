@@ -1,0 +1,170 @@
+"""Contacts that are near at one instant: near pairs of shapes, near pairs of their features, rows of the contact problem."""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.dynamics.contact.pair_kernels import CYCLIC, PLACE, POSE, ROWS, SIGNS, PairKernels, pair_kernels
+from gauss.dynamics.contact.shape_table import KINDS, ShapeTable
+
+MOST_FEATURES = 64  # pairs of features of one pair of shapes, for keys of contacts
+TURNED = np.array([[*(3 * i + a for i in range(3) for a in axes), *range(9, POSE)] for axes in CYCLIC])  # rows of a pose
+RESIZED = np.array([[*axes, 3] for axes in CYCLIC])
+
+
+class NearContacts(NamedTuple):
+    """Contacts of one instant, m of them.
+
+    Attributes
+    ----------
+    key : ndarray of int64, shape (m,)
+        Pair of parts and of their features: the same contact has the same key at all times.
+    law : ndarray of int, shape (m,)
+        Contact of the scene.
+    bodies : ndarray of int64, shape (m, 2)
+        Bodies; −1 is the ground.
+    gap : ndarray, shape (m,)
+        Contact distances [m].
+    place, axes : ndarray, shape (m, 3), (m, 3, 3)
+        Points [m]; normals and two tangents as rows, in world axes.
+    J : ndarray, shape (m, 2, 3, 8)
+        Rows for the twists (ω, u) of both bodies; the last two columns are zero.
+    bias : ndarray, shape (m, 3)
+        Accelerations along normal and tangents while the rates are constant [m/s²].
+    """
+
+    key: np.ndarray
+    law: np.ndarray
+    bodies: np.ndarray
+    gap: np.ndarray
+    place: np.ndarray
+    axes: np.ndarray
+    J: np.ndarray
+    bias: np.ndarray
+
+
+class _Kind:
+    """Pairs of features of one kind of pairs of shapes, as arrays."""
+
+    def __init__(self, kernels: PairKernels):
+        self.kernels = kernels
+        self.function = np.array([feature.function for feature in kernels.features])
+        self.axes = np.array([feature.axes for feature in kernels.features]).T
+        self.signs = np.zeros((SIGNS, len(kernels.features)))
+        for k, feature in enumerate(kernels.features):
+            self.signs[: len(feature.signs), k] = feature.signs
+
+
+class Overlap(NamedTuple):
+    """Shapes in each other of which no pair of features says so: a contact of the scene, and how deep [m]."""
+
+    law: int
+    depth: float
+
+
+class ContactDetection:
+    """Detection of the near contacts of a system.
+
+    Parameters
+    ----------
+    table : ShapeTable
+        Its shapes.
+    length : float
+        Length of the scene [m].
+    """
+
+    def __init__(self, table: ShapeTable, length: float):
+        self.table, self.scale = table, length
+        self._kinds: dict[int, _Kind] = {}
+
+    @cached_property
+    def depth(self) -> np.ndarray:
+        """Least edges (k,) of boxes [m], of which a part is the depth of a missed overlap; infinite for other shapes."""
+        least = self.table.sizes[:3].min(axis=0)
+        return np.where(least > 0.0, 2.0 * least, np.inf)
+
+    def find(self, poses: np.ndarray, centres: np.ndarray, reach: float, unseen: float = np.inf):
+        """Contacts nearer than ``reach``, and pairs of shapes that overlap without one.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (24, k)
+            Poses of the parts.
+        centres : ndarray, shape (3, n + 1)
+            Centres of mass of the bodies, that of the ground last [m].
+        reach : float
+            Distance [m].
+        unseen : float
+            Depth of a missed overlap, relative to the shortest edge of the boxes.
+        """
+        first, second = self.table.near(poses, reach)
+        code = self.table.kind[first] * len(KINDS) + self.table.kind[second]
+        found: list[NearContacts] = []
+        overlaps: list[Overlap] = []
+        for number in np.unique(code):
+            mine = code == number
+            pairs = first[mine], second[mine]
+            kind = self._kind(int(number))
+            gaps = kind.kernels.distances(self._distance_inputs(poses, *pairs))
+            m = kind.function.size
+            if kind.kernels.guarded:
+                overlaps += self._missed(gaps[:m], gaps[m], pairs, unseen)
+            feature, pair = np.nonzero(gaps[:m] <= reach)
+            for function in np.unique(kind.function[feature]):
+                which = kind.function[feature] == function
+                here = pairs[0][pair[which]], pairs[1][pair[which]]
+                found.append(self._rows(kind, int(function), feature[which], *here, poses, centres))
+        return _joined(found), overlaps
+
+    def _kind(self, number: int) -> _Kind:
+        if number not in self._kinds:
+            one, other = divmod(number, len(KINDS))
+            self._kinds[number] = _Kind(pair_kernels((KINDS[one], KINDS[other])))
+        return self._kinds[number]
+
+    def _distance_inputs(self, poses, first, second) -> np.ndarray:
+        sizes = self.table.sizes
+        scale = np.full((1, first.size), self.scale)
+        return np.concatenate([poses[:PLACE, first], poses[:PLACE, second], sizes[:, first], sizes[:, second], scale])
+
+    def _missed(self, gaps, apart, pairs, unseen: float) -> list[Overlap]:
+        """Overlaps beyond a depth with all gap functions positive."""
+        first, second = pairs
+        deepest = unseen * np.minimum(self.depth[first], self.depth[second])
+        missed = np.flatnonzero((apart <= -deepest) & (gaps.min(axis=0) > 0.0))
+        return [Overlap(int(self.table.law[first[k], second[k]]) - 1, -float(apart[k])) for k in missed]
+
+    def _rows(self, kind: _Kind, function: int, feature, first, second, poses, centres) -> NearContacts:
+        """Rows of pairs of features of one kind."""
+        table, axes = self.table, kind.axes[:, feature]
+        parts = [
+            *(poses[TURNED[own].T, part] for own, part in zip(axes, (first, second), strict=True)),
+            *(table.sizes[RESIZED[own].T, part] for own, part in zip(axes, (first, second), strict=True)),
+            np.full((1, feature.size), self.scale),
+            *(centres[:, table.body[part]] for part in (first, second)),
+            kind.signs[:, feature],
+        ]
+        found = kind.kernels.rows[function](np.concatenate(parts))
+        assert found.shape[0] == ROWS
+        gap, place, axis, moments, bias = np.split(found, [1, 4, 13, 31])
+        m = feature.size
+        J = np.zeros((m, 2, 3, 8))
+        J[..., :3] = moments.T.reshape(m, 2, 3, 3)
+        J[:, 0, :, 3:6] = axis.T.reshape(m, 3, 3)
+        J[:, 1] *= -1.0
+        J[:, 1, :, 3:6] = -J[:, 0, :, 3:6]
+        key = (first * len(table.parts) + second) * MOST_FEATURES + feature
+        bodies = np.column_stack([table.body[first], table.body[second]])
+        law = table.law[first, second] - 1
+        return NearContacts(key, law, bodies, gap[0], place.T, J[:, 0, :, 3:6], J, bias.T)
+
+
+def _joined(found: list[NearContacts]) -> NearContacts:
+    if len(found) == 1:
+        return found[0]
+    if found:
+        return NearContacts(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    none, integers = np.zeros(0), np.zeros(0, dtype=np.int64)
+    bodies, J = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2, 3, 8))
+    return NearContacts(integers, integers, bodies, none, np.zeros((0, 3)), np.zeros((0, 3, 3)), J, np.zeros((0, 3)))
