@@ -1,6 +1,6 @@
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
 from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, AdaptiveBatchLoop, MotionQueue
-from gauss.codegen.kernels.block_contacts import BlockContactLaws, BlockContactSolver, ContactGraph
+from gauss.codegen.kernels.block_contacts import BlockContactLaws, BlockContactSolver, ContactGraph, Round
 from gauss.codegen.kernels.block_ldlt import BlockLDLT
 from gauss.codegen.kernels.call_recorder import CallRecorder, Operand, RecordedCalls, Slot, Vector
 from gauss.codegen.kernels.call_table import CallTable
@@ -56,6 +56,7 @@ __all__ = [
     "BlockContactLaws",
     "BlockContactSolver",
     "ContactGraph",
+    "Round",
     "ContactSolver",
     "CompiledContactSolver",
     "BatchSpan",

@@ -13,6 +13,7 @@ exact laws. Where Newton's method fails, projected Gauss–Seidel sweeps over si
 
 import ctypes
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -26,9 +27,29 @@ from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH, TwistRows
 SIDE = 3 * WIDTH  # doubles of the rows of one contact for one body: normal, two tangents
 CONTACT = 2 * SIDE
 MASS = 20  # inertia (3, 3) [kg m²], its inverse, mass, its inverse
+LEAST_NUMBER = 1e-60  # forces and velocities that are set to zero: their squares may not be inverted
 ELIMINATED = 12  # K (3, 3) and g (3,) of a contact
 ORDER = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 7)
 SOLVE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 14)
+
+
+class Round(NamedTuple):
+    """Round of Newton steps.
+
+    Attributes
+    ----------
+    sweeps : int
+        Gauss–Seidel sweeps before it.
+    regularisation : float
+        ε, relative to the diagonal of the Delassus matrix: large values change the forces less by a step, and converge
+        linearly where small ones may cycle.
+    steps : int
+        Newton steps.
+    """
+
+    sweeps: int
+    regularisation: float
+    steps: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,21 +60,15 @@ class BlockContactLaws:
     ----------
     normal, friction, project_normal, project_friction : Function
         As of :class:`gauss.codegen.kernels.ContactSolver`.
-    sweeps : tuple of int
-        Gauss–Seidel sweeps before each round of Newton steps.
-    steps : int
-        Newton steps per round.
-    regularisation : float
-        ε, relative to the diagonal of the Delassus matrix.
+    rounds : tuple of Round
+        What is tried one after the other, each from the best forces so far.
     """
 
     normal: Function
     friction: Function
     project_normal: Function
     project_friction: Function
-    sweeps: tuple[int, ...]
-    steps: int
-    regularisation: float
+    rounds: tuple[Round, ...]
 
 
 class _BlockContactWriter:
@@ -69,7 +84,7 @@ class _BlockContactWriter:
         self.w, self.best, self.error = room, room.after(m * 3), room.after(m * 6)
         self.eliminated = room.after(m * 9)
         self.x = room.after(m * (9 + ELIMINATED))
-        self.tolerance = self.result[0]
+        self.tolerance, self.eps = self.result[0], r.variable(0.0)
 
     def write(self):
         r, laws, f = self.r, self.laws, self.f
@@ -77,17 +92,19 @@ class _BlockContactWriter:
         with r.each(self.m * 3) as i:
             self.best[i] = f[i]
         least, done, round_, total = r.variable(np.inf), r.variable(0, INTEGER), r.variable(0, INTEGER), r.variable(0.0)
-        times = Array(r.b, r.b.gep(constant_array(r.module, "sweeps", np.array(laws.sweeps)), [INTEGER(0), INTEGER(0)]))
+        columns = zip(Round._fields, zip(*laws.rounds, strict=True), strict=True)
+        sweeps, regularisation, steps = (self._table(name, values) for name, values in columns)
         with r.loop() as leave_if:
-            leave_if((round_[0] >= len(laws.sweeps)) | (done[0] > 0))
+            leave_if((round_[0] >= len(laws.rounds)) | (done[0] > 0))
             with r.each(self.m * 3) as i:
                 f[i] = self.best[i]
             self._accumulate()
-            with r.each(times[round_[0]]):
+            self.eps[0] = regularisation[round_[0]]
+            with r.each(sweeps[round_[0]]):
                 self._sweep()
             tries = r.variable(0, INTEGER)
             with r.loop() as leave_round_if:
-                leave_round_if((tries[0] >= laws.steps) | (done[0] > 0))
+                leave_round_if((tries[0] >= steps[round_[0]]) | (done[0] > 0))
                 residual = self._residuals()
                 with r.when(residual < least[0]):
                     least[0] = residual
@@ -100,7 +117,7 @@ class _BlockContactWriter:
                     total[0] = total[0] + 1.0
                 tries[0] = tries[0] + 1
                 with r.when(residual >= LARGEST_RESIDUAL_SUM):
-                    tries[0] = laws.steps
+                    tries[0] = steps[round_[0]]
             round_[0] = round_[0] + 1
         with r.each(self.m * 3) as i:
             f[i] = self.best[i]
@@ -108,6 +125,10 @@ class _BlockContactWriter:
         self.result[0], self.result[1] = least[0], total[0]
         self.result[2] = r.as_double(round_[0])
         r.done()
+
+    def _table(self, name: str, values: tuple) -> Array:
+        array = np.array(values)
+        return Array(self.r.b, self.r.b.gep(constant_array(self.r.module, name, array), [INTEGER(0), INTEGER(0)]))
 
     def _sides(self, c: Value):
         """Body and rows of both sides of a contact."""
@@ -190,13 +211,15 @@ class _BlockContactWriter:
 
     def _residuals(self) -> Value:
         """Residuals of the laws and the elimination of each contact; returns the largest residual, as a velocity."""
-        r, f, w, eps = self.r, self.f, self.w, self.laws.regularisation
+        r, f, w, eps = self.r, self.f, self.w, self.eps[0]
         largest, total = r.variable(0.0), r.variable(0.0)
         with r.each(self.m) as c:
             i = c * 3
-            u = self._rates(c)
+            u = [self._flushed(rate) for rate in self._rates(c)]
             error, by_force, by_rate = r.inline(self.laws.normal, f[i], u[0], w[i])
-            known = f[i + 1], f[i + 2], u[1], u[2], w[i + 1], f[i], u[0], w[i], self.mu[c]
+            trial = [r.absolute(f[i + k] - u[k] / w[i + k]) for k in (1, 2)]
+            moved = r.choose(trial[0] + trial[1] < LEAST_NUMBER, LEAST_NUMBER, 0.0)  # away from where |f_t| has no slope
+            known = f[i + 1] + moved, f[i + 2], u[1], u[2], w[i + 1], f[i], u[0], w[i], self.mu[c]
             e1, e2, *slopes = r.inline(self.laws.friction, *known)
             alpha = by_force + by_rate * w[i] * eps
             Kn, gn = by_rate / alpha, error / alpha
@@ -219,6 +242,9 @@ class _BlockContactWriter:
                 largest[0], total[0] = r.maximum(size, largest[0]), total[0] + size
         return r.choose(total[0] <= LARGEST_RESIDUAL_SUM, largest[0], np.inf)  # the maximum ignores NaN, the sum does not
 
+    def _flushed(self, x: Value) -> Value:
+        return self.r.choose(self.r.absolute(x) < LEAST_NUMBER, 0.0, x)
+
     def _newton(self):
         r, f = self.r, self.f
         self._assemble()
@@ -228,7 +254,7 @@ class _BlockContactWriter:
             zero = [r.number(0.0)] * 3
             moved = self._moved(c, self.x, zero)
             for q in range(3):
-                f[c * 3 + q] = f[c * 3 + q] - own[9 + q] - _dot([own[q * 3 + k] for k in range(3)], moved)
+                f[c * 3 + q] = self._flushed(f[c * 3 + q] - own[9 + q] - _dot([own[q * 3 + k] for k in range(3)], moved))
         self._accumulate()
 
     def _assemble(self):
