@@ -262,6 +262,15 @@ class FreeBodyStepper:
         found, _ = ContactProblem(response @ rows.T, order[0], laws).solve(order[1])
         return np.column_stack([found[:m], found[m:].reshape(m, 2)]), (found @ response).reshape(self.n, 6)
 
+    def forces_of(self, step: FreeBodyStep) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""
+        near, places = step.contacts, self.table.gap_places(step.contacts.key)
+        normal = np.zeros(self.table.gaps[-1])
+        friction = np.zeros((normal.size, 3))
+        normal[places] = step.force[:, 0]
+        friction[places] = (step.force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1) * self.table.sides(near.key)[:, None]
+        return normal, friction
+
     def _start(self, near: NearContacts) -> np.ndarray:
         """Forces (m, 3) of the last step; zero of new contacts."""
         keys, forces = self.known

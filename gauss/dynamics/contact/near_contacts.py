@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.dynamics.contact.moreau_step import START_OVERLAP
 from gauss.dynamics.contact.pair_kernels import CYCLIC, PLACE, POSE, ROWS, SIGNS, PairKernels, pair_kernels
-from gauss.dynamics.contact.shape_table import KINDS, ShapeTable
+from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
 
-MOST_FEATURES = 64  # pairs of features of one pair of shapes, for keys of contacts
 TURNED = np.array([[*(3 * i + a for i in range(3) for a in axes), *range(9, POSE)] for axes in CYCLIC])  # rows of a pose
 RESIZED = np.array([[*axes, 3] for axes in CYCLIC])
 
@@ -132,7 +132,7 @@ class ContactDetection:
         """Overlaps beyond a depth with all gap functions positive."""
         first, second = pairs
         deepest = unseen * np.minimum(self.depth[first], self.depth[second])
-        missed = np.flatnonzero((apart <= -deepest) & (gaps.min(axis=0) > 0.0))
+        missed = np.flatnonzero((apart <= -deepest) & (gaps.min(axis=0) > -START_OVERLAP * self.scale))
         return [Overlap(int(self.table.law[first[k], second[k]]) - 1, -float(apart[k])) for k in missed]
 
     def _rows(self, kind: _Kind, function: int, feature, first, second, poses, centres) -> NearContacts:

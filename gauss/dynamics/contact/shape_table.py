@@ -17,6 +17,7 @@ from gauss.scene.values import unit
 from gauss.system import System
 
 KINDS = (Sphere, Capsule, Box, HalfSpace)
+MOST_FEATURES = 64  # pairs of features of one pair of parts, for keys of contacts
 RANK = {kind: k for k, kind in enumerate(KINDS)}  # the order of kinds in a rule of contacts
 
 
@@ -89,6 +90,7 @@ class ShapeTable:
     """
 
     def __init__(self, system: System):
+        self.scene = system.scene
         self.contacts = [contact for contact in system.scene.contacts.values() if isinstance(contact, Contact)]
         self.parts = _parts(system, self.contacts)
         self.body = np.array([part.body for part in self.parts], dtype=np.int64)
@@ -131,6 +133,37 @@ class ShapeTable:
         """Pairs of a solid and a half-space that have a contact."""
         first, second = np.nonzero(self.law[np.ix_(self.solids, self.planes)])
         return self.solids[first], self.planes[second]
+
+    @cached_property
+    def gaps(self) -> np.ndarray:
+        """Numbers (k + 1,) of the gap functions before each contact, in the order of the scene."""
+        return np.cumsum([0, *(len(contact.sides(self.scene)) for contact in self.contacts)])
+
+    @cached_property
+    def number(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number of each part within its shape, and of the parts of that shape."""
+        names = [part.shape for part in self.parts]
+        own = [names[:k].count(name) for k, name in enumerate(names)]
+        return np.array(own), np.array([names.count(name) for name in names])
+
+    def sides(self, key: np.ndarray) -> np.ndarray:
+        """1 for contacts whose first part is of the first shape of the scene's contact, −1 for the others, by their keys."""
+        first, second = self.pair(key)
+        contacts = (self.contacts[law - 1] for law in self.law[first, second])
+        return np.array([1.0 if self.parts[i].shape == c.shape else -1.0 for i, c in zip(first, contacts, strict=True)])
+
+    def pair(self, key: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parts of contacts by their keys."""
+        first, second = np.divmod(key // MOST_FEATURES, len(self.parts))
+        return first, second
+
+    def gap_places(self, key: np.ndarray) -> np.ndarray:
+        """Places of contacts among all gap functions of the scene, by their keys."""
+        first, second = self.pair(key)
+        turned = self.sides(key) < 0.0
+        one, other = np.where(turned, second, first), np.where(turned, first, second)
+        place, count = self.number
+        return self.gaps[self.law[first, second] - 1] + place[one] * count[other] + place[other] + key % MOST_FEATURES
 
     def poses(self, bodies: np.ndarray) -> np.ndarray:
         """Poses and velocities (24, k) of the parts, by those of the bodies (21, n + 1), the ground last."""
