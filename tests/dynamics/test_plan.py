@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
+from benchmarks import free_bodies
 from gauss import Plan
 from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.laws.traced_laws import Laws
@@ -11,7 +12,7 @@ from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS, MOTIONS, moti
 from gauss.dynamics.rules import Question
 from gauss.errors import ArgumentError, SimulationError
 from gauss.scene import Scene
-from tests.support import free_bodies, mechanisms
+from tests.support import mechanisms
 
 SAME = 1e-9  # of motions by two plans
 RUN = {"integrator": "rk4", "step": 1e-3, "progress": False}

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import gauss
+from benchmarks.free_bodies import EDGE, RADIUS, bin_of_balls, dominoes, floor, free_body, stack
 from gauss import Plan
 from gauss.dynamics.contact.free_body_step import free_body_stepper, rates
 from gauss.dynamics.gap_functions import gaps, slips
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SceneError, SimulationError, StateError
 from gauss.system import State
-from tests.support.free_bodies import EDGE, RADIUS, bin_of_balls, dominoes, floor, free_body, stack
 
 STEP = 1e-3  # [s]
 ROUNDING = 1e-12  # of values of the order of 1 by two ways of computing

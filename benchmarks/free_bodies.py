@@ -3,9 +3,11 @@
 import numpy as np
 
 import gauss
+from gauss.rotations import from_quaternion
 from gauss.scene import Scene
 
 EDGE, RADIUS = 0.2, 0.05  # of boxes and balls [m]
+TILE = 0.01, 0.04, 0.1  # edges of a domino [m]
 WALL = 0.17  # half width of a bin [m]
 
 
@@ -35,7 +37,7 @@ def stack(n: int, friction: float = 0.5) -> Scene:
 
 def dominoes(n: int, push: float = 1.0) -> Scene:
     """A row of dominoes, of which the first begins to topple."""
-    scene, (a, b, c), gap = floor("dominoes"), (0.01, 0.04, 0.1), 0.05
+    scene, (a, b, c), gap = floor("dominoes"), TILE, 0.05
     for k in range(n):
         scene.body(
             f"domino {k}", mass=0.1, inertia=tuple(0.1 / 12.0 * np.array([b * b + c * c, a * a + c * c, a * a + b * b]))
@@ -61,3 +63,16 @@ def bin_of_balls(n: int, friction: float = 0.5, wall: float = WALL, seed: int = 
         scene.sphere(f"sphere {i}", f"ball {i}", RADIUS)
     scene.contacts_all(friction=friction)
     return scene
+
+
+def box_depth(q: np.ndarray, size) -> float:
+    """Deepest corner below the floor [m] of boxes at coordinates (n, 7)."""
+    half = 0.5 * np.array(size)
+    return max(0.0, *(float(np.abs(from_quaternion(own[3:])[2]) @ half - own[2]) for own in q))
+
+
+def ball_depth(q: np.ndarray, wall: float) -> float:
+    """Deepest penetration [m] of balls at coordinates (n, 7) into each other, the floor and the walls of a bin."""
+    x = q[:, :3]
+    apart = np.linalg.norm(x[:, None] - x[None], axis=2) + np.diag(np.full(len(x), np.inf))
+    return max(0.0, 2.0 * RADIUS - apart.min(), RADIUS - x[:, 2].min(), np.abs(x[:, :2]).max() + RADIUS - wall)
