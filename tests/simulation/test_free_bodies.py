@@ -63,7 +63,7 @@ def test_kernels_of_pairs_are_the_gap_functions_of_the_scene(one, other):
         missing = np.setdiff1d(np.arange(found.width.size), places)
         assert (found.width[missing] > 10.0).all()
         np.testing.assert_allclose(near.gap, found.width[places], atol=ROUNDING)
-        rate = rates(near, begun.before)
+        rate = rates(near, begun.both)[..., 0]
         scale = 1.0 + np.abs(found.D).max()
         np.testing.assert_allclose(rate[:, 0], found.rate[places], atol=ROUNDING * scale)
         np.testing.assert_allclose(near.bias[:, 0], -found.D[places], atol=1e3 * ROUNDING * scale)

@@ -85,8 +85,7 @@ class _Begun(NamedTuple):
 
     q: np.ndarray
     bodies: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
+    both: np.ndarray
     mass: np.ndarray
     v: np.ndarray
 
@@ -115,6 +114,7 @@ class FreeBodyStepper:
         self._index_bodies()
         self.reach = self._reaches()
         self.share = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
+        self.coefficients = np.unique(self.table.restitution)
         self.graph: ContactGraph | None = None
         self.known: tuple[np.ndarray, np.ndarray]
         self.forget()
@@ -153,43 +153,45 @@ class FreeBodyStepper:
         """
         for share in self.share:
             begun = self._begin(state, h, share)
-            speed = max(self._speed(begun.before), self._speed(begun.after))
+            speed = max(self._speed(begun.both[..., k]) for k in range(2))
             near = self._near(state, begun, speed, h, share)
-            if share == self.share[-1] or not self._impacts(near, begun, h, share).any():
+            known = rates(near, begun.both)
+            if share == self.share[-1] or not self._impacts(near, begun, known, h, share).any():
                 break
         for _ in range(ATTEMPTS):
-            force, added, error = self._solve(near, begun, h, share)
-            after = begun.after.copy()
+            force, added, error = self._solve(near, begun, known, h, share)
+            after = begun.both[..., 1].copy()
             after[: self.n, :6] += added
             reached = self._speed(after)
             if reached <= REACH_MARGIN * speed:
                 break
             speed = reached
             near = self._near(state, begun, speed, h, share)
+            known = rates(near, begun.both)
         self._keep(near, force)
         found = np.empty(state.q.size), np.empty(state.v.size)
-        change = (after - begun.before)[: self.n, :6].T
+        change = (after - begun.both[..., 0])[: self.n, :6].T
         step = np.repeat([[h], [share]], self.n, axis=1)
         end = self.kernels.end(np.concatenate([begun.q, begun.v[self.v_places], self.given, change, step]))
         found[0][self.q_places], found[1][self.v_places] = end[:7], end[7:]
-        lost = -(force * 0.5 * (rates(near, begun.before) + rates(near, after))).sum()
+        lost = -0.5 * (force * (known[..., 0] + rates(near, after[..., None])[..., 0])).sum()
         return FreeBodyStep(*found, near, force, lost, error)
 
     def _begin(self, state: State, h: float, share: float) -> _Begun:
         q, v = state.q[self.q_places], state.v[self.v_places]
         step = np.repeat([[h], [share]], self.n, axis=1)
         found = self.kernels.begin(np.concatenate([q, v, self.given, self.gravity, step]))
-        at, bodies, free, inertia = np.split(found, [7, 28, 34])
-        before, after = np.zeros((2, self.n + self.fixed.shape[1], TWIST))
-        before[: self.n, :6] = bodies[12:18].T
-        after[: self.n, :6] = (bodies[12:18] + h * free).T
+        at, bodies, free, inertia = found[:7], found[7:28], found[28:34], found[34:]
+        both = np.zeros((self.n + self.fixed.shape[1], TWIST, 2))
+        both[: self.n, :6, 0] = bodies[12:18].T
+        both[: self.n, :6, 1] = (bodies[12:18] + h * free).T
         mass = np.empty((self.n, 20))
         mass[:, :18], mass[:, 18], mass[:, 19] = inertia.T, self.given[27], 1.0 / self.given[27]
-        return _Begun(at, np.concatenate([bodies, self.fixed], axis=1), before, after, mass, state.v)
+        return _Begun(at, np.concatenate([bodies, self.fixed], axis=1), both, mass, state.v)
 
     def _speed(self, twists: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
-        turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in np.split(twists[: self.n, :6], 2, axis=1))
+        turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in (twists[: self.n, :3], twists[: self.n, 3:6]))
         return float((moving + turning * self.reach).max())
 
     def _near(self, state: State, begun: _Begun, speed: float, h: float, share: float) -> NearContacts:
@@ -209,8 +211,8 @@ class FreeBodyStepper:
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
         return near
 
-    def _impacts(self, near: NearContacts, begun: _Begun, h: float, share: float) -> np.ndarray:
-        before, after = (rates(near, twists)[:, 0] for twists in (begun.before, begun.after))
+    def _impacts(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:
+        before, after = known[:, 0].T
         speeds = REST_STEPS * np.abs(after - before + h * near.bias[:, 0]) + self._rest(begun)
         return is_impact(near.gap, before, speeds, h, share)
 
@@ -218,12 +220,12 @@ class FreeBodyStepper:
         """Rate below which a gap neither opens nor closes [m/s]."""
         return self.system.scale.length * resting(self.system, begun.v)
 
-    def _solve(self, near: NearContacts, begun: _Begun, h: float, share: float):
+    def _solve(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float):
         """Forces (m, 3), the velocities (n, 6) that they add, and the error of the laws."""
         m = near.gap.size
         if not m:
             return np.zeros((0, 3)), np.zeros((self.n, 6)), 0.0
-        b = self.without_forces(near, begun, h, share)
+        b = self.without_forces(near, begun, known, h, share)
         bodies = np.where(near.bodies < self.n, near.bodies, -1)
         if self.graph is None or not np.array_equal(self.graph.bodies, bodies):
             self.graph = block_contact_solver().graph(self.n, bodies)
@@ -236,12 +238,24 @@ class FreeBodyStepper:
         f, added = self._dense(near, begun, bodies, b / unit, f / unit, friction)
         return f * unit / h, added * unit, None
 
-    def without_forces(self, near: NearContacts, begun: _Begun, h: float, share: float) -> np.ndarray:
-        """Relative velocities (m, 3) after a step without contact forces, less the least that gaps may have."""
-        b = rates(near, begun.after) + (h * (1.0 - share)) * near.bias
-        before, restitution, rest = rates(near, begun.before)[:, 0], self.table.restitution[near.law], self._rest(begun)
-        for e in np.unique(restitution):
-            mine = restitution == e
+    def without_forces(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:
+        """Relative velocities (m, 3) after a step without contact forces, less the least that gaps may have.
+
+        Parameters
+        ----------
+        near : NearContacts
+            The contacts.
+        begun : _Begun
+            The bodies.
+        known : ndarray, shape (m, 3, 2)
+            Relative velocities before the step, and after it without contact forces [m/s].
+        h, share : float
+            Step [s], and the share of it that the bodies have moved.
+        """
+        b, before, rest = known[..., 1] + (h * (1.0 - share)) * near.bias, known[:, 0, 0], self._rest(begun)
+        restitution = self.table.restitution[near.law]
+        for e in self.coefficients:
+            mine = slice(None) if len(self.coefficients) == 1 else restitution == e
             b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), h, rest, share)
         return b
 
@@ -297,8 +311,9 @@ class FreeBodyStepper:
 
 
 def rates(near: NearContacts, twists: np.ndarray) -> np.ndarray:
-    """Relative velocities (m, 3) of contacts by the twists (n, 8) of the bodies."""
-    return (near.J @ twists[near.bodies][..., None]).sum(axis=1)[..., 0]
+    """Relative velocities (m, 3, k) of contacts by k sets of twists (n, 8, k) of the bodies."""
+    found = near.J @ twists[near.bodies]
+    return found[:, 0] + found[:, 1]
 
 
 @cache

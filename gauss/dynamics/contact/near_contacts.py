@@ -6,11 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.dynamics.contact.moreau_step import START_OVERLAP
-from gauss.dynamics.contact.pair_kernels import CYCLIC, PLACE, POSE, ROWS, SIGNS, PairKernels, pair_kernels
+from gauss.dynamics.contact.pair_kernels import CYCLIC, PLACE, POSE, SIGNS, SIZES, PairKernels, pair_kernels
 from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
 
-TURNED = np.array([[*(3 * i + a for i in range(3) for a in axes), *range(9, POSE)] for axes in CYCLIC])  # rows of a pose
-RESIZED = np.array([[*axes, 3] for axes in CYCLIC])
+COLUMN = POSE + SIZES + 3  # pose and sizes of a part, centre of mass of its body
+# Rows of a column for each axis of a box that counts as its first, and those that distances depend on.
+TURNED = np.array([[*(3 * i + a for i in range(3) for a in axes), *range(9, POSE)] for axes in CYCLIC])
+COLUMNS = np.concatenate([TURNED, POSE + CYCLIC, np.tile(np.arange(POSE + 3, COLUMN), (3, 1))], axis=1)
+DISTANCE_ROWS = np.array([*range(PLACE), *range(POSE, POSE + SIZES)])
 
 
 class NearContacts(NamedTuple):
@@ -50,7 +53,8 @@ class _Kind:
     def __init__(self, kernels: PairKernels):
         self.kernels = kernels
         self.function = np.array([feature.function for feature in kernels.features])
-        self.axes = np.array([feature.axes for feature in kernels.features]).T
+        axes = np.array([feature.axes for feature in kernels.features]).T
+        self.columns = [COLUMNS[own].T for own in axes]  # rows of the columns of both parts, for each pair of features
         self.signs = np.zeros((SIGNS, len(kernels.features)))
         for k, feature in enumerate(kernels.features):
             self.signs[: len(feature.signs), k] = feature.signs
@@ -99,22 +103,25 @@ class ContactDetection:
             Depth of a missed overlap, relative to the shortest edge of the boxes.
         """
         first, second = self.table.near(poses, reach)
+        columns = np.concatenate([poses, self.table.sizes, centres[:, self.table.body]])
         code = self.table.kind[first] * len(KINDS) + self.table.kind[second]
         found: list[NearContacts] = []
         overlaps: list[Overlap] = []
-        for number in np.unique(code):
+        for number in np.flatnonzero(np.bincount(code)):
             mine = code == number
             pairs = first[mine], second[mine]
             kind = self._kind(int(number))
-            gaps = kind.kernels.distances(self._distance_inputs(poses, *pairs))
+            given = [columns[DISTANCE_ROWS[:, None], part] for part in pairs]
+            gaps = kind.kernels.distances(np.concatenate([*given, np.full((1, pairs[0].size), self.scale)]))
             m = kind.function.size
             if kind.kernels.guarded:
                 overlaps += self._missed(gaps[:m], gaps[m], pairs, unseen)
             feature, pair = np.nonzero(gaps[:m] <= reach)
-            for function in np.unique(kind.function[feature]):
-                which = kind.function[feature] == function
-                here = pairs[0][pair[which]], pairs[1][pair[which]]
-                found.append(self._rows(kind, int(function), feature[which], *here, poses, centres))
+            for function in range(len(kind.kernels.rows)):
+                which = np.flatnonzero(kind.function[feature] == function)
+                if which.size:
+                    here = pairs[0][pair[which]], pairs[1][pair[which]]
+                    found.append(self._rows(kind, function, feature[which], *here, columns))
         return _joined(found), overlaps
 
     def _kind(self, number: int) -> _Kind:
@@ -123,11 +130,6 @@ class ContactDetection:
             self._kinds[number] = _Kind(pair_kernels((KINDS[one], KINDS[other])))
         return self._kinds[number]
 
-    def _distance_inputs(self, poses, first, second) -> np.ndarray:
-        sizes = self.table.sizes
-        scale = np.full((1, first.size), self.scale)
-        return np.concatenate([poses[:PLACE, first], poses[:PLACE, second], sizes[:, first], sizes[:, second], scale])
-
     def _missed(self, gaps, apart, pairs, unseen: float) -> list[Overlap]:
         """Overlaps beyond a depth with all gap functions positive."""
         first, second = pairs
@@ -135,29 +137,21 @@ class ContactDetection:
         missed = np.flatnonzero((apart <= -deepest) & (gaps.min(axis=0) > -START_OVERLAP * self.scale))
         return [Overlap(int(self.table.law[first[k], second[k]]) - 1, -float(apart[k])) for k in missed]
 
-    def _rows(self, kind: _Kind, function: int, feature, first, second, poses, centres) -> NearContacts:
+    def _rows(self, kind: _Kind, function: int, feature, first, second, columns) -> NearContacts:
         """Rows of pairs of features of one kind."""
-        table, axes = self.table, kind.axes[:, feature]
-        parts = [
-            *(poses[TURNED[own].T, part] for own, part in zip(axes, (first, second), strict=True)),
-            *(table.sizes[RESIZED[own].T, part] for own, part in zip(axes, (first, second), strict=True)),
-            np.full((1, feature.size), self.scale),
-            *(centres[:, table.body[part]] for part in (first, second)),
-            kind.signs[:, feature],
-        ]
-        found = kind.kernels.rows[function](np.concatenate(parts))
-        assert found.shape[0] == ROWS
-        gap, place, axis, moments, bias = np.split(found, [1, 4, 13, 31])
-        m = feature.size
-        J = np.zeros((m, 2, 3, 8))
-        J[..., :3] = moments.T.reshape(m, 2, 3, 3)
-        J[:, 0, :, 3:6] = axis.T.reshape(m, 3, 3)
-        J[:, 1] *= -1.0
-        J[:, 1, :, 3:6] = -J[:, 0, :, 3:6]
+        table, m = self.table, feature.size
+        given = np.empty((2 * COLUMN + 1 + SIGNS, m))
+        given[:COLUMN] = columns[kind.columns[0][:, feature], first]
+        given[COLUMN : 2 * COLUMN] = columns[kind.columns[1][:, feature], second]
+        given[2 * COLUMN] = self.scale
+        given[2 * COLUMN + 1 :] = kind.signs[:, feature]
+        found = kind.kernels.rows[function](given)
+        J = found[4:52].T.reshape(m, 2, 3, 8)
         key = (first * len(table.parts) + second) * MOST_FEATURES + feature
         bodies = np.column_stack([table.body[first], table.body[second]])
-        law = table.law[first, second] - 1
-        return NearContacts(key, law, bodies, gap[0], place.T, J[:, 0, :, 3:6], J, bias.T)
+        return NearContacts(
+            key, table.law[first, second] - 1, bodies, found[0], found[1:4].T, J[:, 0, :, 3:6], J, found[52:].T
+        )
 
 
 def _joined(found: list[NearContacts]) -> NearContacts:

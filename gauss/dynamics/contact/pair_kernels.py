@@ -29,7 +29,7 @@ from gauss.scene.contact_pairs import BOTH_SIDES, have_edges, places
 POSE = 24  # rotation (9), centre (3), angular velocity, velocity of the centre (6), rates of both where q̈ = 0 (6)
 PLACE = 12  # of these rotation and centre
 SIZES = 4  # half edges, half length as the last one; radius
-ROWS = 34  # distance, point (3), directions (9), moments of these about both bodies (18), biases (3)
+ROWS = 55  # distance, point (3), rows of normal and tangents for both bodies (2, 3, 8), biases (3)
 SIGNS = 3  # sides on which features lie
 CYCLIC = np.array([(0, 1, 2), (1, 2, 0), (2, 0, 1)])  # axes of a box, the one of the edge first
 LAST = {Box: 7, Capsule: 1, Sphere: 0}  # corner on the positive sides
@@ -174,31 +174,31 @@ class PairKernels:
     features : list of Feature
         Pairs of features.
     distances : Kernel
-        (rotation, centre of both shapes, sizes of both, length of the scene) → distances of all pairs of features; where
-        these may miss an overlap, the separation of the shapes as a whole [m].
+        (rotation, centre, sizes of one shape, the same of the other, length of the scene) → distances of all pairs of
+        features; where these may miss an overlap, the separation of the shapes as a whole [m].
     rows : list of Kernel
-        Of one pair of features each: (poses of both shapes, their sizes, length of the scene, centres of mass of both
-        bodies, signs) → distance, point, normal and two tangents, moments of these about the first body, about the second,
-        biases of the three relative velocities.
+        Of one pair of features each: (pose and sizes of one shape, centre of mass of its body, the same of the other, length
+        of the scene, signs) → distance, point, rows for the twists (ω, u) of both bodies that give the relative velocities
+        along normal and tangents, each with two zeros at its end; biases of these velocities.
     """
 
     def __init__(self, kinds: tuple[type, type]):
         self.features, makers = _features(kinds)
         self.guarded = {*kinds} in ({Box}, {Box, Capsule})
 
-        def distances(pose, other, sizes, other_sizes, length):
+        def distances(pose, sizes, other, other_sizes, length):
             still = np.zeros(POSE - PLACE)
             view = PairOfShapes([np.concatenate([pose, still]), np.concatenate([other, still])], length[0])
             shapes = _shape(kinds[0], "first", sizes), _shape(kinds[1], "second", other_sizes)
             apart = [separation(*shapes, view)] if have_edges(*shapes) else []
             return [*(place.touch(view).gap for place in places(*shapes)), *apart]
 
-        self.distances = Kernel(write(distances, PLACE, PLACE, SIZES, SIZES, 1, name="distances"))
+        self.distances = Kernel(write(distances, PLACE, SIZES, PLACE, SIZES, 1, name="distances"))
         self.rows = [_rows(kinds, maker) for maker in makers]
 
 
 def _rows(kinds: tuple[type, type], maker: Callable[..., FeaturePair]) -> Kernel:
-    def rows(pose, other, sizes, other_sizes, length, x, x_other, signs):
+    def rows(pose, sizes, x, other, other_sizes, x_other, length, signs):
         view = PairOfShapes([pose, other], length[0])
         place = maker(_shape(kinds[0], "first", sizes), _shape(kinds[1], "second", other_sizes), signs)
         if isinstance(place, Edges):
@@ -207,11 +207,11 @@ def _rows(kinds: tuple[type, type], maker: Callable[..., FeaturePair]) -> Kernel
         slip = view.velocity_at("first", point) - view.velocity_at("second", point)
         axes = tangents(normal)
         rates = [*view.derivative([gap]), *(axis @ slip for axis in axes)]
-        directions = normal, *axes
-        moments = [cross(point - centre, axis) for centre in (x, x_other) for axis in directions]
-        return [gap], point, *directions, *moments, view.derivative(rates)
+        arms = (1.0, point - x), (-1.0, point - x_other)
+        J = [[*(sign * cross(arm, axis)), *(sign * axis), 0.0, 0.0] for sign, arm in arms for axis in (normal, *axes)]
+        return [gap], point, *J, view.derivative(rates)
 
-    return Kernel(write(rows, POSE, POSE, SIZES, SIZES, 1, 3, 3, SIGNS, name="rows"))
+    return Kernel(write(rows, POSE, SIZES, 3, POSE, SIZES, 3, 1, SIGNS, name="rows"))
 
 
 @cache
