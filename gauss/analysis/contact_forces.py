@@ -126,7 +126,7 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
 
 def _parts(trajectory: Trajectory):
     plan = trajectory.stats.plan
-    if plan is not None and plan.dynamics == "free bodies":
+    if plan is not None and plan.dynamics == "free bodies" and trajectory.step is not None:
         stepper = free_body_stepper(trajectory.system)
         stepper.forget()
         for index in range(len(trajectory)):

@@ -60,7 +60,7 @@ class ContactBuilder(SceneBuilder):
         excluded |= {frozenset((contact.shape, contact.other)) for contact in self._contacts_of_shapes()}
         joints = [joint for joint in self.joints.values() if joint.parent != elements.GROUND]
         excluded |= {frozenset((joint.parent, joint.child)) for joint in joints}
-        taken = {*self.joints, *self.couplings, *self._constraints, *self.loads}
+        taken = self._taken()
         found = []
         for one, other in combinations(self.shapes.values(), 2):
             if self._may_touch(one, other, excluded):

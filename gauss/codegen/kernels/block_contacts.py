@@ -204,9 +204,9 @@ class _BlockContactWriter:
             self._push(c, [change, self.r.number(0.0), self.r.number(0.0)])
             u = self._rates(c)
             moved = [f[i + k] - u[k] / w[i + k] for k in (1, 2)]
-            new = r.inline(self.laws.project_friction, *moved, self.mu[c] * f[i])
-            changes = [new[k] - f[i + 1 + k] for k in range(2)]
-            f[i + 1], f[i + 2] = new
+            across = r.inline(self.laws.project_friction, *moved, self.mu[c] * f[i])
+            changes = [across[k] - f[i + 1 + k] for k in range(2)]
+            f[i + 1], f[i + 2] = across
             self._push(c, [self.r.number(0.0), *changes])
 
     def _residuals(self) -> Value:
@@ -234,9 +234,9 @@ class _BlockContactWriter:
                 column = [(first * x + second * y) / determinant for x, y in zip(sides[0][1:], sides[1][1:], strict=True)]
                 K.append(column[:3])
                 g.append(column[3])
-            own = self.eliminated.after(c * ELIMINATED)
+            kept = self.eliminated.after(c * ELIMINATED)
             for k, value in enumerate([*K[0], *K[1], *K[2], *g]):
-                own[k] = value
+                kept[k] = value
             for k, value in enumerate((error, e1, e2)):
                 size = r.absolute(value * w[i + k])
                 largest[0], total[0] = r.maximum(size, largest[0]), total[0] + size

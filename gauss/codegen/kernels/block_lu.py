@@ -99,11 +99,11 @@ def write_solve(module: ir.Module) -> ir.Function:
         own = x.after(p * WIDTH)
         with r.each(start[k + 1], start[k]) as a:
             r.call(apply_, own, block(p, listed[a]), x.after(listed[a] * WIDTH))
-        for i in range(WIDTH):
-            y[i] = 0.0
+        for entry in range(WIDTH):
+            y[entry] = 0.0
         r.call(add, y, block(p, p), own)
-        for i in range(WIDTH):
-            own[i] = y[i]
+        for entry in range(WIDTH):
+            own[entry] = y[entry]
     return r.done()
 
 

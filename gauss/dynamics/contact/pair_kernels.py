@@ -14,13 +14,13 @@ from dataclasses import replace
 from functools import cache
 from itertools import product
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gauss.codegen import Kernel, forward, from_disk, write
 from gauss.rotations import cross
-from gauss.scene import Box, Capsule, HalfSpace, Sphere
+from gauss.scene import Box, Capsule, Collider, HalfSpace, Sphere
 from gauss.scene.box_distances import CornerOnBox, Edges, separation
 from gauss.scene.contact import tangents
 from gauss.scene.contact_distances import Balls, Capsules, FeaturePair, OnCapsule, OnEdge, OnHalfSpace, Turned
@@ -98,9 +98,10 @@ class PairOfShapes:
         return forward(np.asarray(values, dtype=object), moving, rates)
 
 
-def _shape(kind: type, name: str, sizes):
+def _shape(kind: type[Collider], name: str, sizes) -> Any:
     """Shape in its own axes whose sizes may be expressions, which its checks would refuse."""
-    made, half, radius = object.__new__(kind), sizes[:3], sizes[3]
+    half, radius = sizes[:3], sizes[3]
+    made: Collider = object.__new__(kind)
     given: dict = {"name": name, "body": name, "at": (0.0, 0.0, 0.0)}
     if kind is Sphere:
         given["radius"] = radius
@@ -115,8 +116,12 @@ def _shape(kind: type, name: str, sizes):
     return made
 
 
-CORNERS = {Sphere: [()], Capsule: [(s,) for s in BOTH_SIDES], Box: list(product(BOTH_SIDES, repeat=3))}
-ALONE = {
+CORNERS: dict[type, list[tuple[int, ...]]] = {
+    Sphere: [()],
+    Capsule: [(s,) for s in BOTH_SIDES],
+    Box: list(product(BOTH_SIDES, repeat=3)),
+}
+ALONE: dict[tuple[type, type], Callable] = {
     (Sphere, Sphere): lambda a, b, s: Balls(a, 0, b, 0),
     (Sphere, Capsule): lambda a, b, s: OnCapsule(a, 0, b),
     (Capsule, Capsule): lambda a, b, s: Capsules(a, b),
@@ -144,7 +149,7 @@ def _edges(kind: type) -> tuple[list[Feature], list[Callable]]:
     if kind is not Box:
         return [], []
     found = [Feature(1, signs=s) for s in CORNERS[Box]]
-    found += [Feature(2, axes, s) for axes in product(range(3), repeat=2) for s in sides]
+    found += [Feature(2, axes, s) for axes in product(range(3), range(3)) for s in sides]
     turned = lambda a, b, s: Turned(CornerOnBox(_mirrored(b, s), LAST[Box], a))  # noqa: E731
     return found, [turned, lambda a, b, s: Edges(a, b, 0, 0, s[0], s[1])]
 

@@ -47,6 +47,7 @@ class FreeBodyRun(PythonRun):
         super().__init__(problem.system, TIME_STEPPING, engine, None, problem.step, problem.end, switching=problem.switching)
         self.stepper = free_body_stepper(problem.system)
         self.largest, self.relaxed = 0.0, 0
+        self.h = problem.step or 0.0  # a fixed step is always given
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
@@ -75,5 +76,5 @@ class FreeBodyRun(PythonRun):
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = super()._trajectory(kept, samples, began)
-        method = in_words(self.step, self.largest, self.relaxed, whole.stats.method)
+        method = in_words(self.h, self.largest, self.relaxed, whole.stats.method)
         return replace(whole, stats=whole.stats._replace(method=method), step=self.step)
