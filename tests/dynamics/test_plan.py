@@ -108,7 +108,7 @@ def test_a_motion_tells_its_plan(name, plans):
     plan = plans[name]
     assert (plan.driver, plan.dynamics) == (driver, dynamics)
     assert [found.driver for found in plan.rejected] == rejected and all(found.why for found in plan.rejected)
-    assert bool(plan.fallback) == (dynamics not in ("none", "certified") and driver != "library")
+    assert bool(plan.fallback) == (dynamics not in ("none", "certified", "free bodies") and driver != "library")
 
 
 @pytest.mark.slow
