@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
+from benchmarks import free_bodies
 from gauss import Plan
 from gauss.dynamics.conditions import LARGE_TREE_BODIES, WIDEST
 from gauss.dynamics.laws.traced_laws import Laws
@@ -114,6 +115,12 @@ CASES = {
         ("time stepping", "certified"),
         ["time stepping"],
     ),
+    "steps of many contacts": (
+        lambda: free_bodies.stack(2),
+        {"integrator": "time_stepping", "step": 1e-3},
+        ("time stepping", "free bodies"),
+        ["time stepping"],
+    ),
     "Baumgarte": (mechanisms.four_bar, {"stabilisation": "baumgarte"}, ("compiled loop", "compiled"), []),
 }
 
@@ -134,7 +141,7 @@ def test_a_motion_tells_its_plan(name, plans):
     plan = plans[name]
     assert (plan.driver, plan.dynamics) == (driver, dynamics)
     assert [found.driver for found in plan.rejected] == rejected and all(found.why for found in plan.rejected)
-    assert bool(plan.fallback) == (dynamics not in ("none", "certified") and driver != "library")
+    assert bool(plan.fallback) == (dynamics not in ("none", "certified", "free bodies") and driver != "library")
 
 
 @pytest.mark.slow
