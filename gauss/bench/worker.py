@@ -71,9 +71,11 @@ class Worker:
             return Reply(*pipe.recv())
         except (EOFError, BrokenPipeError, ConnectionResetError):
             process.join()
-            reason = _death(process.exitcode)
+            code = process.exitcode
             self.stop()
-            return Reply("crashed", reason=f"the process of the solver died: {reason}")
+            if code is not None and code == -getattr(signal, "SIGPROF", 0):
+                return Reply("timed out", reason="the CPU time of a call was over")
+            return Reply("crashed", reason=f"the process of the solver died: {_death(code)}")
 
     def stop(self):
         """End the process, whatever it does."""

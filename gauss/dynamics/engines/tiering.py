@@ -11,7 +11,7 @@ from threading import Lock
 
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
-from gauss.dynamics.store import cached
+from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_system import Kernels, Program
 from gauss.system import System
 
@@ -63,10 +63,12 @@ class TieredFunction:
         The first tier.
     make : callable
         () → the second tier.
+    evaluations : int
+        Number of evaluations of the first tier that take as long as making the second.
     """
 
-    def __init__(self, function: Callable, make: Callable[[], Callable]):
-        self.function, self.threshold = function, CompileThreshold(COMPILE_THRESHOLD - 1)  # the last counted one compiles
+    def __init__(self, function: Callable, make: Callable[[], Callable], evaluations: int = COMPILE_THRESHOLD):
+        self.function, self.threshold = function, CompileThreshold(evaluations - 1)  # the last counted one compiles
         self.make: Callable[[], Callable] | None = make
 
     def __call__(self, *args, **kwargs):
@@ -112,9 +114,10 @@ class Tiered:
         if laws.called or (self.spent < LEAST_THRESHOLD and not at_once):
             return None
         program = self.programs.setdefault(laws.key, Program(self.system, laws, Drift()))
-        if not at_once and self.spent < LEAST_THRESHOLD + PER_OPERATION * sum(program.rates.operations().values()):
+        operations = cached_on_disk(self.system, (Tiered, laws.key), lambda: sum(program.rates.operations().values()))
+        if self.spent < LEAST_THRESHOLD + PER_OPERATION * operations and not at_once:
             return None
-        return self.made.setdefault(laws.key, program.kernels())
+        return self.made.setdefault(laws.key, program.cached_kernels)
 
 
 def tiered(system: System) -> Tiered:
