@@ -63,8 +63,8 @@ def _scipy(method: str) -> Callable:
         from scipy import integrate
 
         begin, end = float(times[0]), float(times[-1])
-        sampled, pieces, interruption, failure = len(times) > 2, [], None, None
-        t, y = [begin], [y0]
+        sampled, interruption, failure = len(times) > 2, None, None
+        steps: list[tuple] = []  # time, values and interpolant of each, kept at once: an interruption may come in between
         with np.errstate(all="ignore"):  # divergence is reported
             solver = getattr(integrate, method)(f, begin, y0, end, rtol=max(rtol, 3e-14), atol=atol, max_step=largest)
             try:  # the loop of solve_ivp, which loses all steps when it is interrupted
@@ -72,19 +72,17 @@ def _scipy(method: str) -> Callable:
                     failure = solver.step()
                     if solver.status == "failed":
                         break
-                    piece = solver.dense_output() if sampled else None
-                    if not sampled or solver.t != t[-1]:
-                        t.append(solver.t)
-                        y.append(solver.y)
-                        pieces.append(piece)
+                    if not sampled or solver.t != (steps[-1][0] if steps else begin):
+                        steps.append((solver.t, solver.y, solver.dense_output() if sampled else None))
             except KeyboardInterrupt as error:
                 interruption = error
-        counts = len(t) - 1, solver.nfev, int(solver.nlu)
-        if not sampled or not pieces:
-            return LibrarySolution(np.array(t), np.array(y), *counts, failure, interruption)
+        counts = len(steps), solver.nfev, int(solver.nlu)
+        t = np.array([begin, *(reached for reached, _, _ in steps)])
+        if not sampled or not steps:
+            return LibrarySolution(t, np.array([y0, *(y for _, y, _ in steps)]), *counts, failure, interruption)
         inside = times[times <= t[-1]]
         later_piece = method == "LSODA"  # at the end of a piece; as by solve_ivp
-        found = integrate.OdeSolution(np.array(t[: len(pieces) + 1]), pieces, alt_segment=later_piece)
+        found = integrate.OdeSolution(t, [piece for _, _, piece in steps], alt_segment=later_piece)
         return LibrarySolution(inside, found(inside).T, *counts, failure, interruption)
 
     return solve

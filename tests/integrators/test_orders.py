@@ -294,8 +294,10 @@ def test_ida_says_what_it_cannot_do():
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.5 else 2.0)
     with pytest.raises(SimulationError, match="integrator 'ida' needs the equations of motion in machine code"):
         gauss.simulate(scene, 0.1, integrator="ida")
-    with pytest.raises(SimulationError, match="'ida' gave up: "):
+    with pytest.raises(SimulationError, match="'ida' gave up: ") as caught:
         gauss.simulate(gauss.load("bricard"), 2.0, integrator="ida", rtol=1e-8, atol=1e-8)  # a row too many
+    found = caught.value.trajectory
+    assert found.t[-1] < 2.0 and f"t = {found.t[-1]:.6g} s" in str(caught.value)  # no sample of a time that was not reached
     with pytest.raises(SimulationError, match="'ida' knows no stabilisation by partitioning"):
         gauss.simulate(mechanisms.four_bar(), 0.1, integrator="ida", stabilisation="partitioning")
 
@@ -358,3 +360,12 @@ def test_implicit_methods_bear_coordinates_that_have_grown(integrator):
     options = {"integrator": integrator, "times": [0.7]} | way
     near, far = (gauss.simulate(system, 0.7, state=state, **options) for state in (start, turned))
     assert np.abs(near.q - start.q - (far.q - turned.q)).max() <= 1e-7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", ["gauss4", "gauss6"])
+def test_a_mechanical_method_has_no_fallback(integrator):
+    """A step beyond the singular configuration of a ladder: accelerations of single states do not continue the method."""
+    with pytest.raises(SimulationError, match="needs the equations of motion in machine code") as caught:
+        gauss.simulate(gauss.load("n_four_bar", n=1), 10.0, integrator=integrator, step=0.3125, progress=False)
+    assert caught.value.trajectory.t[-1] < 10.0
