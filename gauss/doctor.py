@@ -30,7 +30,7 @@ EXTRAS = {
     "mjcf": ("mujoco",),
     "peers": ("scikit-sundae", "mujoco"),
 }
-CACHED = {"object code": "", "by content": "made", "sources": "sources"}  # kinds of cached files, begins of their names
+CACHED = {"object code": "", "by content": "made", "sources": "sources"}  # kinds of cached files, starts of their names
 TOLERANCE = 1e-10  # relative difference of accelerations to Pinocchio's
 
 

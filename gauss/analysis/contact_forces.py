@@ -1,12 +1,15 @@
 """Forces of unilateral constraints along a motion: multipliers λ ≥ 0 of the closed gaps, and friction."""
 
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 
+from gauss.analysis.sample_forces import kept_with
 from gauss.analysis.sample_solution import refuse_doubtful
 from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
+from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.gap_functions import gaps, with_gaps
@@ -58,32 +61,63 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
     mine = _gaps_of(trajectory, name)
     if trajectory.step is not None:
         return np.array([normal[mine] for normal, _ in _parts(trajectory)]).reshape(-1, len(mine))
-    found, ambiguous = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
-    for sample, motion in zip(found, trajectory.motions, strict=True):
-        instant, selector = gaps(motion), mode_selector(motion.system)
-        held = selector.choose(motion.state, selector.touching(motion.state), backend)
-        which = np.array(held.gaps, dtype=int)
-        if not np.isin(which, mine).any():
-            continue
-        moved = kinematics(held.system, motion.state)
-        compulsion = with_gaps(assemble_motion(moved, Applied(moved), held.load), instant, which)
-        solution = solve(compulsion, backend)
-        if not solution.status.certified:
-            raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
-        free = Factor(compulsion, np.arange(which.size)).closure.free_active()
-        places = len(compulsion.structure.constraints) + np.flatnonzero(np.isin(which, mine))
-        refuse_doubtful(solution, places, name, motion.state.t)
-        sample[which] = _least(solution.inequality_multipliers, free)
-        sizes = np.linalg.norm(free, axis=1)
-        ambiguous = ambiguous or (sizes[np.isin(which, mine)] > UNDETERMINED_SHARE * sizes.max(initial=0.0)).any()
-    if ambiguous:
+    found = kept_with(trajectory, "contact forces", backend, lambda: _of_all(trajectory, backend))
+    for k, (solution, which) in found.solutions.items():
+        if np.isin(which, mine).any():
+            _require_certified(solution, which, mine, name, trajectory.t[k])
+    if found.ambiguous[:, mine].any():
         warnings.warn(
             f"the forces of {name!r} are not unique: more gaps are closed than it takes to bear the load. Single forces are "
             "those of least norm, one of many distributions; do not size anything by them. Their sum and moment are right.",
             NonUniqueReactionWarning,
             stacklevel=2,
         )
-    return found[:, mine]
+    return found.values[:, mine]
+
+
+class GapForces(NamedTuple):
+    """Forces of all gaps along a motion.
+
+    Attributes
+    ----------
+    values, ambiguous : ndarray, shape (k, g)
+        Forces, and whether they are not unique.
+    solutions : dict
+        Solution of each sample with closed gaps, and these gaps, by its index.
+    """
+
+    values: np.ndarray
+    ambiguous: np.ndarray
+    solutions: dict[int, tuple[Solution, np.ndarray]]
+
+
+def _of_all(trajectory: Trajectory, backend) -> GapForces:
+    """Forces of all gaps at all samples."""
+    shape = len(trajectory), len(trajectory.system.contacts.placed)
+    found, selector = GapForces(np.zeros(shape), np.zeros(shape, dtype=bool), {}), mode_selector(trajectory.system)
+    for k, motion in enumerate(trajectory.motions):
+        instant, held = gaps(motion), selector.choose(motion.state, selector.touching(motion.state), backend)
+        which = np.array(held.gaps, dtype=int)
+        if not which.size:
+            continue
+        moved = kinematics(held.system, motion.state)
+        compulsion = with_gaps(assemble_motion(moved, Applied(moved), held.load), instant, which)
+        solution = solve(compulsion, backend)
+        found.solutions[k] = solution, which
+        if solution.status.certified:
+            free = Factor(compulsion, np.arange(which.size)).closure.free_active()
+            sizes = np.linalg.norm(free, axis=1)
+            found.values[k, which] = _least(solution.inequality_multipliers, free)
+            found.ambiguous[k, which] = sizes > UNDETERMINED_SHARE * sizes.max(initial=0.0)
+    return found
+
+
+def _require_certified(solution: Solution, which: np.ndarray, mine: list[int], name: str, t: float):
+    """Raise a SimulationError if the forces of some gaps are not certified."""
+    if not solution.status.certified:
+        raise SimulationError(f"t = {t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+    places = len(solution.compulsion.structure.constraints) + np.flatnonzero(np.isin(which, mine))
+    refuse_doubtful(solution, places, name, t)
 
 
 def friction_forces(trajectory: Trajectory, name: str) -> Shaped[np.ndarray, "k m 3"]:

@@ -1,26 +1,23 @@
-"""Derivatives of the accelerations with respect to coordinates, rates and forces, by inverse dynamics.
+"""Derivatives of the accelerations of one state with respect to coordinates, rates and forces.
 
-With the equations of motion r(q, v, q̈, λ) = 0 and the constraints g(q, v, q̈) = 0, a small change of q or v leaves a
-residual at fixed q̈ and λ; the change of q̈ that removes it is the derivative (Carpentier and Mansard, Analytical
-derivatives of rigid
-body dynamics algorithms, RSS 2018). Residuals are differentiated on the traced graph, without finite differences.
+All directions at once, in SIMD code that is short for any system, by :mod:`gauss.dynamics.acceleration_derivatives`. For
+many states of a small one, ``system.acceleration_derivatives`` is faster.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.codegen import Kernel, forward, write
+from gauss.codegen import Kernel, write
+from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, on_boundary
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
-from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import SimulationError, judged_later, require
 from gauss.shapes import Shaped
-from gauss.system import State, System, coordinate_rates, refuse_changed
+from gauss.system import State, System, refuse_changed
 
 
 @dataclass(frozen=True)
@@ -99,21 +96,13 @@ def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
     """(t, q, v, load) → (q̈, λ), and (t, q, v, load, q̈, λ, changes of q, v and load) → change of q̈."""
     sizes = 1, system.n_q, system.n_v, system.n_v
 
-    def parts(t, q, v, load):
-        own, forces, _ = applied_loads(system, loads, State(t[0], q, v))
-        return Mechanism(system, q, v, t[0]), own + load, forces
-
     def solved(t, q, v, load):
-        mechanism, effort, forces = parts(t, q, v, load)
-        return mechanism.motion(effort, forces)
+        return LoadedMechanism(system, loads, t[0], q, v, load).motion()
 
     def change(t, q, v, load, rates, multipliers, along_q, along_v, along_load):
-        mechanism, effort, forces = parts(t, q, v, load)
-        motion, violation = mechanism.residual(rates, multipliers, effort, forces)
-        moving = np.concatenate([q, v]), np.concatenate([coordinate_rates(system, q, along_q), along_v])
-        parts_changed = (forward(part, *moving) for part in (motion, violation, mechanism.dependent_accelerations(rates)))
-        force, constraint, following = parts_changed
-        return mechanism.response(force + along_load, constraint)[0] + following
+        loaded = LoadedMechanism(system, loads, t[0], q, v, load)
+        ((force, constraint, following),) = loaded.changes(rates, multipliers, [(along_q, along_v)])
+        return loaded.mechanism.response(force + along_load, constraint)[0] + following
 
     solve = write(solved, *sizes, name="solve")
     count = len(solve.outputs) - system.n_v

@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gauss.analysis.load_sharing import shared
+from gauss.analysis.sample_forces import kept_with, sample_forces
 from gauss.analysis.sample_solution import refuse_doubtful, solution_at
 from gauss.backends import Backend
 from gauss.dynamics.contact.mode_selection import mode_selector
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mobility import row_name
 from gauss.errors import NonUniqueReactionWarning, StateError, did_you_mean, require
@@ -158,12 +160,22 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | ty
     limited = _rates_of(system, joint, system.scene.set_valued, LimitedDrive)
     if not given and not motions and not limited:
         raise StateError(f"nothing drives joint {joint!r}; add a drive with scene.drive({joint!r}, …).")
-    efforts = np.array([Applied(motion, given).P[places] for motion in trajectory.motions])
+    efforts = _given_efforts(trajectory, given, places)
     for name, rate in motions.items():
         efforts[:, rate] += constraint_forces(trajectory, name, backend)[:, 0]
     for name, rate in limited.items():
         efforts[:, rate] += set_valued_forces(trajectory, name, backend)
     return efforts[:, 0] if efforts.shape[1] == 1 else efforts
+
+
+def _given_efforts(trajectory: Trajectory, given, places: slice) -> np.ndarray:
+    """Efforts (k, n) of given drives along some rates; of many samples by machine code, where laws can be traced."""
+    if not given:
+        return np.zeros((len(trajectory), places.stop - places.start))
+    names = [bound.load.name for bound in given]
+    if any(bound.load.name in names for bound in Laws(trajectory.system).called):
+        return np.array([Applied(motion, given).P[places] for motion in trajectory.motions])
+    return trajectory.sampled(f"drives {names}", lambda motion: Applied(motion, given).P[places])
 
 
 def _rates_of(
@@ -207,9 +219,18 @@ def set_valued_forces(trajectory: Trajectory, name: str, backend: str | Backend 
     if trajectory.step is not None:
         which = list(scene.set_valued).index(name) - len(scene.set_valued)
         return np.array([step_at(trajectory, i).force[which] for i in range(len(trajectory))])
-    selector = mode_selector(trajectory.system)
-    states = (trajectory.state(i) for i in range(len(trajectory)))
-    return np.array([selector.choose(state, selector.touching(state), backend).forces[name] for state in states])
+    return np.array([forces[name] for forces in _mode_forces(trajectory, backend)])
+
+
+def _mode_forces(trajectory: Trajectory, backend) -> list[dict]:
+    """Forces of all set-valued elements and losses at every sample, by name."""
+
+    def found():
+        selector = mode_selector(trajectory.system)
+        states = (trajectory.state(i) for i in range(len(trajectory)))
+        return [selector.choose(state, selector.touching(state), backend).forces for state in states]
+
+    return kept_with(trajectory, "forces of modes", backend, found)
 
 
 def unique_reactions(
@@ -238,18 +259,18 @@ def multipliers(trajectory: Trajectory, name: str, backend, compliance=None) -> 
 
 def _found(trajectory: Trajectory, name: str, backend, compliance):
     """Constraint, its multipliers (k, m) at every sample, and which of them are not unique (m,)."""
+    if not compliance:
+        return sample_forces(trajectory, backend).of(trajectory, name)
     constraint = next(c for c in trajectory.system.structure.constraints if c.name == name)
-    found = [_solved(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
+    found = [_shared(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
     return constraint, np.array([values for values, _ in found]), np.any([loose for _, loose in found], axis=0)
 
 
-def _solved(trajectory: Trajectory, index: int, rows: slice, backend, compliance):
-    """Multipliers of some rows at a sample, and which of them are not unique."""
+def _shared(trajectory: Trajectory, index: int, rows: slice, backend, compliance):
+    """Multipliers of some rows at a sample, shared by compliances, and which of them are not unique."""
     solution = solution_at(trajectory, index, backend)
     constraints = solution.compulsion.structure.constraints
     place = next(i for i, constraint in enumerate(constraints) if constraint.rows == rows)
     refuse_doubtful(solution, place, constraints[place].name, trajectory.t[index])
-    values, loose = solution.multipliers, solution.certificate.undetermined
-    if compliance:
-        values, loose = shared(solution, trajectory.motions[index], compliance)
+    values, loose = shared(solution, trajectory.motions[index], compliance)
     return values[rows], loose[rows] if loose.size else np.zeros(rows.stop - rows.start, dtype=bool)

@@ -51,10 +51,14 @@ def refuse_doubtful(solution: Solution, places, name: str, t: Scalar):
         Time of the sample [s].
     """
     error = float(np.max(solution.certificate.dual.errors[places], initial=0.0))
-    if error <= solution.status.tolerance:
-        return
+    if error > solution.status.tolerance:
+        refuse_uncertain(error, solution.status.tolerance, solution.backend, name, t)
+
+
+def refuse_uncertain(error: float, tolerance: float, backend: str, name: str, t: Scalar):
+    """Raise the SimulationError of forces with an estimated relative error above the tolerance."""
     raise SimulationError(
-        f"t = {t:.6g} s, backend {solution.backend!r}: the forces of {name!r} are not certified, though accelerations are: "
-        f"estimated relative error {error:.1e}, expected at most {solution.status.tolerance:.0e}. Near a singular "
+        f"t = {t:.6g} s, backend {backend!r}: the forces of {name!r} are not certified, though accelerations are: "
+        f"estimated relative error {error:.1e}, expected at most {tolerance:.0e}. Near a singular "
         "configuration forces lose digits; take samples farther from it (times= of simulate)."
     )

@@ -23,7 +23,7 @@ import numpy as np
 from gauss.backends.active_set import active_set, has_negative_multiplier
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.dual_certificate import DualCertificate
-from gauss.backends.estimate import SHARE_AT_REST, SUSPICIOUS_ERROR, acceleration_errors, accelerations_by_one_reaction
+from gauss.backends.estimate import SHARE_AT_REST, SUSPICIOUS_ERROR, AccelerationScale
 from gauss.backends.kkt_factor import EPSILON, Correction, KKTFactor
 from gauss.backends.solution import Answer, Certificate, Solution, SolveStatus
 
@@ -69,11 +69,12 @@ def certify(
     doubled = tuple(2.0 * change for change in again)  # the sum of steps that halve each time
     parts = correction, doubled, factor.rounding(answer)
     judged = replace(refined, a=answer.a, qdd=answer.qdd)  # wrong multipliers must not make accelerations look small
-    first, second, hidden = (acceleration_errors(compulsion, judged, part) for part in parts)
+    scale = AccelerationScale(compulsion, judged)
+    first, second, hidden = (scale.errors(part) for part in parts)
     errors = EPSILON + (1.0 + ROUNDED_NORM) * (first + second + hidden)
     structure = compulsion.structure
     worst = int(np.argmax(errors))
-    residual, worst_row = _row_residual(compulsion, judged, *correction[:2])
+    residual, worst_row = _row_residual(scale, *correction[:2])
     undetermined = _undetermined(factor.free_multipliers())
     return Certificate(
         float(errors[worst]),
@@ -149,8 +150,9 @@ def conclude(compulsion: Compulsion, answer: Answer, certificate: Certificate, b
     return Solution(*fields, status, certificate, backend, answer.iterations, compulsion)
 
 
-def _row_residual(compulsion: Compulsion, answer: Answer, da, dqdd) -> tuple[float, str]:
+def _row_residual(sizes: AccelerationScale, da, dqdd) -> tuple[float, str]:
     """Largest relative residual of a row that the correction leaves, and the name of its constraint."""
+    compulsion, answer = sizes.compulsion, sizes.answer
     refined = replace(answer, a=answer.a - da, qdd=answer.qdd - dqdd)
     _, r2, _ = compulsion.residuals(refined.a, refined.qdd, refined.multipliers)
     worst, name = 0.0, ""
@@ -160,7 +162,7 @@ def _row_residual(compulsion: Compulsion, answer: Answer, da, dqdd) -> tuple[flo
         if size > worst:
             worst, name = float(size), constraint.name
     if worst > SUSPICIOUS_ERROR:  # at rest under forces in balance: accelerations are round-off of these forces
-        worst *= scale / max(scale, SHARE_AT_REST * accelerations_by_one_reaction(compulsion, answer).max(initial=0.0))
+        worst *= scale / max(scale, SHARE_AT_REST * sizes.by_one_reaction.max(initial=0.0))
     return worst, name
 
 

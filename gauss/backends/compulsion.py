@@ -168,6 +168,35 @@ class Compulsion:
         deviation = a - self.a_free
         return 0.5 * deviation @ (self.Phi * deviation) - self.P @ qdd
 
+    @cached_property
+    def gyrations(self) -> np.ndarray:
+        """Radius of gyration (n,) of each body [m]; 1 m for a body without mass."""
+        parts = self.Phi.reshape(-1, 6)
+        mass = parts[:, 3]
+        mean = parts[:, :3].sum(axis=1) / 2
+        return np.sqrt(np.divide(mean, mass, out=np.ones_like(mass), where=mass > 0))
+
+    @cached_property
+    def reaches(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates of joints, bodies of these, and the acceleration [m/s²] of the body by a unit one of the joint."""
+        joints = [(c, A, B) for c, A, B in self.blocks if c.bodies and c.rows.stop - c.rows.start == 6 and c.columns]
+        if not joints:
+            return np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros(0)
+        # of the joint point about the centre of mass
+        levers = iter(np.linalg.norm(np.array([block[3:, :3] for _, A, _ in joints for block in A]), 2, axis=(1, 2)))
+        coordinates, bodies, reaches = [], [], []
+        for constraint, A_blocks, B_blocks in joints:
+            arms = [
+                np.hypot(self.gyrations[body], next(levers)) for body, _ in zip(constraint.bodies, A_blocks, strict=True)
+            ]
+            for columns, B in zip(constraint.columns, B_blocks, strict=True):
+                turn, slide = np.sqrt((B[:3] * B[:3]).sum(axis=0)), np.sqrt((B[3:] * B[3:]).sum(axis=0))
+                for body, arm in zip(constraint.bodies, arms, strict=True):
+                    coordinates.append(np.arange(columns.start, columns.stop))
+                    bodies.append(np.full(turn.size, body))
+                    reaches.append(arm * turn + slide)
+        return np.concatenate(coordinates), np.concatenate(bodies), np.concatenate(reaches)
+
     @property
     def blocks(self) -> Iterator[tuple[ConstraintRows, tuple, tuple]]:
         """Every constraint with its blocks of A and of B."""

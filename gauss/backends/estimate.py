@@ -4,6 +4,8 @@ The acceleration of a body is one length [m/s²]: √(k² |ω̇|² + |a|²), wit
 its own size, that of its free acceleration, or 10⁻³ of the largest acceleration of all bodies.
 """
 
+from functools import cached_property
+
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
@@ -12,6 +14,57 @@ from gauss.backends.solution import Answer
 
 SUSPICIOUS_ERROR = 1e-12  # relative error above which the size that it is compared with is found more closely
 SHARE_AT_REST = 1e-6  # of the acceleration by one reaction alone: its errors at rest are compared with that
+
+
+class AccelerationScale:
+    """Sizes that errors of the accelerations of one answer are relative to; what takes long is found when first needed.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        The problem.
+    answer : Answer
+        The answer.
+    """
+
+    def __init__(self, compulsion: Compulsion, answer: Answer):
+        self.compulsion, self.answer, self.lengths = compulsion, answer, compulsion.gyrations
+        self.size = np.maximum(_length(answer.a, self.lengths), _length(compulsion.a_free, self.lengths))
+
+    @cached_property
+    def by_one_reaction(self) -> np.ndarray:
+        """Largest acceleration (n,) [m/s²] that the reaction of one constraint, or one drive, would give each body alone."""
+        compulsion, multipliers = self.compulsion, self.answer.multipliers
+        effort, bodies, forces = np.abs(compulsion.P), list[int](), list[np.ndarray]()
+        for constraint, _, B_blocks in compulsion.blocks:
+            for columns, B in zip(constraint.columns, B_blocks, strict=True):
+                effort[columns] = np.maximum(effort[columns], np.abs(B.T @ multipliers[constraint.rows]))
+        for constraint, A_blocks, B_blocks in compulsion.blocks:
+            own = [multipliers[constraint.rows]]
+            own += [B @ effort[columns] for columns, B in zip(constraint.columns, B_blocks, strict=True)]
+            for body, A in zip(constraint.bodies, A_blocks, strict=True):
+                bodies += [body] * len(own)
+                forces += [A.T @ force for force in own]
+        Phi, alone = compulsion.Phi.reshape(-1, 6)[bodies], np.array(forces).reshape(-1, 6)
+        found = np.divide(alone, Phi, out=np.zeros_like(alone), where=Phi > 0)
+        largest = np.zeros(compulsion.structure.n_bodies)
+        np.fmax.at(largest, bodies, _length(found, self.lengths[bodies]))
+        return largest
+
+    def errors(self, correction, suspicious: float = SUSPICIOUS_ERROR) -> np.ndarray:
+        """Size of a correction relative to the answer, see :func:`acceleration_errors`."""
+        da, dqdd = correction[:2]
+        size, change, joints = self.size, _length(da, self.lengths), np.abs(self.answer.qdd)
+        bodies = _relative(change, size)
+        if (bodies > suspicious).any():
+            size = np.maximum(size, SHARE_AT_REST * self.by_one_reaction)
+            bodies = _milder(bodies, _relative(change, size), suspicious)
+        turned = _relative(np.abs(dqdd), joints)
+        if (turned > suspicious).any():
+            moved = np.maximum(LEAST_SHARE * size, SHARE_AT_REST * self.by_one_reaction)
+            scale = np.maximum(joints, _carried(self.compulsion, moved))
+            turned = _milder(turned, _relative(np.abs(dqdd), scale), suspicious)
+        return np.concatenate([bodies, turned])
 
 
 def acceleration_errors(
@@ -23,19 +76,7 @@ def acceleration_errors(
     joint acceleration that would move its bodies as fast as they accelerate, or as fast as counts for a body at rest. This
     takes longer, and is found for suspicious errors only.
     """
-    da, dqdd = correction[:2]
-    lengths = gyration(compulsion.Phi)
-    size = np.maximum(_length(answer.a, lengths), _length(compulsion.a_free, lengths))
-    bodies = _relative(_length(da, lengths), size)
-    if (bodies > suspicious).any():
-        size = np.maximum(size, SHARE_AT_REST * accelerations_by_one_reaction(compulsion, answer))
-        bodies = _milder(bodies, _relative(_length(da, lengths), size), suspicious)
-    joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
-    if (joints > suspicious).any():
-        moved = np.maximum(LEAST_SHARE * size, SHARE_AT_REST * accelerations_by_one_reaction(compulsion, answer))
-        scale = np.maximum(np.abs(answer.qdd), _carried(compulsion, moved, lengths))
-        joints = _milder(joints, _relative(np.abs(dqdd), scale), suspicious)
-    return np.concatenate([bodies, joints])
+    return AccelerationScale(compulsion, answer).errors(correction, suspicious)
 
 
 def _milder(strict: np.ndarray, mild: np.ndarray, suspicious: float) -> np.ndarray:
@@ -46,46 +87,12 @@ def _milder(strict: np.ndarray, mild: np.ndarray, suspicious: float) -> np.ndarr
     return np.minimum(strict, np.maximum(mild, suspicious))
 
 
-def accelerations_by_one_reaction(compulsion: Compulsion, answer: Answer) -> np.ndarray:
-    """Largest acceleration (n,) [m/s²] that the reaction of one constraint, or one drive, would give each body by itself."""
-    blocks, lengths = list(compulsion.blocks), gyration(compulsion.Phi)
-    effort = np.abs(compulsion.P)
-    for constraint, _, B_blocks in blocks:
-        for columns, B in zip(constraint.columns, B_blocks, strict=True):
-            effort[columns] = np.maximum(effort[columns], np.abs(B.T @ answer.multipliers[constraint.rows]))
-    largest = np.zeros(compulsion.structure.n_bodies)
-    for constraint, A_blocks, B_blocks in blocks:
-        forces = [answer.multipliers[constraint.rows]]
-        forces += [B @ effort[columns] for columns, B in zip(constraint.columns, B_blocks, strict=True)]
-        for body, A in zip(constraint.bodies, A_blocks, strict=True):
-            Phi = compulsion.Phi[6 * body : 6 * body + 6]
-            alone = [np.divide(A.T @ force, Phi, out=np.zeros(6), where=Phi > 0) for force in forces]
-            largest[body] = max(largest[body], *(_length(a, lengths[body : body + 1])[0] for a in alone))
-    return largest
-
-
-def _carried(compulsion: Compulsion, size: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+def _carried(compulsion: Compulsion, size: np.ndarray) -> np.ndarray:
     """Acceleration (p,) of each joint coordinate that moves the bodies of its joint as fast as they accelerate."""
-    needed = np.zeros(compulsion.P.size)
-    for constraint, A_blocks, B_blocks in compulsion.blocks:
-        if not constraint.bodies or constraint.rows.stop - constraint.rows.start != 6:
-            continue
-        for columns, B in zip(constraint.columns, B_blocks, strict=True):
-            turn, slide = np.linalg.norm(B[:3], axis=0), np.linalg.norm(B[3:], axis=0)
-            for body, A in zip(constraint.bodies, A_blocks, strict=True):
-                lever = np.linalg.norm(A[3:, :3], 2)  # of the joint point about the centre of mass
-                reach = np.hypot(lengths[body], lever) * turn + slide
-                moved = np.divide(size[body], reach, out=np.zeros_like(reach), where=reach > 0)
-                needed[columns] = np.maximum(needed[columns], moved)
+    needed, (coordinates, bodies, reach) = np.zeros(compulsion.P.size), compulsion.reaches
+    moved = np.divide(size[bodies], reach, out=np.zeros_like(reach), where=reach > 0)
+    np.maximum.at(needed, coordinates, moved)
     return needed
-
-
-def gyration(Phi: np.ndarray) -> np.ndarray:
-    """Radius of gyration of each body [m]; 1 m for a body without mass."""
-    parts = Phi.reshape(-1, 6)
-    mass = parts[:, 3]
-    mean = parts[:, :3].sum(axis=1) / 2
-    return np.sqrt(np.divide(mean, mass, out=np.ones_like(mass), where=mass > 0))
 
 
 def _length(a: np.ndarray, lengths: np.ndarray) -> np.ndarray:

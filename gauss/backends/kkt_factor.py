@@ -9,6 +9,7 @@ round-off it bounds what they may hide.
 
 from abc import ABC, abstractmethod
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,7 +19,16 @@ from gauss.backends.solution import Answer
 Correction = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # what is subtracted from (a, q̈, λ, μ of active rows)
 EPSILON = float(np.finfo(float).eps)
 RANDOM_ROUNDINGS = 8  # number of random residuals of the size of round-off
+KEPT_SIZES = 32  # sizes of problems whose random roundings are kept
 ROUNDING_MARGIN = 4.0  # times the root mean square of their effects: a bound of the effect of one rounding
+
+
+@lru_cache(maxsize=KEPT_SIZES)
+def _noise(size: int) -> np.ndarray:
+    """Random roundings (size, :data:`RANDOM_ROUNDINGS`) of numbers of size 1, the same each time; read-only."""
+    noise = EPSILON * np.random.default_rng(0).uniform(-1.0, 1.0, (size, RANDOM_ROUNDINGS))
+    noise.flags.writeable = False
+    return noise
 
 
 class KKTFactor(ABC):
@@ -101,8 +111,7 @@ class KKTFactor(ABC):
         G, h = compulsion.G[self.active], compulsion.h[self.active]
         r4 = np.abs(G) @ np.abs(np.concatenate([answer.a, answer.qdd])) + np.abs(h)
         sizes = np.cumsum([r1.size, r2.size, r3.size])
-        noise = EPSILON * np.random.default_rng(0).uniform(-1.0, 1.0, (sizes[-1] + r4.size, RANDOM_ROUNDINGS))
-        parts = zip((r1, r2, r3, r4), np.split(noise, sizes), strict=True)
+        parts = zip((r1, r2, r3, r4), np.split(_noise(int(sizes[-1]) + r4.size), sizes), strict=True)
         changes = self.solve_columns(*(size[:, None] * share for size, share in parts))
         a, qdd, multipliers, mu = (ROUNDING_MARGIN * np.sqrt((change**2).mean(axis=1)) for change in changes)
         return a, qdd, multipliers, mu

@@ -1,4 +1,4 @@
-"""What is asked of a QP solver in the comparison: tolerances and limits, and apart from those the defaults of the solver.
+"""Tolerances and limits of QP solvers in the comparison; all other settings are the defaults of the solver.
 
 The tolerances are those of qpbenchmark (Caron et al. 2023), a test holds it: absolute ones of the residuals and of the
 duality gap, relative ones of zero. What qpbenchmark does not set is listed in :data:`BEYOND`. Nothing is tuned for any

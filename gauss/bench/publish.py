@@ -1,4 +1,4 @@
-"""The tables of the comparison turned into its reports and charts."""
+"""Reports and charts of the comparison, from its tables."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a solver says of a programme that has no solution, in its own words, and whether that is true."""
+"""Verdicts of solvers on programmes without a solution, read from their status texts, and whether they are true."""
 
 import re
 
@@ -12,7 +12,7 @@ DOUBTFUL = re.compile(r"almost|inaccurate|close|max|limit|trouble")  # words by 
 
 
 def said(reason: str) -> str:
-    """Verdict in the words of a solver: "infeasible", "unbounded", or "" where there is none or it may be either."""
+    """Verdict by the status text of a solver: "infeasible", "unbounded", or "" where there is none or it may be either."""
     words = reason.lower()
     if DOUBTFUL.search(words):
         return ""

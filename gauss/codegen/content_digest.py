@@ -30,6 +30,8 @@ BY_NAME = (PACKAGE, "numpy", "math", "cmath", "operator", "builtins")  # package
 # built-in functions by which code may depend on more than its constants, globals and arguments
 OPAQUE_BUILTINS = {"__import__", "eval", "exec", "globals", "input", "locals", "open", "vars"}
 IMPORTS = {dis.opmap["IMPORT_NAME"]}
+# kinds of Python's own objects, which have no name by which they are found
+PYTHON_KINDS = {FunctionType, MethodType, BuiltinFunctionType, CodeType, ModuleType, NoneType}
 IS_CONTENT = "is_content"  # metadata of a field of a record: False if results do not depend on it
 CODE_FIELDS: tuple[str, ...] = (
     "co_code",
@@ -65,6 +67,7 @@ class _Encoder:
         self.enclosing: dict[int, int] = {}  # address of each object that contains the present one → its depth
         self.functions: dict[int, int] = {}  # address of each traced function encoded so far → its number
         self.names: dict[int, bytes] = {}  # address of each named object encoded so far → its name
+        self.codes: dict[int, int] = {}  # address of each code object encoded so far → its number
 
     def encode(self, thing):
         """Append the encoding of an object.
@@ -127,7 +130,7 @@ def _refused(_: _Encoder, thing):
 def _tuple(encoder: _Encoder, thing):
     if type(thing) is not tuple:
         _named(encoder, type(thing))
-    if thing and all(type(part) is float for part in thing):
+    if set(map(type, thing)) == {float}:
         encoder.parts.append(b"v%d:" % len(thing) + struct.pack(f"<{len(thing)}d", *thing))
     else:
         encoder.sequence(b"t", thing)
@@ -196,7 +199,9 @@ def _named(encoder: _Encoder, thing):
 
 
 def _has_name(thing) -> bool:
-    """Whether an object is found under its own name in such a package."""
+    """Whether an object is found under its own name in such a package, or has a name that no other of them has."""
+    if isinstance(thing, type) and thing in PYTHON_KINDS:
+        return True
     module = getattr(thing, "__module__", None) or ""
     if module.partition(".")[0] not in BY_NAME:
         return False
@@ -248,6 +253,10 @@ def _content(cell) -> tuple:
 
 
 def _code(encoder: _Encoder, code: CodeType):
+    if id(code) in encoder.codes:
+        encoder.parts.append(b"K%d;" % encoder.codes[id(code)])
+        return
+    encoder.codes[id(code)] = len(encoder.codes)
     if not IMPORTS.isdisjoint(code.co_code[::2]) or not OPAQUE_BUILTINS.isdisjoint(code.co_names):
         _refused(encoder, code)
     encoder.sequence(b"k", [getattr(code, name) for name in CODE_FIELDS])
@@ -265,7 +274,9 @@ def _traced(encoder: _Encoder, function: Function):
     inputs = [place.get(symbol, -1) for symbol in function.inputs]
     encoder.sequence(b"G", (function.name, function.parameters, inputs, ends, len(place)))
     for node in place:
-        encoder.sequence(b"x", (node.op, node.value, [place[x] for x in node.operands]))
+        operands = ",".join([str(place[x]) for x in node.operands])
+        encoder.parts.append(b"x%s%s;" % (_text(node.op), operands.encode()))
+        encoder.encode(node.value)
 
 
 # kinds, their encoding, and whether a subclass is refused, since it may hold more

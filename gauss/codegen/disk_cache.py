@@ -21,7 +21,7 @@ from gauss.codegen.package_digest import package_digest
 T = TypeVar("T")
 
 
-def from_disk(content: tuple, make: Callable[[], T]) -> T:
+def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None) -> T:
     """Object made from a content, from the cache on disk if it is there.
 
     Parameters
@@ -30,8 +30,10 @@ def from_disk(content: tuple, make: Callable[[], T]) -> T:
         All that the object depends on, first its maker. What has no digest is made anew by every process.
     make : callable
         () → the object. Machine code in it is of type :class:`gauss.codegen.machine.MachineCode`.
+    first : bytes, optional
+        Digest that the first object of the content had before. What is made is kept only if it has it still.
     """
-    name = _name(content)
+    name = _name(content, first)
     if name is None:
         return make()
     found = _read(name, content)
@@ -42,12 +44,12 @@ def from_disk(content: tuple, make: Callable[[], T]) -> T:
     return found
 
 
-def _name(content: tuple) -> str | None:
+def _name(content: tuple, first: bytes | None = None) -> str | None:
     """Name of an entry in the cache; None if the content has no digest, or nothing is cached."""
     if object_cache.folder() is None:
         return None
-    own, package = content_digest(*content), package_digest()
-    return None if own is None or package is None else "made-" + hashlib.sha256(own + package).hexdigest()
+    parts = first or content_digest(content[0]), content_digest(*content[1:]), package_digest()
+    return None if None in parts else "made-" + hashlib.sha256(b"".join(parts)).hexdigest()
 
 
 def _read(name: str, content: tuple):

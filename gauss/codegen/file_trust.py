@@ -18,7 +18,7 @@ from gauss.errors import CacheWarning
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 OTHERS_ANY = stat.S_IRWXG | stat.S_IRWXO
 KEY_FILE = "key"
-PARTIAL = "partial-"  # begin of the names of incomplete files
+PARTIAL = "partial-"  # start of the names of incomplete files
 KEY_BYTES = 32  # length of a key, that of the digest
 HAS_OWNERS = hasattr(os, "getuid")
 OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)

@@ -13,7 +13,7 @@ from gauss.codegen.tiers import Run
 
 SLOW = 1.0  # a line appears where code is made for longer than this [s]
 TEXT = "gauss: making machine code …"
-CLEARED = "\r\x1b[K"  # begin of the line, all erased
+CLEARED = "\r\x1b[K"  # start of the line, all erased
 
 _is_making: ContextVar[bool] = ContextVar("is making", default=False)
 _lock = Lock()

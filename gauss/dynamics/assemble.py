@@ -111,7 +111,8 @@ def _state_residual(motion: Kinematics, compulsion: Compulsion) -> Scalar:
 
 
 def _largest(values) -> Scalar:
-    return reduce(math.maximum, np.abs(values), 0.0)
+    sizes = np.abs(values)
+    return reduce(math.maximum, sizes, 0.0) if sizes.dtype == object else np.fmax.reduce(sizes, initial=0.0)
 
 
 def closure_distances(motion: Kinematics) -> np.ndarray:
@@ -144,7 +145,7 @@ def impressed(motion: Kinematics, applied: Applied) -> np.ndarray:
 def position_residual(motion: Kinematics) -> np.ndarray:
     """Position residual φ (r,) of all constraints [rad, m]; zero for tree joints and velocity rows."""
     system, constraints = motion.system, motion.system.structure.constraints
-    phi = np.zeros(system.structure.n_rows)
+    phi: np.ndarray = np.zeros(system.structure.n_rows)
     for index in system.structure.closures:
         rows = constraints[index].rows
         name = constraints[index].name

@@ -1,12 +1,14 @@
 """Contact terms of a time step, in machine code: gap functions, tangential and slip rates, u = J q̇, u̇ = J q̈ + J̇ q̇."""
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Kernel, forward, jacobian, write
+from gauss.codegen import Function, Kernel, forward, jacobian, write
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.store import cached_on_disk
 from gauss.system import State, System, coordinate_rates, guards, sides
 from gauss.system.build import slips
 from gauss.system.relations import place_residuals
@@ -56,13 +58,18 @@ class ContactTermsKernel:
             motion = kinematics(system, State(t[0], q, v))
             found = watched.values(motion)
             width, rate = found[:m], found[m:]
-            apart = guarded.values(motion)[: len(whole)] if whole else []
+            apart: Iterable = guarded.values(motion)[: len(whole)] if whole else ()
             bias = forward(rate, [*t, *q], [1.0, *coordinate_rates(system, q, v)])
             return [[*width, *apart, *rate, *jacobian(rate, v).ravel(), *bias]]
 
-        self.function = write(flat, 1, system.n_q, self.n_v, name="touching")
+        self.system, self.trace = system, lambda: write(flat, 1, system.n_q, self.n_v, name="touching")
         n = len(watched.function.outputs) - m
         self.parts = np.cumsum([m, len(whole), n, n * self.n_v])
+
+    @cached_property
+    def function(self) -> Function:
+        """Traced function (t, q, v) → contact terms."""
+        return self.trace()
 
     @property
     def operations(self) -> int:
@@ -72,7 +79,8 @@ class ContactTermsKernel:
     @cached_property
     def kernel(self) -> Kernel:
         """Machine code."""
-        return Kernel(self.function, batch=False)
+        make = lambda: Kernel(self.function, batch=False)  # noqa: E731
+        return cached_on_disk(self.system, (ContactTermsKernel,), make)
 
     def __call__(self, state: State) -> ContactTerms:
         """Contact terms of a state."""

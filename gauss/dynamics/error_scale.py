@@ -11,7 +11,7 @@ from gauss.dynamics.conditions import is_large, obstacles
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
-from gauss.dynamics.store import cached
+from gauss.dynamics.store import cached, cached_on_disk
 from gauss.errors import GaussError
 from gauss.scene import Spring
 from gauss.system import State, System, rate_units, retract
@@ -37,7 +37,9 @@ def acceleration_scale(system: System) -> float:
     def made() -> float:
         scale, gravity = system.scale, float(np.linalg.norm(system.scene.gravity))
         least = LEAST_SHARE_OF_GRAVITY * gravity / scale.length + LEAST_ACCELERATION / scale.time**2
-        return max(least, ROUNDOFF_TERMS * spring_roundoff(system) / ACCELERATION_TOLERANCE)
+        springs = any(isinstance(bound.load, Spring) for bound in system.loads)
+        roundoff = cached_on_disk(system, (spring_roundoff,), lambda: spring_roundoff(system)) if springs else 0.0
+        return max(least, ROUNDOFF_TERMS * roundoff / ACCELERATION_TOLERANCE)
 
     return cached(system, (acceleration_scale,), made)
 

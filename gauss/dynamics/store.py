@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
-from gauss.codegen import compile_notice, from_disk, gc_pause
+from gauss.codegen import compile_notice, content_digest, from_disk, gc_pause
 from gauss.system import System
 
 T = TypeVar("T")
@@ -35,14 +35,17 @@ class Store:
         make : callable
             () → the entry.
         """
-        if key not in self._made:
-            with self._lock:
-                being_made = self._being_made.setdefault(key, RLock())
-            with being_made:  # a lock for each key: making one entry may request others
-                if key not in self._made:
-                    with gc_pause(), compile_notice():
-                        self._made[key] = make()
-                    self._being_made.pop(key, None)
+        found = self._made.get(key, self)  # the key is hashed once; no entry is the store itself
+        return self._make(key, make) if found is self else found
+
+    def _make(self, key: Key, make: Callable[[], T]) -> T:
+        with self._lock:
+            being_made = self._being_made.setdefault(key, RLock())
+        with being_made:  # a lock for each key: making one entry may request others
+            if key not in self._made:
+                with gc_pause(), compile_notice():
+                    self._made[key] = make()
+                self._being_made.pop(key, None)
         return self._made[key]
 
 
@@ -76,4 +79,5 @@ def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> 
     *beside
         What else the entry depends on, where the system is a part of another.
     """
-    return cached(system, key, lambda: from_disk((system, *key, *beside), make))
+    digest = lambda: cached(system, (content_digest,), lambda: content_digest(system))  # noqa: E731
+    return cached(system, key, lambda: from_disk((system, *key, *beside), make, digest()))

@@ -122,8 +122,8 @@ class CounterRotors(NamedTuple):
 def counter_rotors(chain: Chain, links: tuple[str, ...]) -> CounterRotors:
     """Counter-rotating discs on links pivoted on the ground that leave the least shaking moment (least squares over a turn).
 
-    The moment means something once the forces are balanced; a force-balanced four-bar whose coupler is a physical pendulum
-    is then balanced entirely (Berkof 1973).
+    The moment does not depend on its reference point once the forces are balanced; a force-balanced four-bar whose coupler
+    is a physical pendulum is then balanced entirely (Berkof 1973).
     """
     from scipy.optimize import nnls  # takes long to import, and few need it
 

@@ -82,7 +82,7 @@ def _of_groups(reduced: ReducedNetwork, old: Mode, new: Mode) -> Kinds:
 
 
 def _of_torques(reduced: ReducedNetwork, old: Mode, new: Mode) -> Kinds:
-    """Begin and end of torques."""
+    """Start and end of torques."""
     for term, was, now in zip(reduced.terms, old.gate, new.gate, strict=True):
         if was != now:
             yield "switch", term.name

@@ -1,6 +1,6 @@
 """Event location: the first zero of a margin in a step, refined by steps that end there, and the phase beyond it.
 
-The zero is found on the dense output (Brent's method), the state by a step of its own from the begin of the step; Newton's
+The zero is found on the dense output (Brent's method), the state by a step of its own from the start of the step; Newton's
 method on the margin corrects the time, since the dense output is less accurate than a step.
 """
 
@@ -36,20 +36,20 @@ def land(
     before: np.ndarray,
     negative,
 ) -> None:
-    """Step from the begin of a step to the first margin that becomes negative, and find the new phase.
+    """Step from the start of a step to the first margin that becomes negative, and find the new phase.
 
     Parameters
     ----------
     run : RotorRun
-        The run, at the begin of the step.
+        The run, at the start of the step.
     kind : type
         Integrator.
     dense : callable
         Dense output of the step.
     begin, until : float
-        Begin of the step, and a time at which margins are negative [s].
+        Start of the step, and a time at which margins are negative [s].
     keys, before : list, ndarray
-        Names of the margins, and their values at the begin.
+        Names of the margins, and their values at the start.
     negative : ndarray of int
         Indices of the negative margins.
 

@@ -1,7 +1,7 @@
-"""Margins of a mode: quantities that are positive while the mode is right, each over its own scale.
+"""Margins of a mode: quantities that are positive while the mode holds, each over its own scale.
 
 Power flow of lossy links, slip of dry links, gap function of backlash sides, direction of groups with friction, torque
-reserve of what sticks, and the indicators, which only report events.
+reserve of the locks, and the indicators, which only report events.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _gaps(phase: NetworkPhase, t: float, angle: np.ndarray, speed: np.ndarray) -
 
 
 def _reserves(phase: NetworkPhase, t: float, found: NetworkInstant, torques: np.ndarray, scale: float) -> Margins:
-    """Torque reserve of what sticks."""
+    """Torque reserve of the locks."""
     reserves = []
     for lock, torque in zip(phase.locks, torques, strict=True):
         if lock.kind == "group":

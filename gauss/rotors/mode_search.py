@@ -1,7 +1,7 @@
 """Mode search: sticking or slipping, backlash sides and directions of power flow that are consistent at one instant.
 
-Positions and speeds fix what they can; sticking follows from a linear complementarity problem (projected Gauss–Seidel),
-directions of power from the sign of the torques; the two alternate until the mode repeats (fixed point).
+Positions and speeds determine a part of the mode; sticking follows from a linear complementarity problem (projected
+Gauss–Seidel), directions of power from the sign of the torques; the two alternate until the mode repeats (fixed point).
 """
 
 from dataclasses import replace
@@ -86,7 +86,7 @@ def _standing(phase: NetworkPhase) -> NetworkPhase:
 
 
 def _kinematic(equations: NetworkEquations, t: float, theta, speed, small: float, previous, fired) -> tuple[Mode, list[int]]:
-    """Mode as far as positions and speeds decide it, and the links that may stick."""
+    """Part of the mode that positions and speeds determine, and the links that may stick."""
     reduced = equations.reduced
     gate = active(reduced.terms, t)
     dry_limit = np.array([sum(x.law.value for x in torques if x.active(t)) for torques in reduced.dry.values()])

@@ -1,4 +1,4 @@
-"""The motion of a network: samples, events, energies."""
+"""Motion of a rotor network: samples, events, energies."""
 
 from dataclasses import dataclass
 
@@ -43,12 +43,12 @@ class RotorEnergy:
 
     @property
     def balance(self) -> np.ndarray:
-        """What is missing (k,): input − useful − heat − kinetic − elastic."""
+        """Residual of the energy balance (k,): input − useful − heat − kinetic − elastic."""
         return self.input - self.useful - self.heat - self.kinetic - self.elastic
 
     @property
     def scale(self) -> float:
-        """What the balance should be compared with: the largest of all these energies."""
+        """Scale of the balance: the largest of all these energies."""
         return max(np.abs(getattr(self, key)).max() for key in self.__dataclass_fields__)
 
 
@@ -133,7 +133,7 @@ class RotorMotion:
         return self.torques[:, self._link(link)]
 
     def slip(self, link) -> np.ndarray:
-        """Slip (k,) 1 − i ω_driven/ω_driver of a link (III.73); not a number while the driver is at rest."""
+        """Slip (k,) 1 − i ω_driven/ω_driver of a link (III.73); NaN while the driver is at rest."""
         b = self._link(link)
         v_d = self.speeds[:, self.reduced.driver[b]]
         v = self.reduced.links[b].ratio * self.speeds[:, self.reduced.driven[b]]

@@ -1,4 +1,4 @@
-"""A network in one mode: smooth differential equations with the torques of what sticks.
+"""Network in one mode: smooth differential equations with the torques of its locks.
 
 What sticks (a link, or a group by its friction) is a lock: a row R of the speeds and a column H of accelerations for its
 unit torque. Its torques λ follow from R (a + Hᵀ λ) = 0.
@@ -22,7 +22,7 @@ REDUNDANT_LOCK = 1e-13  # singular value, relative to the largest, of locks that
 
 
 class Lock(NamedTuple):
-    """Something that sticks: the slip rate u = row · w is zero by a torque within bounds.
+    """Sticking link or group: a torque within bounds keeps the slip rate u = row · w at zero.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class NetworkPhase:
         return self._factors[1]
 
     def lock(self, kind: str, index: int) -> Lock:
-        """Row and column of something that can stick."""
+        """Row and column of a link or group that can stick."""
         reduced, (F, J) = self.reduced, self._factors
         row, column = np.zeros(reduced.n_groups), np.zeros(reduced.n_groups)
         if kind == "group":
@@ -150,7 +150,7 @@ class NetworkPhase:
         return max(sizes) or 1.0
 
     def link_torques(self, found: NetworkInstant) -> np.ndarray:
-        """Q_em (n_l,) [N m]; where they are not unique, of power loops and of trains stuck at rest, a definite choice."""
+        """Q_em (n_l,) [N m]; one admissible set where power loops, or trains stuck at rest, leave them undetermined."""
         torque = self.reduced.split(found.torque).copy()
         for lock in self.locks:
             if lock.kind == "group":

@@ -217,7 +217,7 @@ class RotorRun:
             raise SimulationError(not_finite(self.t, message or "not finite"))
 
     def _refused(self, begin: float, end: float, dense) -> bool:
-        """Whether a step is refused, for a law that switches in it; a discontinuity at its begin is crossed."""
+        """Whether a step is refused, for a law that switches in it; a discontinuity at its start is crossed."""
         share, jump = resolved_share(self, begin, end, dense)
         if jump is not None and jump - self.t <= HOP_RESOLUTIONS * self.switching.finest:
             self._hop(min(jump + self.switching.finest, end))

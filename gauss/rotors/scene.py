@@ -158,7 +158,7 @@ def _dry_limit(torque: Torque, limit: float) -> float | Callable:
 
 
 def _gated(torque: Torque, law: Callable) -> Callable:
-    """Law (t, …) that is zero before the begin of a torque and from its end on."""
+    """Law (t, …) that is zero before the start of a torque and from its end on."""
 
     def gated(t, *where):
         value = law(t, *where)

@@ -13,7 +13,7 @@ class StepEnd(NamedTuple):
     Attributes
     ----------
     before, after : float
-        End of the step, and begin of the next one [s]: a few units in the last place apart at a switching time of a law, so
+        End of the step, and start of the next one [s]: a few units in the last place apart at a switching time of a law, so
         that no evaluation falls upon it.
     switches : bool
         Whether torques may be discontinuous there.

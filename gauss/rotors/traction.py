@@ -172,7 +172,7 @@ def as_curve(given: Any, what: str) -> Curve:
     Raises
     ------
     SceneError
-        If it is none of these.
+        If it has none of these forms.
     """
     if isinstance(given, Curve):
         return given

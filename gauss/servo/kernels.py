@@ -12,7 +12,7 @@ from gauss.dynamics.traced_system import applied_loads
 from gauss.servo.actuators import push
 from gauss.servo.instant import ServoInstant
 from gauss.servo.observed import MotionSymbols, body_inputs, body_symbols
-from gauss.servo.rows import Scalar, ServoRows, rows, scalars
+from gauss.servo.rows import ScalarRelation, ServoRows, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.system import State, System
 
@@ -94,7 +94,7 @@ class BodyRows:
 class TreeRows:
     """Rows G q̈ = γ of some relations in tree coordinates, and directions of the efforts."""
 
-    def __init__(self, servo: Servo, found: list[Scalar]):
+    def __init__(self, servo: Servo, found: list[ScalarRelation]):
         symbols = servo.symbols
         self.kernel = ShapedKernel(symbols.inputs, [*rows(found, symbols), directions(servo, symbols)])
 
@@ -107,7 +107,7 @@ class TreeRows:
 class EffortResponses:
     """Instants by machine code, of systems that are not :func:`untraceable`."""
 
-    def __init__(self, servo: Servo, found: list[Scalar]):
+    def __init__(self, servo: Servo, found: list[ScalarRelation]):
         self.system, laws = servo.system, Laws(servo.system)
         self.called = laws.called
         symbols = servo.symbols
@@ -134,12 +134,12 @@ def body_rows(servo: Servo) -> BodyRows:
     return servo.made((BodyRows,), lambda: BodyRows(servo))
 
 
-def tree_rows(servo: Servo, found: tuple[Scalar, ...]) -> TreeRows:
+def tree_rows(servo: Servo, found: tuple[ScalarRelation, ...]) -> TreeRows:
     """Rows in tree coordinates of these relations; compiled at the first call."""
     return servo.made((TreeRows, found), lambda: TreeRows(servo, list(found)))
 
 
-def responses(servo: Servo, found: tuple[Scalar, ...]) -> EffortResponses:
+def responses(servo: Servo, found: tuple[ScalarRelation, ...]) -> EffortResponses:
     """Rows and responses of these relations; compiled at the first call."""
     return servo.made((EffortResponses, found), lambda: EffortResponses(servo, list(found)))
 

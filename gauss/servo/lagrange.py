@@ -21,7 +21,7 @@ from gauss.rotations import cross
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.observed import MotionSymbols
 from gauss.servo.relation import as_relations
-from gauss.servo.rows import Scalar, rows, scalars
+from gauss.servo.rows import ScalarRelation, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, System, whole
@@ -194,7 +194,7 @@ def generalised_forces(symbols: MotionSymbols, effort) -> np.ndarray:
     return Q
 
 
-def contact_scalars(servo: Servo) -> list[Scalar]:
+def contact_scalars(servo: Servo) -> list[ScalarRelation]:
     """Constraints of the scene beyond joints and couplings, and relations that contacts keep."""
     motion = servo.symbols.motion
     of_scene = [r for c in servo.system.scene.relations.values() for r in as_relations(c, motion, ideal=True)]

@@ -15,7 +15,7 @@ from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SceneError
 from gauss.servo.kernels import ShapedKernel, accelerations, directions
-from gauss.servo.rows import Scalar, rows
+from gauss.servo.rows import ScalarRelation, rows
 from gauss.servo.servo import Servo
 from gauss.system import State, retract
 
@@ -39,7 +39,7 @@ class RelationPlan(NamedTuple):
         Highest relative degree.
     """
 
-    scalars: tuple[Scalar, ...]
+    scalars: tuple[ScalarRelation, ...]
     active: tuple[int, ...]
     degree: int
 
@@ -114,7 +114,7 @@ def _check(servo: Servo):
         raise NoReductionError(f"the equations of motion cannot be differentiated further: {'; '.join(against)}.")
 
 
-def _free_of_efforts(servo: Servo, found: list[Scalar], samples) -> list:
+def _free_of_efforts(servo: Servo, found: list[ScalarRelation], samples) -> list:
     """Rows without efforts after elimination from G q̈ = γ: (row, ψ, size of its terms at the samples)."""
     system, symbols = servo.system, servo.symbols
     effort = symbols.t.graph.symbols("P", system.n_v)
@@ -151,7 +151,7 @@ def _free_of_efforts(servo: Servo, found: list[Scalar], samples) -> list:
     return [(row, b[row], b_sizes[:, row]) for row in waiting]
 
 
-def _hidden(servo: Servo, name: str, psi, size, samples) -> Scalar:
+def _hidden(servo: Servo, name: str, psi, size, samples) -> ScalarRelation:
     """Hidden relation ψ = 0, of positions if rates do not matter in it."""
     system, symbols = servo.system, servo.symbols
     name = f"{HIDDEN}{name.removeprefix(HIDDEN)}"
@@ -167,7 +167,7 @@ def _hidden(servo: Servo, name: str, psi, size, samples) -> Scalar:
         return max(abs(float(kernel(_inputs(s))[0][0] - kernel(_inputs(other(s)))[0][0])) for s in samples) / size.max()
 
     if change(lambda s: State(s.t, s.q, -2.0 * s.v)) > TERM_ROUNDING:
-        return Scalar(name, psi, "velocity")
+        return ScalarRelation(name, psi, "velocity")
     psi = substitute([psi], symbols.velocities, np.zeros(system.n_v))[0]
     kernel = ShapedKernel(symbols.inputs, [np.array([psi], dtype=object)])
     others = dict(zip(map(id, samples), samples[1:] + samples[:1], strict=True))
@@ -175,7 +175,7 @@ def _hidden(servo: Servo, name: str, psi, size, samples) -> Scalar:
         raise NoReductionError(
             f"no effort acts on relation {name.removeprefix(HIDDEN)!r}: its acceleration is one of gravity and time alone."
         )
-    return Scalar(name, psi, "position")
+    return ScalarRelation(name, psi, "position")
 
 
 def _inputs(state: State) -> np.ndarray:

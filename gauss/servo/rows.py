@@ -14,7 +14,7 @@ from gauss.servo.observed import MotionSymbols
 from gauss.servo.relation import ServoRelation
 
 
-class Scalar(NamedTuple):
+class ScalarRelation(NamedTuple):
     """Scalar entry of a relation, in symbols."""
 
     name: str
@@ -44,7 +44,7 @@ class ServoRows(NamedTuple):
     gamma: np.ndarray
 
 
-def scalars(relations, symbols: MotionSymbols) -> list[Scalar]:
+def scalars(relations, symbols: MotionSymbols) -> list[ScalarRelation]:
     """Entries of relations, by calling each residual once with symbols.
 
     Raises
@@ -55,7 +55,7 @@ def scalars(relations, symbols: MotionSymbols) -> list[Scalar]:
     return [scalar for relation in relations for scalar in _scalars(relation, symbols)]
 
 
-def _scalars(relation: ServoRelation, symbols: MotionSymbols) -> list[Scalar]:
+def _scalars(relation: ServoRelation, symbols: MotionSymbols) -> list[ScalarRelation]:
     what = f"relation {relation.name!r}"
     try:
         value = np.ravel(np.asarray(branches(lambda: relation.residual(symbols.t, symbols.motion)), dtype=object))
@@ -69,7 +69,7 @@ def _scalars(relation: ServoRelation, symbols: MotionSymbols) -> list[Scalar]:
     names = [relation.name] if value.size == 1 else [f"{relation.name}[{k}]" for k in range(value.size)]
     for name, entry in zip(names, value, strict=True):
         _check(name, entry, relation.level, symbols)
-    return [Scalar(name, entry, relation.level, relation.ideal) for name, entry in zip(names, value, strict=True)]
+    return [ScalarRelation(name, entry, relation.level, relation.ideal) for name, entry in zip(names, value, strict=True)]
 
 
 def _check(name: str, entry, level: str, symbols: MotionSymbols) -> None:
@@ -103,7 +103,7 @@ def _constant(entry: Expression, symbols: list[Expression]) -> bool:
     return all(slope.is_constant and slope.value == 0 for slope in jacobian([entry], symbols).ravel())
 
 
-def rows(found: list[Scalar], symbols: MotionSymbols) -> ServoRows:
+def rows(found: list[ScalarRelation], symbols: MotionSymbols) -> ServoRows:
     """Rows of scalar relations, in the symbols.
 
     Raises

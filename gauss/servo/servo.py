@@ -13,7 +13,7 @@ from gauss.scene import Scene, values
 from gauss.servo.actuators import Cable, efforts
 from gauss.servo.observed import MotionSymbols, tree_symbols
 from gauss.servo.relation import ServoRelation, as_relations
-from gauss.servo.rows import Scalar, scalars
+from gauss.servo.rows import ScalarRelation, scalars
 from gauss.system import System
 
 
@@ -32,7 +32,7 @@ class Servo:
         Forces of the servos.
     weights : dict, optional
         Weight of each effort, by its name, where there are more efforts than relations: the sum of
-        weight · (effort − preload)² is made least. 1 when not given.
+        weight · (effort − preload)² is minimised. 1 when not given.
     preload : dict, optional
         Effort from which that sum is measured, by name [N, N m]; 0 when not given.
 
@@ -107,7 +107,7 @@ class Servo:
         return tree_symbols(self.system)
 
     @cached_property
-    def scalars(self) -> tuple[Scalar, ...]:
+    def scalars(self) -> tuple[ScalarRelation, ...]:
         """Entries of all relations: those of contacts first, then those of servos."""
         ordered = [*(x for x in self.relations if x.ideal), *(x for x in self.relations if not x.ideal)]
         return tuple(scalars(ordered, self.symbols))

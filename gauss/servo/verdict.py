@@ -1,4 +1,4 @@
-"""Realisability of servo-constraints at one instant: rank of S = G N H_N⁻¹ Nᵀ Wᵀ, relations and efforts that clash."""
+"""Realisability of servo-constraints at one instant: rank of S = G N H_N⁻¹ Nᵀ Wᵀ; relations and efforts in contradiction."""
 
 from dataclasses import dataclass
 

@@ -4,10 +4,8 @@ import numpy as np
 
 from gauss import integrators
 from gauss.backends import Backend, ready
-from gauss.codegen import from_disk
 from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
-from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
@@ -16,6 +14,7 @@ from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
+from gauss.simulation.held_inputs import HeldInputs
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
@@ -52,11 +51,11 @@ def checked_problem(
         made = ready(backend)
         backend = backend if isinstance(backend, str) else made
     system = scene if isinstance(scene, System) else compile_scene(scene)
-    check_arguments(duration, integrator, step, rtol, atol)
+    method = check_arguments(duration, integrator, step, rtol, atol)
     refuse_changed(system)
     start = _start(system) if state is None else system.projected(state)
     samples = sample_times(times, start.t, duration)
-    method, known_breaks = chosen(integrator), check_breaks(breaks, start.t, duration)
+    known_breaks = check_breaks(breaks, start.t, duration)
     constraint_drift, laws, end = drift(system, stabilisation, start), Laws(system), start.t + duration
     problem = Problem(
         system,
@@ -81,6 +80,15 @@ def checked_problem(
     return problem
 
 
+def held_inputs(problem: Problem, control, rate: float | None) -> HeldInputs | None:
+    """Inputs of a motion, as of :class:`gauss.simulation.held_inputs.HeldInputs`; None without a control law."""
+    if control is None:
+        if rate is not None:
+            raise SimulationError("rate: goes with control=, the law that is sampled.")
+        return None
+    return HeldInputs(problem.system, control, rate, problem.start.t, problem.end)
+
+
 def described(problem: Problem, duration: float, integrator: str | Integrator, rtol: float, atol) -> dict:
     """Settings of a motion by name, as its trajectory records them."""
     return {
@@ -91,6 +99,7 @@ def described(problem: Problem, duration: float, integrator: str | Integrator, r
         "atol": atol,
         "backend": named(problem.backend),
         "stabilisation": problem.stabilisation,
+        **({} if problem.held is None else {"rate": problem.held.rate}),
     }
 
 
@@ -104,19 +113,7 @@ def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.
 
 def _start(system: System) -> State:
     """Initial state of the scene, cached."""
-    return cached(system, (_start,), lambda: _assembled(system) if system.has_closures else system.initial_state())
-
-
-def _assembled(system: System) -> State:
-    """Initial state of a scene with loops, from disk unless there is something to be warned of."""
-    found: list[State] = []
-
-    def make():
-        found.append(system.initial_state())
-        return found[0], not violations(system, found[0])
-
-    state, is_met = from_disk((_assembled, system), make)
-    return state if found or is_met else system.initial_state()
+    return cached(system, (_start,), system.initial_state)
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
@@ -161,12 +158,19 @@ def chosen(integrator: str | Integrator) -> Integrator:
     return integrator
 
 
-def check_arguments(duration, integrator, step, rtol, atol):
-    """Raise a SimulationError if an argument of a simulation is invalid."""
+def check_arguments(duration, integrator, step, rtol, atol) -> Integrator:
+    """Integrator of a simulation.
+
+    Raises
+    ------
+    SimulationError
+        If an argument is invalid.
+    """
     method = chosen(integrator)
     check_tolerances(duration=duration, rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
     if isinstance(method, FixedStep) and step is None:
         raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
+    return method
 
 
 def sample_times(times, start: float, duration: float):

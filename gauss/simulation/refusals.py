@@ -14,7 +14,7 @@ def refuse(problem: Problem):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
     if problem.drift.partitioned and (isinstance(method, Library) or method.mechanical):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
-    nonsmooth, time_stepping = system.scene.nonsmooth, is_time_stepping(problem.question)
+    nonsmooth, time_stepping = system.nonsmooth, is_time_stepping(problem)
     if stabilisation != "projection" and (nonsmooth or time_stepping):
         raise SimulationError(
             f"stabilisation {stabilisation!r}: motions with unilateral constraints, friction, limited forces or time "

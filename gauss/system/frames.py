@@ -7,7 +7,7 @@ from gauss.errors import SceneError
 from gauss.scene import GROUND, Joint, Scene
 from gauss.scene.values import rotation_matrix
 
-SAME_POINT = 1e-9  # distance, relative to the coordinates of a point that is given twice, of typed digits
+SAME_POINT = 1e-9  # distance of two given positions of one point, relative to its coordinates: numbers with typed digits
 
 Pose = tuple[np.ndarray, np.ndarray]
 IDENTITY: Pose = (np.eye(3), np.zeros(3))

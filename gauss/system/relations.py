@@ -8,11 +8,12 @@ principal axes), C = A v + B q̇ − ċ. Where a = 0 and q̈ = 0 also Ẇ = 0 an
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Function, Graph, Kernel, forward, jacobian
+from gauss.codegen import Function, Graph, Kernel, forward, from_disk, jacobian
 from gauss.codegen.expression import reachable
 from gauss.errors import GaussError, SceneError, SimulationError
 from gauss.scene.values import is_scalar
@@ -73,7 +74,7 @@ class Relations:
     @cached_property
     def kernel(self) -> Kernel:
         """Machine code of all rows."""
-        return Kernel(self.function, batch=False)
+        return from_disk((Kernel, self.function), lambda: Kernel(self.function, batch=False))
 
     @cached_property
     def asks_time(self) -> bool:
@@ -99,15 +100,16 @@ class Relations:
         if not self.placed:
             return
         joints, start, values = view.system.joints, 0, self.values(view)
+        finite = values.dtype == object or bool(np.isfinite(values).all())
         for relation in self.placed:
             m = relation.size
             shapes = [(m, 6) for _ in relation.bodies] + [(m, joints[j].pair.n_v) for j in relation.joints] + [(m,)] * 3
             blocks = []
             for shape in shapes:
-                end = start + int(np.prod(shape))
+                end = start + prod(shape)
                 blocks.append(values[start:end].reshape(shape))
                 start = end
-            if values.dtype != object and not all(np.isfinite(block).all() for block in blocks):
+            if not finite and not all(np.isfinite(block).all() for block in blocks):
                 raise SimulationError(f"constraint {relation.name!r} has no finite value at t = {view.t:.6g} s.")
             n = len(relation.bodies)
             yield Rows(tuple(blocks[:n]), tuple(blocks[n:-3]), *blocks[-3:])

@@ -20,7 +20,7 @@ from gauss.scene import values
 from gauss.scene.stateful_laws import preserved
 
 LENGTH_FIELDS = ("at", "child_at", "other_at", "length", "radius", "crown", "on_radius", "size", "points")
-LEAST_CHANGE = 1e-9  # of a law, relative to its value at the begin: less is round-off
+LEAST_CHANGE = 1e-9  # of a law, relative to its value at the start: less is round-off
 SAMPLED_TIMES = 10.0 ** np.arange(-15, 16)  # s, of a law of unknown time scale
 
 
@@ -234,7 +234,7 @@ def _reaches(law, unit: float, order: int) -> float:
 
 
 def _quickest(law, unit: float) -> float:
-    """Largest mean rate of a law of time from its begin on, until it has gone by one unit."""
+    """Largest mean rate of a law of time from its start on, until it has gone by one unit."""
     begin, peak = _value(law, 0.0), 0.0
     for t in SAMPLED_TIMES:
         moved = _size(_value(law, t) - begin)

@@ -9,13 +9,16 @@ from enum import Enum
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from types import FunctionType
+from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, NoneType
 
 import numpy as np
 import pytest
 
 import gauss
 from gauss.codegen import Function, content_digest
+from gauss.dynamics.plan import method_key
+from gauss.integrators import Library
+from gauss.simulation.integrators import INTEGRATORS
 from gauss.system import System
 
 SHIPPED = sorted(import_module("gauss.io.catalog").shipped())
@@ -122,6 +125,36 @@ def test_every_leaf_of_every_element_is_in_the_key_to_the_last_place(name):
             assert content_digest(scene) != key
             named[name] = element
     assert content_digest(scene) == key
+
+
+def test_every_method_of_ours_has_a_key_of_its_own():
+    ours = {name: INTEGRATORS[name] for name in INTEGRATORS if not isinstance(INTEGRATORS[name], Library)}
+    keys = [content_digest(method_key(method)) for method in ours.values()]
+    assert None not in keys and len(set(keys)) == len(keys) > 10
+    kinds = [content_digest(kind) for kind in (FunctionType, MethodType, BuiltinFunctionType, CodeType, NoneType, int)]
+    assert None not in kinds and len(set(kinds)) == len(kinds)
+
+
+def test_a_change_of_any_operation_changes_the_key_of_a_function():
+    function = gauss.compile_scene(gauss.load("planetary_gears")).relations.function
+    key, operations = content_digest(function), [node for node in function.nodes if node.operands]
+    for node in operations[:: len(operations) // 20]:
+        for field, value in (("op", node.op + "x"), ("operands", node.operands[::-1] + node.operands), ("value", 0.5)):
+            kept = getattr(node, field)
+            setattr(node, field, value)
+            assert content_digest(function) != key, (node, field)
+            setattr(node, field, kept)
+    assert content_digest(function) == key
+
+
+def test_code_that_two_functions_share_is_told_from_other_code():
+    def twice(first, second):
+        return content_digest(first, second)
+
+    one, other = [_closing_over(factor) for factor in (2.0, 3.0)]
+    different = lambda t, motion: one(t, motion)  # noqa: E731
+    found = [twice(one, other), twice(one, one), twice(other, one), twice(one, different), twice(different, one)]
+    assert len(set(found)) == len(found) and twice(_closing_over(2.0), other) == found[0]
 
 
 def test_a_scene_has_one_key_in_all_processes():

@@ -7,6 +7,7 @@ import pytest
 
 import gauss
 from gauss.dynamics.assemble import position_residual
+from gauss.dynamics.initial_states import RESIDUAL_THRESHOLD
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import AssemblyError, InconsistentConstraintsWarning, SceneError, StateError
 from gauss.system import random_state
@@ -52,6 +53,29 @@ def test_the_step_is_the_least_in_the_mass_metric():
     change = momenta(found.v) - momenta(guess)
     direction = kinematics(system, allowed).quasi_velocities()
     assert abs(change @ direction) <= 1e-12 * np.abs(momenta(guess)).max()
+
+
+@pytest.mark.parametrize("name", ["four_bar", "cardan", "rolling_disk", "planetary_gears"])
+def test_a_state_that_meets_the_constraints_stays_as_it_is(name):
+    """By numpy first, then by machine code; a state off the constraints is projected by either."""
+    system = gauss.compile_scene(gauss.load(name))
+    met, rng = system.initial_state(), np.random.default_rng(0)
+    off = system.state(met.q, met.v + 1e-6 * rng.uniform(-1.0, 1.0, system.n_v))
+    goal = system.projected(off)
+    assert not np.array_equal(goal.v, off.v)
+    for _ in range(RESIDUAL_THRESHOLD + 2):
+        same, again = system.projected(met), system.projected(off)
+        assert np.array_equal(same.q, met.q) and np.array_equal(same.v, met.v)
+        assert np.array_equal(again.q, goal.q) and np.array_equal(again.v, goal.v)
+
+
+def test_who_writes_to_an_initial_state_changes_no_other():
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    first = system.initial_state()
+    kept = first.q.copy()
+    first.q[:] = 9.0
+    assert np.array_equal(system.initial_state().q, kept)
+    assert np.array_equal(gauss.simulate(system, 0.01, progress=False).q[0], kept)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0, 2.0, 4.0])

@@ -70,7 +70,7 @@ def test_implicit_steps_see_it_too():
 
 @pytest.mark.slow
 def test_fixed_steps_end_where_a_reference_begins():
-    """Steps of 0.07 s do not fall upon the begin; the force of the scene jumps there, and rk4 is exact for it."""
+    """Steps of 0.07 s do not fall upon the start; the force of the scene jumps there, and rk4 is exact for it."""
     held = Servo(cart(lambda t: FORCE if BEGIN <= t < END else 0.0), [follow()], [Motor("motor", "y")])
     found = servo.simulate(held, DURATION, integrator="rk4", step=0.07, progress=False)
     assert found.motion.rate("x")[-1] == pytest.approx(FORCE * (END - BEGIN) / MASS, rel=EXACT)

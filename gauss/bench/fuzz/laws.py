@@ -31,7 +31,7 @@ def random_law(rng, strength: float, span: float, feel: Callable):
 
 
 def _pulse(rng, span: float) -> tuple[float, float]:
-    """Begin and end, often late and short [s]."""
+    """Start and end, often late and short [s]."""
     begin = span * rng.uniform(0.05, 0.95)
     return begin, begin + span * float(10.0 ** rng.uniform(-3.0, -0.3))
 

@@ -1,4 +1,4 @@
-"""Sparse matrices times vectors of twice the precision: every product and every sum keeps some 32 digits.
+"""Sparse matrices times vectors of twice the precision: every product and every sum has about 32 digits.
 
 The entries of the matrix are exact binary numbers. Sums are made in pairs, all rows at once.
 """

@@ -1,8 +1,8 @@
 """References of quadratic programmes: the active set, confirmed, and its equations solved to some thirty digits.
 
-A guess tells which rows hold. With these rows as equations the answer is that of one linear system, refined with
+A guess gives the active rows. With these rows as equations the answer is that of one linear system, refined with
 residuals of twice the precision, so that the double factorisation only steers (Wilkinson 1963; Gleixner, Steffy, Wolter
-2016). Then all conditions are checked in twice the precision: rows whose multipliers pull leave, rows that are violated
+2016). Then all conditions are checked in twice the precision: rows with multipliers of the wrong sign leave, violated rows
 enter, until the active set is confirmed (Hintermüller, Ito, Kunisch 2002).
 """
 
@@ -18,13 +18,13 @@ from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, sizes
 from gauss.errors import BackendError
 
-ACTIVE = 1e-7  # relative slack below which a row may hold, and multiplier below which it may not push, by the guess
-STRICT = 1e-24  # relative, of what a row may be violated or pull by, where independent rows decide
-ROUNDED = 1e-13  # the same, where rows depend on each other but for the rounding of their entries
-DEPENDENT = 1e-11  # relative, of pivots: rows that are dependent but for their rounding; the next ones are at 1e-7
+ACTIVE = 1e-7  # relative: slack of the guess below which a row may be active, multiplier of it below which it may not
+STRICT = 1e-24  # relative: largest violation of a row, and multiplier of the wrong sign, where the rows are independent
+ROUNDED = 1e-13  # the same, where rows are dependent to the round-off of their entries
+DEPENDENT = 1e-11  # relative pivot of rows that are dependent to round-off; the next ones are at 1e-7
 LITTLE = 1e-14  # of entries near one: less than dependent
 CHANGES, STEPS = 40, 60
-CONVERGED, ENOUGH = 1e-31, 1e-20  # last correction, relative: what is aimed at, and what is taken where it stays
+CONVERGED, ENOUGH = 1e-31, 1e-20  # last correction, relative: target, and limit where the refinement stagnates
 
 
 class Held(NamedTuple):
@@ -59,7 +59,7 @@ def refined(instance: SuiteInstance) -> SuiteReference:
 
 
 def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> Held:
-    """Answer whose rows are all kept, and whose multipliers all push."""
+    """Answer that violates no row, with multipliers of the right sign on the active ones."""
     rows, right = instance.plain_rows()
     best, least = None, float("inf")
     for changes in range(CHANGES):
@@ -184,12 +184,12 @@ def _kept(instance: SuiteInstance, equal, rows, active) -> np.ndarray:
 
 
 def _pushing(instance: SuiteInstance, equal, rows, candidates, x: np.ndarray) -> np.ndarray:
-    """Of rows that may hold, independent ones that together push as much as is needed at x."""
+    """Independent rows, of the candidates, whose multipliers balance the gradient at x (non-negative least squares)."""
     if not candidates.size:
         return candidates
     A, R = sparse.csr_array(instance.A)[equal].toarray(), rows[candidates].toarray()
     need = -(instance.P @ x + instance.q)
-    if equal.size:  # what the equality rows can do is theirs
+    if equal.size:  # the part in their span is balanced by the equality rows
         Q = linalg.qr(A.T, mode="economic")[0]
         R, need = R - (R @ Q) @ Q.T, need - Q @ (Q.T @ need)
     lengths = np.maximum(np.linalg.norm(R, axis=1), TINY)

@@ -28,7 +28,7 @@ class Adaptive:
         inputs of dense output).
     project : Function or None
         Point → (projected point, constraint residual), with one evaluation; None without projection.
-    check : Function
+    check : Function or NativeFunction
         Point → (error of its accelerations, residual of the loop constraints, energy sample).
     dense : Function
         (point before, point after, h, inputs of dense output) → coefficients.
@@ -36,7 +36,7 @@ class Adaptive:
         (point before, h, coefficients, t) → row.
     dense_evaluations : int
         Evaluations of the accelerations in ``dense``.
-    rates : Function
+    rates : Function or NativeFunction
         Equations of motion: (t, q, v) → rates.
     """
 
@@ -44,11 +44,11 @@ class Adaptive:
     row: int
     trial: Function | NativeFunction
     project: Function | NativeFunction | None
-    check: Function
+    check: Function | NativeFunction
     dense: Function | NativeFunction
     sample: Function | NativeFunction
     dense_evaluations: int
-    rates: Function
+    rates: Function | NativeFunction
 
     def compile(self, start: Function | NativeFunction) -> Loop:
         """Machine code of the loop, and of ``start``, which is called by name."""

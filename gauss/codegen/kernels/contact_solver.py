@@ -55,10 +55,6 @@ class ContactSolver:
     accepted: float
     least_diagonal: float
 
-    def room(self, rows: int) -> int:
-        """Doubles of workspace for a number of rows."""
-        return 7 * rows + rows * rows + space(rows)
-
     def write(self, module: ir.Module) -> ir.Function:
         """Emit the solver.
 
@@ -68,6 +64,11 @@ class ContactSolver:
         """
         kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGER.as_pointer()] + [POINTER] * 5
         return _ContactSolverWriter(self, subroutine(module, "solve_contacts", kinds)).write()
+
+
+def room_of(rows: int) -> int:
+    """Numbers of working memory for a contact problem with so many rows."""
+    return 7 * rows + rows * rows + space(rows)
 
 
 class _ContactSolverWriter:
@@ -205,13 +206,19 @@ class CompiledContactSolver:
     """
 
     def __init__(self, solver: ContactSolver):
-        self.solver, writer = solver, Writer()
+        writer = Writer()
         inner = solver.write(writer.module)
         r = Routine(ir.Function(writer.module, inner.function_type, "solve"))
         r.call(inner, *r.integers, *r.arrays)
         r.done()
-        self.code = machine.load(str(writer.module))
-        self._solve = self.code.entry("solve", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8))
+        self.__setstate__(machine.load(str(writer.module)))
+
+    def __getstate__(self) -> machine.MachineCode:
+        return self.code
+
+    def __setstate__(self, code: machine.MachineCode):
+        self.code = code
+        self._solve = code.entry("solve", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8))
 
     def __call__(self, W, b, under, friction, limit, start) -> tuple[np.ndarray, float]:
         """Forces (n,) and the residual of the laws, −1 if no solution was found.
@@ -228,7 +235,7 @@ class CompiledContactSolver:
             Initial forces.
         """
         counts = start.size - 2 * friction.size - limit.size, friction.size, limit.size
-        forces, left, room = np.array(start, dtype=float), np.empty(1), np.empty(self.solver.room(start.size))
+        forces, left, room = np.array(start, dtype=float), np.empty(1), np.empty(room_of(start.size))
         arrays = [np.ascontiguousarray(array, dtype=float) for array in (W, b, friction, limit)]
         arrays.insert(2, np.ascontiguousarray(under, dtype=np.int64))
         self._solve.call(*counts, *(array.ctypes.data for array in (*arrays, forces, left, room)))

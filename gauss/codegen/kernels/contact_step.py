@@ -7,7 +7,7 @@ from llvmlite import ir
 
 from gauss.codegen import INTEGER, Function, NativeFunction, Writer
 from gauss.codegen.kernels.arrays import Array, Routine, Strided, Value, routine
-from gauss.codegen.kernels.contact_solver import ContactSolver
+from gauss.codegen.kernels.contact_solver import ContactSolver, room_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class _ContactStepWriter:
         self.h, self.slack, self.slow = h[0], slack[0], slow[0]
         n, n_v, k = contacts.rows, contacts.freedoms, contacts.under.size
         self.W, self.R, self.acceleration = r.buffer(n * n), r.buffer(n * n_v), r.buffer(n_v)
-        self.b, self.f, self.room, self.left = r.buffer(n), r.buffer(n), r.buffer(contacts.solver.room(n)), r.variable(0.0)
+        self.b, self.f, self.room, self.left = r.buffer(n), r.buffer(n), r.buffer(room_of(n)), r.variable(0.0)
         self.active, self.rows, self.place, self.below, self.which = (r.buffer(size, INTEGER) for size in (n, n, n, k, k))
         self.friction = r.buffer(k)
         self.n_active, self.n_frictional = r.variable(0, INTEGER), r.variable(0, INTEGER)

@@ -35,7 +35,7 @@ class Numbers(ctypes.Structure):
 def numbers(kind: type[Numbers]) -> type[Numbers]:
     """Class decorator: annotated attributes become fields, their values defaults."""
     names = kind.__annotations__
-    kind.defaults = {name: getattr(kind, name) for name in names if hasattr(kind, name)}
+    kind.defaults = {name: getattr(kind, name) for name in names if getattr(kind, name, 0.0)}  # memory begins as zeros
     kind._fields_ = [(name, ctypes.c_double) for name in names]
     return kind
 

@@ -38,11 +38,11 @@ class TaylorStep:
         Index of the first rate among the expanded quantities.
     project : Function or None
         Point → (projected point, constraint residual), with one evaluation; None without projection.
-    check : Function
+    check : Function or NativeFunction
         Point → (error of its accelerations, residual of the loop constraints, energy sample).
     sample : Function
         (point before, h, change) → row.
-    rates : Function
+    rates : Function or NativeFunction
         Equations of motion: (t, q, v) → rates.
     """
 
@@ -56,9 +56,9 @@ class TaylorStep:
     defect: Function | None
     rates_at: int
     project: Function | None
-    check: Function
+    check: Function | NativeFunction
     sample: Function
-    rates: Function
+    rates: Function | NativeFunction
 
     def compile(self, start: Function | NativeFunction) -> Loop:
         """Machine code of the loop, and of ``start``, which is called by name."""

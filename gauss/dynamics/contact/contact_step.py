@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Function, jacobian, write
+from gauss.codegen import Function, from_disk, jacobian, write
 from gauss.codegen.kernels import CompiledContactSolver, ContactSolver
 from gauss.errors import SimulationError
 
@@ -188,4 +188,4 @@ def _with_slopes(law, size: int, over) -> Function:
 
 @cache
 def _solver() -> CompiledContactSolver:
-    return CompiledContactSolver(contact_solver())
+    return from_disk((CompiledContactSolver,), lambda: CompiledContactSolver(contact_solver()))

@@ -1,4 +1,4 @@
-"""Contacts and stops of MJCF files, where they are asked for: geoms become shapes, and what may touch becomes a contact.
+"""Contacts and stops of MJCF files, on request: geoms become shapes, and pairs of geoms that may touch become contacts.
 
 Which geoms may touch is decided as in MuJoCo: pairs that the file names, and geoms whose masks match, of bodies that are
 neither one, nor parent and child, nor excluded. All are hard: softness, margins and torsional friction have no counterpart.
@@ -29,7 +29,7 @@ def add_stops(scene: Scene, named: Named):
 
 
 def add_contacts(scene: Scene, named: Named) -> list[str]:
-    """Shapes and contacts of all geoms that may touch; what of them has no counterpart, by name."""
+    """Add shapes and contacts of all geoms that may touch; names of those without a counterpart."""
     model, unlike = named.model, set()
     pairs = [(int(a), int(b), *_of_pair(model, i)) for i, (a, b) in enumerate(_pairs(model))]
     pairs += [(a, b, *_of_geoms(model, a, b)) for a, b in _matching(model)]

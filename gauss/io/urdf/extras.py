@@ -1,4 +1,4 @@
-"""What a URDF file says beyond masses and joints, where it is asked for: limits, damping and friction, collision shapes."""
+"""Optional content of a URDF file beside masses and joints: limits, damping and friction, collision shapes."""
 
 import warnings
 from collections.abc import Iterable
@@ -19,12 +19,12 @@ MANY = 4  # names that a warning gives before it counts
 
 
 def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance: bool = False, collisions: bool = False):
-    """Scene of a URDF file with what else is asked for.
+    """Scene of a URDF file with its limits, resistance and collision shapes, as requested.
 
     Parameters
     ----------
     scene : Scene
-        Its bodies and joints; it is added to.
+        Its bodies and joints; elements are added to it.
     path : Path
         The file.
     limits : str, optional
@@ -66,13 +66,13 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
 
 
 def _named(text: str, names: Iterable[str | None]) -> list[str]:
-    """The text with the names in it; nothing if there are none."""
+    """Message with the given names; none without names."""
     found = [name for name in names if name]
     return [text.format(_some(found))] if found else []
 
 
 def _limit(scene: Scene, source: Source, element: Element, stops: bool) -> str | None:
-    """Name of a joint whose limits leave no motion, as files write that do not mean them; others are added."""
+    """Add the limits of a joint; its name if they leave no motion: such limits are placeholders, and are not read."""
     given, joint = element.find("limit"), scene.joints[element.get("name", "")]
     if given is None or element.get("type") == "continuous" or joint.pair.n_v != 1:
         return None
@@ -87,7 +87,7 @@ def _limit(scene: Scene, source: Source, element: Element, stops: bool) -> str |
 
 
 def _resist(scene: Scene, source: Source, element: Element, read: bool) -> str | None:
-    """Name of a joint that has damping or friction, which become elements of the scene if they are read."""
+    """Add damping and friction of a joint if they are requested; its name if it has any."""
     given, name = element.find("dynamics"), element.get("name", "")
     if given is None or scene.joints[name].pair.n_v != 1:
         return None

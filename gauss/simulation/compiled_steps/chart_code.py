@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import INTEGER, Function, write
-from gauss.codegen.kernels import RowCode
+from gauss.codegen.kernels import RowCode, RowFunction
 from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Tolerance
@@ -107,7 +107,7 @@ class ChartCode:
         """Buffer of a state, and of the parameters of the system."""
         return code.room(1 + self.n_q + self.n_v + len(self.layout.parameters))
 
-    def evaluate(self, code: RowCode, function: Function, state, x, found):
+    def evaluate(self, code: RowCode, function: Function | RowFunction, state, x, found):
         """Call a function of (t, q, v) with the parameters of a point x."""
         known = self.layout.parameters
         for k, name in enumerate(function.parameters):

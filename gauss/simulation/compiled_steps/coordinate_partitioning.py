@@ -1,6 +1,6 @@
 """Coordinate partitioning: a step integrates the independent coordinates; the dependent ones follow from g(q) = 0, K v = C.
 
-The dependent coordinates are selected anew at the begin of every step, by pivoting on K, so that the partition changes
+The dependent coordinates are selected anew at the start of every step, by pivoting on K, so that the partition changes
 before its Jacobian becomes singular (Wehage and Haug, J. Mech. Design 104, 1982; García de Jalón and Bayo, Kinematic and
 Dynamic Simulation of Multibody Systems, 1994, 3.4 and 5.2).
 """
@@ -24,7 +24,7 @@ REFINEMENTS = 2  # remove the regularisation from the solution
 
 
 class PartitionedSystem:
-    """Partition of the coordinates of a system, selected at the begin of every step.
+    """Partition of the coordinates of a system, selected at the start of every step.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 
 from gauss import math
-from gauss.codegen import INTEGER, Function, write
+from gauss.codegen import INTEGER, Function, NativeFunction, write
 from gauss.codegen.kernels import CheckedSwitch, ExplicitTrial, Interpolation, RowCode, RowFunction, stride
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import ExplicitPair, compensation_size, first_length, trial_length
@@ -74,7 +74,7 @@ class ExplicitStages:
         size = self.layout.size
         return RowFunction("project", size, size + 1, self._project) if self.program.projects else None
 
-    def first(self, check: Function) -> RowFunction:
+    def first(self, check: Function | NativeFunction) -> RowFunction:
         """Function (t, q, v, rtol, atol, atol_rates, parameters) → (point, its check, first step)."""
         layout, emit = self.layout, lambda code: self._first(code, check)
         return RowFunction("start", layout.row + len(layout.parameters), layout.size + len(check.outputs) + 1, emit)
@@ -109,7 +109,7 @@ class ExplicitStages:
         self._end_row(code, y, code.motions.constant(1.0))
         self._end_row(code, slope, *code.inline(_known_sigma(), code.number(x, self.sigma)))
 
-    def _first(self, code: RowCode, check: Function):
+    def _first(self, code: RowCode, check: Function | NativeFunction):
         """Initial point, its check and the first step, by the formulas of :func:`gauss.integrators.first_step`."""
         layout, (n_q, n_v), b, x, size = self.layout, (self.n_q, self.n_v), code.b, code.found, self.layout.size
         code.copy(x, code.given, 1 + n_q + n_v)

@@ -14,7 +14,7 @@ from gauss.codegen import Scalar
 from gauss.dynamics.laws.switching_times import distinct
 
 NEAR_MIDDLE = 0.65  # of half the widest interval between stages: a zero this near to its middle needs no other step
-EARLY = 0.05  # relative to the step: a zero this near to its begin is not avoided by a shorter step
+EARLY = 0.05  # relative to the step: a zero this near to its start is not avoided by a shorter step
 SMALLEST_RATE = 1e-300  # of σ, over the step
 
 
@@ -24,7 +24,7 @@ class StageNodes:
     Parameters
     ----------
     c : ndarray, shape (s,)
-        Nodes of the stages with known σ, among them begin and end of the step.
+        Nodes of the stages with known σ, among them start and end of the step.
     others : ndarray
         Nodes of further stages.
 

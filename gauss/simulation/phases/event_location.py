@@ -59,7 +59,7 @@ def _brent(function, begin: float, end: float) -> float:
 
 
 def _root(width, begin: float, end: float) -> float:
-    """Zero of a gap function that is negative at the end and not at the begin."""
+    """Zero of a gap function that is negative at the end and not at the start."""
     return begin if width(begin) <= 0.0 else _brent(width, begin, end)
 
 
@@ -80,7 +80,7 @@ def first_negative(
 
 
 def first_true(condition: Callable[[float], bool], begin: float, end: float) -> float:
-    """Time from which a condition holds that is false at the begin of a step and true at its end, by bisection."""
+    """Time from which a condition holds that is false at the start of a step and true at its end, by bisection."""
     for _ in range(HALVINGS):
         middle = 0.5 * (begin + end)
         if condition(middle):

@@ -1,4 +1,4 @@
-"""What is shown: a motion as it was computed, its pictures at equal distances in time, and what is drawn with it."""
+"""Content of a view: the computed motion, its pictures at equally spaced times, and what is drawn with them."""
 
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,7 @@ NOT_SIMULATED = Stats(0, 0, 0, 0, 0.0, 0.0, "not simulated")
 
 @dataclass(frozen=True)
 class Shown:
-    """What is shown.
+    """Content of a view.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ class Shown:
 
 
 def shown(thing: Scene | Trajectory, frames: int, visuals=(), joints=(), traces=None) -> Shown:
-    """What is shown of a scene in its start, or of a motion; traces of the bodies that carry no others if none are named.
+    """View of a scene at its start, or of a motion; traces of the bodies that carry no others if none are named.
 
     Raises
     ------
     StateError
-        If a trace is named after nothing.
+        If the name of a trace is that of no body or frame.
     """
     require(thing, (Scene, Trajectory), "show")
     if isinstance(thing, Scene):
@@ -72,7 +72,7 @@ def _tips(system) -> tuple[str, ...]:
 
 
 def resampled(trajectory: Trajectory, count: int) -> Trajectory:
-    """Motion at ``count`` equally spaced times, by cubic interpolation; for the eye, not for numbers.
+    """Motion at ``count`` equally spaced times, by cubic interpolation; for display only.
 
     Where two samples share a time, at an impact, the later one counts.
     """

@@ -152,7 +152,7 @@ def _crane(steps: int) -> SuiteInstance:
 
 
 def _noisy_copies() -> SuiteInstance:
-    """Four-bar with one hinge said twice and noise on its rows; the certificate is the least residual of its rows."""
+    """Four-bar with a duplicated hinge and noise on its rows; the certificate is the least residual of its rows."""
     compulsion = make_problem("noisy copies").compulsion
     story = "Four-bar with one hinge said twice and noise of 1e-8 on its rows: they contradict each other by 8e-8."
     instance = of_compulsion("infeasible noisy copies", "infeasible", story, compulsion)

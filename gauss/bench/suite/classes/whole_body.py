@@ -4,7 +4,7 @@ Unknown are the accelerations q̈ of base and joints, the forces f at points of 
 
     M q̈ + h = Sᵀ τ + Jᵀ f,   J q̈ + J̇ q̇ = 0 at every foot,   |f_x|, |f_y| ≤ μ f_z / √2,   |τ| ≤ τ_max
 
-and the least weighted squares of tasks are asked for (Herzog et al. 2016). Models are those of example-robot-data, read
+and the weighted squares of the task errors are minimised (Herzog et al. 2016). Models are those of example-robot-data, read
 by Pinocchio, whose recursions give M, h and J.
 """
 
@@ -51,13 +51,13 @@ def control(
     name, seed : str, int
         Robot and pose.
     lifted : int
-        So many feet, the last ones, are off the ground.
+        Number of feet off the ground, the last ones.
     most : float
-        What each point of the last foot may carry [N].
+        Largest normal force at each point of the last foot [N].
     shift : float
-        The base is to accelerate aside by so much [m/s²].
+        Lateral acceleration task of the base [m/s²].
     kind : str
-        Class; friction of "cones" is one of cones, of the others one of pyramids.
+        Class; "cones" has friction cones, the others friction pyramids.
     **more
         Other fields of the instance: its name, a sequence.
     """

@@ -1,0 +1,288 @@
+"""Functions of a state: one call from Python, a loop of machine code, a batch of 4096, beside Pinocchio and MuJoCo.
+
+Run it with:
+
+    python -m benchmarks.functions [--rounds 15] [--only Panda]
+
+Pinocchio and MuJoCo give these functions to Python one state at a time: their time stands beside each of ours. Where
+joints close loops, the functions are those of the spanning tree, for all engines. The difference is the largest one to
+Pinocchio's results, in the rates of gauss, relative to the largest number. CPU time of the process; medians of rounds.
+Writes benchmarks/results/functions.csv and .md.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("GAUSS_TIER", "optimised")
+
+import warnings  # noqa: E402
+from collections.abc import Callable, Iterator  # noqa: E402
+from contextlib import suppress  # noqa: E402
+from dataclasses import dataclass  # noqa: E402
+from statistics import median  # noqa: E402
+
+import mujoco  # noqa: E402
+import numpy as np  # noqa: E402
+import pinocchio as pin  # noqa: E402
+
+import gauss  # noqa: E402
+from benchmarks.command import command, load_at_the_end  # noqa: E402
+from benchmarks.latency.scenes import FEET, biped  # noqa: E402
+from gauss.analysis.crosscheck.pinocchio_ import Configuration, Twin, twin  # noqa: E402
+from gauss.bench.contest import OURS, Competitor, difference, interleaved  # noqa: E402
+from gauss.bench.machine import header  # noqa: E402
+from gauss.bench.markdown import formatted_table, head, in_time  # noqa: E402
+from gauss.dynamics.kinematics import kinematics  # noqa: E402
+from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree  # noqa: E402
+from gauss.io.mjcf.write import to_mjcf  # noqa: E402
+from gauss.system import State, System, random_state  # noqa: E402
+
+CALLS, BATCH = 256, 4096
+PAD = 8  # doubles between rows: rows at multiples of 2048 bytes would share few sets of the cache
+PINOCCHIO, MUJOCO, LOOP, MANY = "Pinocchio", "MuJoCo", "loop", "batch"
+COMPETITORS = OURS, LOOP, MANY, PINOCCHIO, MUJOCO
+MECHANISMS: dict[str, Callable[[], gauss.Scene]] = {
+    "Panda": lambda: gauss.load("robot:panda", mimic=False),
+    "UR5": lambda: gauss.load("robot:ur5"),
+    "Talos": lambda: gauss.load("robot:talos"),
+    "biped": lambda: biped(FEET),
+    "Stewart platform": lambda: gauss.load("stewart_platform"),
+    "ladder of 10": lambda: gauss.load("n_four_bar", n=10),
+}
+
+
+@dataclass(frozen=True)
+class Peers:
+    """A mechanism in one state in Pinocchio and in MuJoCo; no MuJoCo where it has no counterpart.
+
+    Parameters
+    ----------
+    pair : Twin
+        The mechanism in Pinocchio.
+    at : Configuration
+        The state there.
+    data : pinocchio.Data
+        Its workspace.
+    frame : int
+        The frame of kinematics.
+    model, state : mujoco.MjModel, mujoco.MjData
+        The mechanism in MuJoCo, in this state; None without.
+    body : int
+        Its body.
+    """
+
+    pair: Twin
+    at: Configuration
+    data: pin.Data
+    frame: int
+    model: object = None
+    state: object = None
+    body: int = 0
+
+
+def _momentum(A):
+    return np.concatenate([A[3:], A[:3]])
+
+
+def _mass_matrix(p: Peers):
+    return pin.crba(p.pair.model, p.data, p.at.q)
+
+
+def _full(M, p: Peers):
+    M = np.triu(M) + np.triu(M, 1).T
+    return p.at.T.T @ M @ p.at.T
+
+
+AXES = pin.LOCAL_WORLD_ALIGNED
+# Of each function: Pinocchio's call, and its result in the rates and in the order of gauss; None is not compared.
+BY_PINOCCHIO: dict[str, tuple[Callable, Callable | None]] = {
+    "mass_matrix": (_mass_matrix, _full),
+    "bias_forces": (
+        lambda p: pin.nonLinearEffects(p.pair.model, p.data, p.at.q, p.at.v),
+        lambda h, p: p.at.T.T @ pin.rnea(p.pair.model, p.data, p.at.q, p.at.v, p.at.bias),
+    ),
+    "gravity_forces": (
+        lambda p: pin.computeGeneralizedGravity(p.pair.model, p.data, p.at.q),
+        lambda g, p: p.at.T.T @ g,
+    ),
+    "coriolis_matrix": (lambda p: pin.computeCoriolisMatrix(p.pair.model, p.data, p.at.q, p.at.v), None),
+    "forward_kinematics": (
+        lambda p: (pin.framesForwardKinematics(p.pair.model, p.data, p.at.q), p.data.oMf[p.frame])[1],
+        lambda M, p: np.append(M.rotation, M.translation),
+    ),
+    "jacobian": (
+        lambda p: pin.computeFrameJacobian(p.pair.model, p.data, p.at.q, p.frame, AXES),
+        lambda J, p: _momentum(J @ p.at.T),
+    ),
+    "jacobian_rate": (
+        lambda p: (
+            pin.computeJointJacobiansTimeVariation(p.pair.model, p.data, p.at.q, p.at.v),
+            pin.getFrameJacobianTimeVariation(p.pair.model, p.data, p.frame, AXES),
+        )[1],
+        None,
+    ),
+    "center_of_mass": (lambda p: pin.centerOfMass(p.pair.model, p.data, p.at.q), lambda x, p: x),
+    "momentum": (
+        lambda p: pin.computeCentroidalMomentum(p.pair.model, p.data, p.at.q, p.at.v),
+        lambda h, p: _momentum(h.vector),
+    ),
+    "momentum_matrix": (
+        lambda p: pin.computeCentroidalMap(p.pair.model, p.data, p.at.q),
+        lambda A, p: _momentum(A @ p.at.T),
+    ),
+    "kinetic_energy": (lambda p: pin.computeKineticEnergy(p.pair.model, p.data, p.at.q, p.at.v), lambda T, p: T),
+    "potential_energy": (lambda p: pin.computePotentialEnergy(p.pair.model, p.data, p.at.q), lambda V, p: V),
+    "inverse_dynamics": (
+        lambda p: pin.rnea(p.pair.model, p.data, p.at.q, p.at.v, p.at.bias),
+        lambda tau, p: p.at.T.T @ tau,
+    ),
+}
+OF_TREES = {
+    "forward_dynamics": (lambda p: pin.aba(p.pair.model, p.data, p.at.q, p.at.v, np.zeros(p.pair.model.nv)), None),
+    "acceleration_derivatives": (
+        lambda p: pin.computeABADerivatives(p.pair.model, p.data, p.at.q, p.at.v, np.zeros(p.pair.model.nv)),
+        None,
+    ),
+}
+
+
+def _placed(p: Peers, *more: Callable):
+    for step in (mujoco.mj_kinematics, mujoco.mj_comPos, *more):
+        step(p.model, p.state)
+
+
+def _crb(p: Peers):
+    _placed(p, mujoco.mj_crb)
+
+
+def _rne(p: Peers):
+    _placed(p, mujoco.mj_comVel)
+    mujoco.mj_rne(p.model, p.state, 0, np.empty(p.model.nv))
+
+
+def _jac(p: Peers):
+    _placed(p)
+    J = np.empty((6, p.model.nv))
+    mujoco.mj_jacBody(p.model, p.state, J[3:], J[:3], p.body)
+
+
+BY_MUJOCO: dict[str, Callable[[Peers], object]] = {
+    "mass_matrix": _crb,
+    "bias_forces": _rne,
+    "forward_kinematics": lambda p: (mujoco.mj_kinematics(p.model, p.state), p.state.xmat[p.body], p.state.xpos[p.body]),
+    "jacobian": _jac,
+    "center_of_mass": _placed,
+    "potential_energy": lambda p: (mujoco.mj_kinematics(p.model, p.state), mujoco.mj_energyPos(p.model, p.state)),
+    "forward_dynamics": lambda p: mujoco.mj_forward(p.model, p.state),
+}
+
+
+def peers(system: System, state: State, body: str) -> Peers:
+    """The mechanism in other engines."""
+    pair = twin(system)
+    placed = system.frame(body)
+    side = pair.placements[placed.body]
+    frame = pin.Frame("probe", side.joint, 0, side.central * pin.SE3(placed.R, placed.p), pin.FrameType.OP_FRAME)
+    index, at = pair.model.addFrame(frame), pair.configuration(state)
+    if system.is_tree:
+        with suppress(gauss.GaussError):
+            model = mujoco.MjModel.from_xml_string(to_mjcf(system.scene))
+            data = mujoco.MjData(model)
+            limbs = [limb(system, *edge) for edge in spanning_tree(system.scene)[0]]
+            data.qpos, data.qvel = mujoco_state(system, limbs, kinematics(system, state))
+            return Peers(pair, at, pair.model.createData(), index, model, data, data.body(body).id)
+    return Peers(pair, at, pair.model.createData(), index)
+
+
+def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
+    """Times of all functions of a mechanism [s]."""
+    rng = np.random.default_rng(0)
+    if system.has_closures:
+        q = system.initial_state().q
+        state = system.projected(State(0.0, q, rng.standard_normal(system.n_v)))
+    else:
+        state = random_state(system, rng)
+    body = system.structure.bodies[-1]
+    others, given = peers(system, state, body), {"q": state.q, "v": state.v}
+    given |= {"acceleration": np.zeros(system.n_v), "load": np.zeros(system.n_v)}
+    for function, (theirs, result) in (BY_PINOCCHIO | (OF_TREES if not system.has_closures else {})).items():
+        full = f"{function}:{body}" if function in ("forward_kinematics", "jacobian", "jacobian_rate") else function
+        ours = system.forward_dynamics if function == "forward_dynamics" else system.function(full)
+        wrapper = ours.__self__.fallback
+        arguments = [given[one].copy() for one in wrapper.interface.vectors]
+        batches = [np.tile(one, (BATCH, 1)) for one in arguments]
+        out = ours(*batches)
+        loop = _loop(wrapper, arguments)
+        tasks = {
+            OURS: Competitor(lambda f=ours, x=arguments: _repeat(f, x), CALLS),
+            LOOP: Competitor(loop, CALLS),
+            MANY: Competitor(lambda f=ours, x=batches, out=out: f(*x, out), BATCH),
+            PINOCCHIO: Competitor(lambda f=theirs: _repeat(f, (others,)), CALLS),
+        }
+        if others.model is not None and function in BY_MUJOCO:
+            tasks[MUJOCO] = Competitor(lambda f=BY_MUJOCO[function]: _repeat(f, (others,)), CALLS)
+        _, seconds = interleaved(tasks, 3), interleaved(tasks, rounds)
+        found = ours(*arguments)
+        found = np.concatenate([np.ravel(part) for part in (found if isinstance(found, tuple) else (found,))])
+        expected = None if result is None else np.ravel(result(theirs(others), others))
+        line = {"mechanism": name, "function": function}
+        line |= {task: median(seconds[task]) if task in seconds else np.nan for task in COMPETITORS}
+        yield line | {"agreement": np.nan if expected is None else difference(found, expected)}
+
+
+def _repeat(function: Callable, arguments):
+    for _ in range(CALLS):
+        function(*arguments)
+
+
+def _loop(wrapper, arguments) -> Callable:
+    """Run one state after the other in machine code."""
+    stride = CALLS + PAD
+    inputs = np.tile(np.concatenate([*arguments, [0.0]])[:, None], stride)
+    outputs = np.empty((wrapper.n_out + len(wrapper.interface.limits), stride))
+    return lambda: wrapper.compute.run.call(CALLS, inputs.ctypes.data, stride, outputs.ctypes.data, stride)
+
+
+def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
+    """Rows of the table, and the conditions."""
+    conditions, found = header("numpy", "pin", "mujoco"), []
+    warnings.simplefilter("ignore")  # of robots whose files hold more than is read
+    for name, make in MECHANISMS.items():
+        if only in name:
+            for line in rows(name, gauss.compile_scene(make()), rounds):
+                print(name, line["function"], flush=True)
+                found.append(line)
+    return found, [*conditions, load_at_the_end()]
+
+
+def page(lines: list[dict], conditions: list[str]) -> list[str]:
+    """The page of the table."""
+    made = []
+    for line in lines:
+        times = {key: float(line[key]) for key in COMPETITORS}
+        best = np.nanmin([times[PINOCCHIO], times[MUJOCO]])
+        agreement = float(line["agreement"])
+        made.append(
+            {key: in_time(value) for key, value in times.items()}
+            | {"mechanism": line["mechanism"], "function": line["function"]}
+            | {"once": best / times[OURS], "looped": best / times[LOOP], "many": best / times[MANY]}
+            | {"agreement": f"{agreement:.0e}" if np.isfinite(agreement) else "–"}
+        )
+    titles = {
+        "mechanism": "{mechanism}",
+        "function": "`{function}`",
+        "one call": f"{{{OURS}}}",
+        "in a loop of machine code": f"{{{LOOP}}}",
+        f"in a batch of {BATCH}": f"{{{MANY}}}",
+        "Pinocchio, one call": f"{{{PINOCCHIO}}}",
+        "MuJoCo, one call": f"{{{MUJOCO}}}",
+        "best peer / one call": "{once:.1f}",
+        "/ loop": "{looped:.1f}",
+        "/ batch": "{many:.0f}",
+        "difference": "{agreement}",
+    }
+    return [*head("Functions of a state", conditions), *formatted_table(titles, made), ""]
+
+
+if __name__ == "__main__":
+    command("functions", __doc__, measure, page, {"rounds": (15, "interleaved repetitions"), "only": ("", "a mechanism")})

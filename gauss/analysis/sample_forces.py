@@ -1,0 +1,111 @@
+"""Multipliers of all constraints at all samples of a motion, in one pass: machine code of many samples, certified where not.
+
+Kept with the motion, so that forces of further joints cost nothing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from gauss.analysis.sample_solution import refuse_uncertain, solution_at
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.sample_multipliers import sample_multipliers
+from gauss.simulation import Trajectory
+
+MANY_SAMPLES = 1000  # above, machine code is made: certified solutions take about as long for so many
+UNKNOWN = "machine code"  # in place of the name of a backend
+T = TypeVar("T")
+
+
+@dataclass
+class SampleForces:
+    """Multipliers of all constraints of a system along a motion.
+
+    Parameters
+    ----------
+    values : ndarray, shape (k, r)
+        Multipliers.
+    loose : ndarray, shape (k, r)
+        Whether they are not unique.
+    errors : ndarray, shape (k, c)
+        Estimated relative errors by constraint.
+    tolerances : ndarray, shape (k,)
+        Largest errors that certificates accept.
+    backends : list of str
+        Solver of each sample.
+    """
+
+    values: np.ndarray
+    loose: np.ndarray
+    errors: np.ndarray
+    tolerances: np.ndarray
+    backends: list[str]
+
+    def of(self, trajectory: Trajectory, name: str):
+        """Constraint of this name, its multipliers (k, m), and which of them are not unique (m,).
+
+        Raises
+        ------
+        SimulationError
+            If those of some sample are not certified.
+        """
+        constraints = trajectory.system.structure.constraints
+        place = next(i for i, constraint in enumerate(constraints) if constraint.name == name)
+        for k in np.flatnonzero(self.errors[:, place] > self.tolerances):
+            refuse_uncertain(self.errors[k, place], self.tolerances[k], self.backends[k], name, trajectory.t[k])
+        rows = constraints[place].rows
+        return constraints[place], self.values[:, rows], self.loose[:, rows].any(axis=0)
+
+
+def sample_forces(trajectory: Trajectory, backend) -> SampleForces:
+    """Multipliers of all constraints at every sample, found once for each backend that is given by its name.
+
+    Raises
+    ------
+    SimulationError
+        If a sample has no certified solution.
+    """
+    return kept_with(trajectory, "multipliers", backend, lambda: _found(trajectory, backend))
+
+
+def kept_with(trajectory: Trajectory, what: str, backend, find: Callable[[], T]) -> T:
+    """What is found for all samples, kept with the motion for a backend that is given by its name.
+
+    Laws of loads are those of now: with another traced law it is found anew, with an opaque one, which may change, always.
+    """
+    laws = Laws(trajectory.system)
+    if laws.called or not isinstance(backend, str):
+        return find()
+    kept = trajectory.__dict__.setdefault("_kept", {})
+    if (what, backend, laws.key) not in kept:
+        kept[what, backend, laws.key] = find()
+    return kept[what, backend, laws.key]
+
+
+def _found(trajectory: Trajectory, backend) -> SampleForces:
+    k, structure = len(trajectory), trajectory.system.structure
+    size, count = structure.n_rows, len(structure.constraints)
+    found = SampleForces(
+        np.zeros((k, size)), np.zeros((k, size), dtype=bool), np.zeros((k, count)), np.full(k, np.inf), [UNKNOWN] * k
+    )
+    by_code = None
+    if backend == "auto" and k >= MANY_SAMPLES and trajectory.step is None:
+        by_code = sample_multipliers(trajectory.system, trajectory.t, trajectory.q, trajectory.v)
+    if by_code is not None:
+        found.values[:] = by_code[0]
+    for index in range(k) if by_code is None else np.flatnonzero(~by_code[1]):
+        _solve_sample(found, trajectory, int(index), backend)
+    return found
+
+
+def _solve_sample(found: SampleForces, trajectory: Trajectory, index: int, backend):
+    """Certified multipliers of one sample."""
+    constraints, solution = trajectory.system.structure.constraints, solution_at(trajectory, index, backend)
+    places = {constraint.rows.start: i for i, constraint in enumerate(solution.compulsion.structure.constraints)}
+    size, loose = found.values.shape[1], solution.certificate.undetermined
+    found.values[index] = solution.multipliers[:size]
+    found.loose[index] = loose[:size] if loose.size else False
+    found.errors[index] = solution.certificate.dual.errors[[places[constraint.rows.start] for constraint in constraints]]
+    found.tolerances[index], found.backends[index] = solution.status.tolerance, solution.backend

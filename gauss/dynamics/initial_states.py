@@ -1,0 +1,69 @@
+"""Initial states without Newton steps: the start of the scene is kept by its content, a consistent state as it is given."""
+
+import numpy as np
+
+from gauss.codegen import Kernel, write
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.consistent_states import consistent, violations
+from gauss.dynamics.engines.tiering import TieredFunction
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.projection import RESIDUAL_ROUNDOFF, within_limits
+from gauss.dynamics.store import cached, cached_on_disk
+from gauss.system import State, System
+
+RESIDUAL_THRESHOLD = 30  # residuals by numpy that take as long as compiling the residual
+
+
+def scene_start(system: System) -> State:
+    """Consistent start of the scene at time 0, assembled once; a new process reads it unless there is something to warn of.
+
+    Raises
+    ------
+    AssemblyError
+        If the constraints cannot be met from there.
+    """
+    find = lambda: consistent(system, system.start(), tuple(system.scene.starts))  # noqa: E731
+    if not system.has_closures:
+        return find()
+    found: list[State] = []
+
+    def make() -> tuple[State, bool]:
+        found.append(find())
+        return found[0], not violations(system, found[0])
+
+    state, is_met = cached_on_disk(system, (scene_start,), make)
+    if not (found or is_met):
+        return find()
+    return State(state.t, state.q.copy(), state.v.copy())  # the caller may write to it
+
+
+def projected(system: System, state: State) -> State:
+    """State projected onto the constraints; one that meets them to round-off stays as it is.
+
+    Raises
+    ------
+    AssemblyError
+        If the constraints cannot be met from there.
+    """
+    state = within_limits(system, state)
+    if not system.has_closures:
+        return state
+    residual = cached(system, (_residual,), lambda: _residual(system))
+    return state if residual(state) <= RESIDUAL_ROUNDOFF else consistent(system, state)
+
+
+def _residual(system: System) -> TieredFunction:
+    """Constraint residual of a state, in position and velocity, relative: that of the compulsion."""
+
+    def residual(state: State):
+        motion = kinematics(system, state)
+        return assemble_motion(motion, Applied(motion, ())).constraint_residual
+
+    def compiled():
+        flat = lambda t, q, v: [residual(State(t[0], q, v))]  # noqa: E731
+        make = lambda: Kernel(write(flat, 1, system.n_q, system.n_v, name="residual"), batch=False)  # noqa: E731
+        kernel = cached_on_disk(system, (projected,), make)
+        return lambda state: kernel(np.concatenate([[state.t], state.q, state.v]))[0]
+
+    return TieredFunction(residual, compiled, RESIDUAL_THRESHOLD)
