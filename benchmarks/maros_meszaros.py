@@ -37,7 +37,7 @@ from benchmarks import published_form, published_form_report
 from benchmarks.command import RESULTS
 from gauss.bench.contestants import contestants
 from gauss.bench.folders import of_folder
-from gauss.bench.levels import BEYOND, LEVELS, LIMIT, TIME_LIMITS, settings
+from gauss.bench.levels import BEYOND, LEVELS, LIMIT, settings
 from gauss.bench.markdown import head, share, table
 from gauss.bench.qp import compare
 from gauss.bench.summary import is_kept, mean_time
@@ -97,12 +97,8 @@ def in_published_form(data: Path, work: Path, solvers: list[str], problems: list
 
 
 def as_qpbenchmark_sets(solver: str, level: str) -> dict:
-    """Settings without what the comparison adds to qpbenchmark's, but for limits of iterations.
-
-    Limits of wall time are such that a busy machine does not reach them before that of CPU time.
-    """
-    chosen = {name: value for name, value in settings(solver, level).items() if name not in BEYOND.get(solver, ())}
-    return chosen | ({TIME_LIMITS[solver]: 10.0 * LIMIT} if TIME_LIMITS.get(solver) in chosen else {})
+    """Settings without what the comparison adds to qpbenchmark's, but for limits of iterations."""
+    return {name: value for name, value in settings(solver, level).items() if name not in BEYOND.get(solver, ())}
 
 
 def verdicts(path: Path) -> list[dict]:

@@ -9,14 +9,14 @@ VERSION = "0.1.0"
 DISTRIBUTION = "gauss-dynamics"
 
 
-def version_of(package: str, missing: str | None = None) -> str | None:
-    """Version of an installed distribution, or of this package as it was imported; ``missing`` where there is none."""
+def version_of(package: str) -> str | None:
+    """Version of an installed distribution, or of this package as it was imported; None where there is none."""
     from importlib.metadata import PackageNotFoundError, version  # takes long to import
 
     try:
         return VERSION if package == "gauss" else version(package)
     except PackageNotFoundError:
-        return missing
+        return None
 
 
 def current_name(module: str, renamed: dict[str, str], name: str) -> str:

@@ -14,8 +14,11 @@ ABSOLUTE = {
     "piqp": ("eps_abs", "eps_duality_gap_abs"),
     "proxqp": ("eps_abs", "eps_duality_gap_abs"),
     "qpalm": ("eps_abs",),
+    "pyqpmad": ("tolerance",),
     "qpax": ("solver_tol",),
+    "qtqp": ("tol_feas", "tol_gap_abs"),
     "scs": ("eps_abs",),
+    "sip": ("eps_abs",),
 }
 RELATIVE = {
     "clarabel": ("tol_gap_rel",),
@@ -26,7 +29,9 @@ RELATIVE = {
     "piqp": ("eps_rel", "eps_duality_gap_rel"),
     "proxqp": ("eps_rel", "eps_duality_gap_rel"),
     "qpalm": ("eps_rel",),
+    "qtqp": ("tol_gap_rel",),
     "scs": ("eps_rel",),
+    "sip": ("eps_rel",),
 }
 SMALLEST_TOLERANCE = {"gurobi": 1e-9, "highs": 1e-10}  # absolute; smaller ones are refused
 # Without its duality gap, ProxQP ends while small unknowns are still off by many times the tolerance.

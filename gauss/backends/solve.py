@@ -1,11 +1,21 @@
-"""Compulsion → certified Solution: the one entry. A backend by name answers, and its answer is certified."""
+"""Compulsion → certified Solution: the one entry. A backend by name answers, and its answer is certified.
 
+Backend "auto" tries one method after another until an answer is certified; the status names those that failed. The order is
+that of independence: the singular values of the whole KKT matrix where the tree moves no inertia or the rank of a loop is
+hard to tell; other QP solvers where an active-set method stalls. Answers with inequality rows get one proximal step more:
+their active rows are taken as equalities, and the correction that the certificate finds is taken off.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.backends.active_set import active_set
 from gauss.backends.answering import certified
 from gauss.backends.backend import Backend
-from gauss.backends.certificate import TOLERANCE
+from gauss.backends.certificate import TOLERANCE, certify, conclude
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.registry import ready
-from gauss.backends.rescue import automatic
+from gauss.backends.registry import choose, installed_solvers, make, ready
 from gauss.backends.solution import Solution
 from gauss.errors import judged_later, require
 
@@ -46,3 +56,61 @@ def solve(
             return automatic(compulsion, tolerance, settings)
         method = ready(backend, **settings)
         return certified(compulsion, method, tolerance)
+
+
+EQUALITIES = ("recursion", "svd", "nullspace", "sparse")
+INEQUALITIES = ("daqp", "piqp", "clarabel", "quadprog")
+CORRECTABLE_ERROR = 1e-3  # relative error from which one step brings an answer to round-off
+
+
+def automatic(compulsion: Compulsion, tolerance: float, settings: dict) -> Solution:
+    """First certified solution of the methods that suit a compulsion; the first one's failure if there is none.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        The problem.
+    tolerance : float
+        Relative error above which a solution is not certified.
+    settings : dict
+        ``form`` and settings of the method that :func:`gauss.backends.choose` names.
+    """
+    names, failed, solutions = _candidates(compulsion), list[str](), list[Solution]()
+    for name in names:
+        method = make(name, **(settings if name == choose(compulsion) else {}))
+        solution = certified(compulsion, method, tolerance)
+        if compulsion.h.size:
+            solution = refined(solution, tolerance)
+        if solution.status.certified:
+            rescued = "; ".join(failed)
+            return replace(solution, status=replace(solution.status, rescued=rescued)) if rescued else solution
+        failed.append(f"{name}: {solution.status.reason}")
+        solutions.append(solution)
+    first, others = solutions[0], f"; nor by {', '.join(names[1:])}" if names[1:] else ""
+    reason = f"{first.status.reason.removesuffix('.')}{others}"
+    return replace(first, status=replace(first.status, reason=reason))
+
+
+def _candidates(compulsion: Compulsion) -> tuple[str, ...]:
+    """Names of the methods to try, in order; one alone where numbers are not finite: no other could do better."""
+    names: tuple[str, ...] = EQUALITIES
+    if compulsion.h.size:
+        present = installed_solvers()
+        names = tuple(name for name in INEQUALITIES if name in present)
+    finite = all(np.isfinite(part).all() for part in (compulsion.impressed, compulsion.D, compulsion.P, compulsion.h))
+    return names if finite else names[:1]
+
+
+def refined(solution: Solution, tolerance: float) -> Solution:
+    """Solution less its error, with the same active rows; the given one if that is no better."""
+    error, compulsion = solution.certificate.error, solution.compulsion
+    if not 0.0 < error < CORRECTABLE_ERROR:
+        return solution
+    answer = solution.answer
+    factor, _, correction = active_set(compulsion, answer)
+    better = factor.less(answer, correction)
+    better = replace(better, found=True, message="solved")
+    certificate = certify(compulsion, better, factor)
+    if not certificate.error < error or certificate.complementarity > max(solution.certificate.complementarity, tolerance):
+        return solution
+    return conclude(compulsion, better, certificate, solution.backend, tolerance)

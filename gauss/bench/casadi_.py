@@ -1,13 +1,15 @@
-"""QP solvers that come with CasADi: qpOASES, its own active-set method, and HPIPM for problems with stages.
+"""QP solvers that come with CasADi: qpOASES, its own active-set method, and HPIPM and Fatrop for problems with stages.
 
-Fatrop's interface to programmes fails on those with stages, on some with a wrong answer that is called a success; the
-interior-point method ipqp returns nan, and calls it a success, where no row is an inequality.
+Fatrop is called through CasADi's interface to nonlinear programmes: that to quadratic ones fails on those with stages, on
+some with a wrong answer that is called a success. The interior-point method ipqp returns nan, and calls it a success, where
+no row is an inequality.
 """
 
 import contextlib
 import os
 import sys
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -21,7 +23,6 @@ SOLVERS: dict[str, dict[str, Any]] = {
     "qpoases": {"printLevel": "none"},
     "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
 }
-STAGEWISE = ("hpipm",)
 FREE = 1e6  # bounds of this size stand for none: HPIPM's residuals round where they are as large as CasADi's 1e8
 
 
@@ -30,7 +31,7 @@ def ready(solver: str, programme: Programme, settings: dict):
     import casadi
 
     if solver in STAGEWISE:
-        return _stagewise(programme, settings)
+        return _stagewise(solver, programme, settings)
     programme, m = programme.without_zeros(), programme.d.size
     H, rows = casadi.DM(programme.H), casadi.DM(sparse.csc_matrix(sparse.vstack([programme.C, programme.K])))
     lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
@@ -57,31 +58,47 @@ def ready(solver: str, programme: Programme, settings: dict):
     return call, read, _wall_time, _quiet()
 
 
-def _stagewise(programme: Programme, settings: dict):
-    """The same for HPIPM, which takes rows of the dynamics with their sign turned, and bounds as such."""
+def _stagewise(solver: str, programme: Programme, settings: dict):
+    """The same for solvers that take stages, and bounds as such."""
+    if not isinstance(programme, StructuredProgramme):
+        raise BackendError(f"{solver} takes programmes with stages only.")
+    K = sparse.csr_matrix(programme.K)
+    if (np.diff(K.indptr) != 1).any():
+        raise BackendError(f"{solver} takes bounds, and no other inequality rows, here.")
+    return STAGEWISE[solver](programme, Bounds.of_rows(K, programme.k), settings)
+
+
+class Bounds(NamedTuple):
+    """Inequality rows of one entry each as bounds of the unknowns: their places, signs and sizes, and the bounds (n,)."""
+
+    places: np.ndarray
+    signs: np.ndarray
+    sizes: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @classmethod
+    def of_rows(cls, K: sparse.csr_matrix, k: np.ndarray) -> "Bounds":
+        """Bounds that K x ≤ k says."""
+        places, signs, bounds = K.indices, np.sign(K.data), k / K.data
+        lower, upper = np.full(K.shape[1], -np.inf), np.full(K.shape[1], np.inf)
+        np.maximum.at(lower, places[signs < 0.0], bounds[signs < 0.0])
+        np.minimum.at(upper, places[signs > 0.0], bounds[signs > 0.0])
+        return cls(places, signs, np.abs(K.data), lower, upper)
+
+    def multipliers(self, box: np.ndarray) -> np.ndarray:
+        """Multipliers of the rows by those of the bounds (n,), which are negative at lower ones."""
+        return np.maximum(self.signs * box[self.places], 0.0) / self.sizes
+
+
+def _hpipm(programme: StructuredProgramme, bounds: Bounds, settings: dict):
+    """HPIPM takes rows of the dynamics with their sign turned."""
     import casadi
 
-    if not isinstance(programme, StructuredProgramme):
-        raise BackendError("hpipm takes programmes with stages only.")
     steps, n_x, n_u = programme.structure.stages
-    n, K = programme.c.size, sparse.csr_matrix(programme.K)
-    if (np.diff(K.indptr) != 1).any():
-        raise BackendError("hpipm takes bounds, and no other inequality rows, here.")
-    where, sign = K.indices, np.sign(K.data)
-    bounds = programme.k / K.data
-    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
-    np.maximum.at(lower, where[sign < 0.0], bounds[sign < 0.0])
-    np.minimum.at(upper, where[sign > 0.0], bounds[sign > 0.0])
     H, rows = casadi.DM(programme.H), casadi.DM(-programme.C)
-    given: dict[str, Any] = {
-        "h": H,
-        "g": programme.c,
-        "a": rows,
-        "lba": -programme.d,
-        "uba": -programme.d,
-        "lbx": lower,
-        "ubx": upper,
-    }
+    given: dict[str, Any] = {"h": H, "g": programme.c, "a": rows, "lba": -programme.d, "uba": -programme.d}
+    given |= {"lbx": bounds.lower, "ubx": bounds.upper}
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
     stages = {"N": steps, "nx": [0] + [n_x] * steps, "nu": [n_u] * steps + [0], "ng": [0] * (steps + 1)}
     options: dict[str, Any] = {"inf": FREE, "error_on_fail": False, "record_time": True, "hpipm": settings} | stages
@@ -93,11 +110,40 @@ def _stagewise(programme: Programme, settings: dict):
     def read(found) -> Outcome:
         result, said = found
         x, y, box = (np.asarray(result[name], dtype=float).ravel() for name in ("x", "lam_a", "lam_x"))
-        z = np.maximum(sign * box[where], 0.0) / np.abs(K.data)
         message = f"hpipm: {'solved' if said['success'] else 'return status {}'.format(said['return_status'])}"
-        return Outcome(x, -y, z, said["success"], message, max(int(said["iter_count"]), 0))
+        return Outcome(x, -y, bounds.multipliers(box), said["success"], message, max(int(said["iter_count"]), 0))
 
     return call, read, _wall_time, _quiet()
+
+
+def _fatrop(programme: StructuredProgramme, bounds: Bounds, settings: dict):
+    """Fatrop as the solver of nonlinear programmes that it is; the functions that it evaluates are made beforehand."""
+    import casadi
+
+    steps, n_x, n_u = programme.structure.stages
+    x = casadi.MX.sym("x", programme.c.size)
+    rows = casadi.mtimes(casadi.DM(programme.C), x)
+    cost = 0.5 * casadi.bilin(casadi.DM(programme.H), x, x) + casadi.dot(casadi.DM(programme.c), x)
+    options: dict[str, Any] = {"expand": True, "print_time": False, "record_time": True, "error_on_fail": False}
+    options |= {"structure_detection": "manual", "equality": [True] * programme.d.size}
+    options |= {"N": steps, "nx": [0] + [n_x] * steps, "nu": [n_u] * steps + [0], "ng": [0] * (steps + 1)}
+    options["fatrop"] = {"print_level": 0} | settings
+    made = casadi.nlpsol("solver", "fatrop", {"x": x, "f": cost, "g": rows}, options)
+    given: dict[str, Any] = {"lbg": programme.d, "ubg": programme.d, "lbx": bounds.lower, "ubx": bounds.upper}
+
+    def call():
+        return made(**given), made.stats()
+
+    def read(found) -> Outcome:
+        result, said = found
+        x, y, box = (np.asarray(result[name], dtype=float).ravel() for name in ("x", "lam_g", "lam_x"))
+        message = f"fatrop: {'solved' if said['success'] else 'return status {}'.format(said['return_status'])}"
+        return Outcome(x, y, bounds.multipliers(box), said["success"], message, max(int(said["iter_count"]), 0))
+
+    return call, read, _wall_time, _quiet()
+
+
+STAGEWISE: dict[str, Callable[..., Any]] = {"fatrop": _fatrop, "hpipm": _hpipm}
 
 
 def _wall_time(found) -> Times:

@@ -3,28 +3,29 @@
 import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
-from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time
-from gauss.bench.levels import LIMIT, OWN
+from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time, of_special_form
+from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.markdown import head, number, share, table
-from gauss.bench.measure import OURS, middle
+from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
 from gauss.bench.structured import COULOMB
 from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_right, mean_time
 from gauss.bench.verdicts import is_false, stated, truth
 
+MAIN = "high"  # level of leaderboards, sentences and charts
 HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
-acceleration of a body or joint, is at most {RIGHT:g}; of a problem without a solution, its proven verdict is stated.
-**Kept**: residuals and gap are within the tolerance asked for. **Claimed, beyond**: success was claimed, and a
-residual or the gap is above the tolerance and above rounding. **False verdict**: a problem is called infeasible or
-unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and quadprog. Error of multipliers: of the
-solver's own, row by row or constraint by constraint, without the directions that redundant rows leave open; a solver
-that gives none is off by 1. Errors are medians over all problems.
+acceleration of a body or joint, is at most {RIGHT:g}, that of multipliers at most {WRONG:g}; of a problem without a
+solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for. **Claimed,
+beyond**: success was claimed, and a residual or the gap is above the tolerance and above rounding. **False verdict**:
+a problem is called infeasible or unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and
+quadprog. Error of multipliers: of the solver's own, row by row or constraint by constraint, without the directions
+that redundant rows leave open; a solver that gives none is off by 1. Errors are medians over all problems.
 
-Times are calls from Python on a ready problem, set-up included: shifted geometric means over all problems, a problem
-that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least, for the machine may be
-shared. Library: the share of a call that the library reports as its own set-up and solve. Bounds are given as rows. How
-solvers are set is said in [the comparison](qp.md)."""
+Times are CPU times of calls from Python on a ready problem, set-up included: shifted geometric means over all
+problems, a problem that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least. Library:
+the share of a call that the library reports as its own set-up and solve. Bounds are given as rows. How solvers are set is
+said in [the comparison](qp.md)."""
 
 WARM = """Warm starts begin at the solution of the step before, where qpsolvers hands it on, which is x alone; set-up is made
 anew, so that what they spare is iterations. Medians over the steps that have one."""
@@ -35,20 +36,24 @@ NONE_OF_OURS = "Methods of gauss itself take the problem of an instant of a mech
 BY_CLASS = {
     "cones": """Asked are the solvers here that take second-order cones. Residuals count what is outside of a cone, of the
 answer and of its multipliers. ECOS has a linear objective, so that it gets the epigraph of the quadratic one, which is made
-before the clock runs.""",
+before the clock runs. MuJoCo's solvers take impulses of contacts with a positive definite matrix, which they regularise by
+a part of its own diagonal, so that they are asked the very problem; making their arrays is not timed. Their tolerance is of
+the decrease of the cost in an iteration, the square of that of the level.""",
     "coulomb": """The answer is judged by the law itself: the primal residual is friction beyond its limit, the dual one an
 approaching velocity, the gap the sum of |u_n r_n| and of what sliding friction falls short of the most that it can
 dissipate; multipliers are the velocities. newton is gauss's own solver of time stepping, in machine code, with a tolerance
-of its own; the others are short references in Python, whose times are those of Python. MuJoCo's solvers take models, not
-such problems, and soften contacts.""",
+of its own; the others are short references in Python, whose times are those of Python. MuJoCo's solvers are asked for
+[cones](qp_cones.md): theirs is the convex step, which lifts bodies that slide.""",
     "mpc": """HPIPM gets stages, and bounds as such; those that are infinite are 1e6, for residuals round where they are
 larger. CasADi analyses the structure of the problem anew in every call, which its library does not count: that is
-HPIPM's solve alone. Fatrop's interface in CasADi fails on these problems.""",
+HPIPM's solve alone. Fatrop, a solver of nonlinear programmes with stages, gets functions of cost and rows, which are made
+before the clock runs; its tolerance is scaled, and its bounds are loose by about 1e-8.""",
 }
 
 
 def class_page(kind: str, rows, header: list[str], chart: str) -> str:
-    """The page of a class."""
+    """The page of a class: all of its main level, and a table by levels where there are others."""
+    every, rows = rows, at_main_level(rows)
     problems = list(dict.fromkeys(row["problem"] for row in rows))
     mine = ordered(cells(rows))
     solvable = any(truth(row) == SOLVABLE for row in rows)
@@ -56,12 +61,60 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
     lines += [BY_CLASS[kind], ""] if kind in BY_CLASS else []
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
-    lines += _board(mine, solvable) + _sentences(mine, *fronts(rows)[1:])
+    lines += _board("Leaderboard", mine, solvable) + _sentences(list(mine), mine, *fronts(rows)[1:])
+    special = of_special_form(rows, set(mine))
+    lines += _special_board(special, set(mine), solvable)
     if set(OURS) & set(mine):
         lines += [OWN_TIMES, ""]
     elif kind != COULOMB:
         lines += [NONE_OF_OURS, ""]
-    return "\n".join(lines + _by_problem(problems, mine)) + "\n"
+    return "\n".join(lines + _by_level(every, list(mine)) + _by_problem(problems, mine | _added(special, mine))) + "\n"
+
+
+def at_main_level(rows) -> list[dict]:
+    """Rows of the level that a page is about, high or the only one, and those of methods without levels."""
+    levels = {row["level"] for row in rows} - {OWN}
+    main = MAIN if MAIN in levels else max(levels, key=list(LEVELS).index, default=OWN)
+    return [row for row in rows if row["level"] in (main, OWN)]
+
+
+def _by_level(rows, names: list[str]) -> list[str]:
+    """What each solver kept, had right and took at every level, on the problems that were asked at all of them."""
+    levels = [level for level in LEVELS if any(row["level"] == level for row in rows)]
+    common = set.intersection(*({row["problem"] for row in rows if row["level"] == level} for level in levels or [OWN]))
+    found = _lines_by_level(rows, names, levels, common)
+    if len(levels) < 2 or not found:
+        return []
+    words = "; ".join(f"{level} {LEVELS[level]:g}" for level in levels)
+    return [
+        "## By level",
+        "",
+        f"Tolerances: {words}. Asked at each: {len(common)} problems. Right, kept; claimed, beyond where that is not none. "
+        "Then shifted geometric means of times in ms.",
+        "",
+        *table(["solver", *levels, *(f"{level} [ms]" for level in levels)], found),
+        "",
+    ]
+
+
+def _lines_by_level(rows, names: list[str], levels: list[str], problems: set[str]) -> list[list]:
+    """A line for each solver that was asked all of the problems at all levels."""
+    cells_at: dict[tuple[str, str], list[dict]] = {}
+    for row in rows:
+        if row["problem"] in problems:
+            cells_at.setdefault((row["backend"], row["level"]), []).append(row)
+    found = {name: [cells_at.get((name, level), []) for level in levels] for name in names}
+    complete = {name: mine for name, mine in found.items() if all(len(one) == len(problems) for one in mine)}
+    return [[name, *map(_at_level, mine), *map(_mean, mine)] for name, mine in complete.items()]
+
+
+def _at_level(found: list[dict]) -> str:
+    broken = sum(map(is_broken, found))
+    return f"{sum(map(is_right, found))}, {sum(map(is_kept, found))}{f'; {broken} beyond' if broken else ''}"
+
+
+def _mean(found: list[dict]) -> str:
+    return f"{1e3 * mean_time(found):.3g}"
 
 
 def ordered(mine: dict[str, list[dict]]) -> dict[str, list[dict]]:
@@ -69,7 +122,22 @@ def ordered(mine: dict[str, list[dict]]) -> dict[str, list[dict]]:
     return dict(sorted(mine.items(), key=lambda item: (-sum(map(is_right, item[1])), mean_time(item[1]))))
 
 
-def _board(mine: dict[str, list[dict]], solvable: bool) -> list[str]:
+def _special_board(rows: list[dict], general: set[str], solvable: bool) -> list[str]:
+    """Leaderboard of the problems that solvers of a special form take, and sentences about these; none without any."""
+    if not rows:
+        return []
+    mine, overall, panels = ordered(cells(rows)), *fronts(rows)[1:]
+    title = f"Leaderboard of the {len(set(row['problem'] for row in rows))} problems that solvers of a special form take"
+    named = [name for name in mine if name not in general]
+    return _board(title, mine, solvable) + _sentences(named, mine, overall, panels)[2:]
+
+
+def _added(rows: list[dict], general: dict[str, list[dict]]) -> dict[str, list[dict]]:
+    """Cells of solvers of a special form."""
+    return {name: found for name, found in ordered(cells(rows)).items() if name not in general}
+
+
+def _board(title: str, mine: dict[str, list[dict]], solvable: bool) -> list[str]:
     warm = any(np.isfinite(row.get("warm", np.nan)) for found in mine.values() for row in found)
     titles = ["", "solver", "right", "false verdicts", "claimed, beyond"]
     titles += ["kept", "error", "error of multipliers"] if solvable else ["no verdict"]
@@ -82,7 +150,7 @@ def _board(mine: dict[str, list[dict]], solvable: bool) -> list[str]:
         texts += [sum(row["outcome"] in ("crashed", "timed out") for row in found), _factor(mean_time(found) / least)]
         texts += [_in_library(found)]
         body.append(texts + ([_warm(found)] if warm else []))
-    return ["## Leaderboard", "", *table(titles, body), *(["", WARM] if warm else []), ""]
+    return [f"## {title}", "", *table(titles, body), *(["", WARM] if warm else []), ""]
 
 
 def _accuracy(found: list[dict]) -> list[str]:
@@ -96,7 +164,7 @@ def _in_library(found: list[dict]) -> str:
     """Median share of the times of right answers that the library itself reports: of set-up and solve, or of solve alone."""
     times = [(row["seconds"], row["library"], row.get("solve", np.nan)) for row in found if is_right(row)]
     shares = [(whole if np.isfinite(whole) else solve) / call for call, whole, solve in times]
-    return f"{np.median(shares):.0%}" if np.isfinite(shares).any() else "–"
+    return f"{np.nanmedian(shares):.0%}" if np.isfinite(shares).any() else "–"
 
 
 def _factor(value: float) -> str:
@@ -109,9 +177,11 @@ def _warm(found: list[dict]) -> str:
     return f"{np.median(shares):.2g}" if shares else "takes no start"
 
 
-def _sentences(mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]) -> list[str]:
+def _sentences(
+    names: list[str], mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]
+) -> list[str]:
     lines = ["## What each is good for", ""]
-    lines += [f"* **{name}** {sentence(name, mine, overall, panels)}" for name in mine]
+    lines += [f"* **{name}** {sentence(name, mine, overall, panels)}" for name in names]
     return [*lines, ""]
 
 
@@ -157,12 +227,14 @@ def _by_problem(problems: list[str], mine: dict[str, list[dict]]) -> list[str]:
         "Error, and in brackets that of the multipliers; the verdict where one is stated. Bold: claimed, beyond, or a false "
         "verdict. –: no answer.",
         "",
-        *table(["problem", *mine], ([problem, *(_cell(at[name, problem]) for name in mine)] for problem in problems)),
+        *table(["problem", *mine], ([problem, *(_cell(at.get((name, problem))) for name in mine)] for problem in problems)),
         "",
     ]
 
 
 def _cell(row) -> str:
+    if row is None:  # not asked
+        return ""
     if row["outcome"] in ("crashed", "timed out"):
         return row["outcome"]
     verdict = stated(row)

@@ -10,10 +10,11 @@ from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.qp import NAME, compare
 from gauss.bench.suite import CLASSES, recipes
-from gauss.bench.suite_instances import SUITE, of_suite
+from gauss.bench.suite_instances import SUITE, of_suite, suite_class
 from gauss.bench.table import ResultTable
 
 FEW = 8  # problems of a class in a quick run, evenly spread
+TOGETHER = {"friction": ("cones", "coulomb")}  # names of several classes
 STORIES = {
     "equality": "Accelerations of open and closed mechanisms: equality rows alone.",
     "inequality": "Joints at stops and boxes on points.",
@@ -52,11 +53,16 @@ def compare_class(
     return compare(folder, instances=_instances(kind, wanted), name=name_of(kind), **how)
 
 
+def classes_named(kinds: Iterable[str]) -> list[str]:
+    """Classes by name, with those that a name stands for in its place, each once."""
+    return list(dict.fromkeys(one for kind in kinds for one in TOGETHER.get(kind, (kind,))))
+
+
 def problems_of(kind: str) -> tuple[str, ...]:
     """Names of the problems of a class."""
     if kind in GROUPS:
         return tuple(name for name in SELECTION if group_of(make_problem(name)) == kind)
-    return tuple(recipe.name for recipe in recipes(kind))
+    return tuple(recipe.name for recipe in recipes(suite_class(kind)))
 
 
 def spread(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -72,7 +78,7 @@ def name_of(kind: str) -> str:
 
 def story_of(kind: str) -> str:
     """What is in a class."""
-    return STORIES.get(kind) or CLASSES[kind]
+    return STORIES.get(kind) or CLASSES[suite_class(kind)]
 
 
 def _instances(kind: str, names: tuple[str, ...]) -> Iterator[Instance]:

@@ -12,12 +12,14 @@ import qpsolvers
 
 from gauss.backends import qpsolvers_
 from gauss.backends.programme import Outcome, Programme, Programmed
-from gauss.bench import casadi_, clocks, conic, coulomb
+from gauss.bench import casadi_, clocks, conic, coulomb, mujoco_
+from gauss.bench.instances import FILE, Instance
 from gauss.bench.levels import settings
-from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, ProgrammeStructure, StructuredProgramme
+from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, StructuredProgramme
 from gauss.errors import BackendError
 
-WARM = ("cvxopt", "osqp", "proxqp", "qpalm", "scs")  # to which qpsolvers hands a first x; it ignores that for all others
+# To which qpsolvers hands a first x; it ignores that for all others.
+WARM = ("cvxopt", "osqp", "proxqp", "pyqpmad", "qpalm", "scs", "sip")
 DENSE = 3e7  # entries of dense matrices, 0.24 GB
 
 
@@ -46,8 +48,10 @@ class Ready:
 
 def contestants(kind: str = ROWS) -> list[str]:
     """Names of the solvers that can be compared here on programmes with a structure of one kind; of rows alone at first."""
-    if kind in (CONES, COULOMB):
-        return {CONES: conic, COULOMB: coulomb}[kind].installed()
+    if kind == COULOMB:
+        return coulomb.installed()
+    if kind == CONES:
+        return [*conic.installed(), *mujoco_.installed()]
     through_casadi = [*casadi_.SOLVERS, *(casadi_.STAGEWISE if kind == STAGES else ())]
     return [*qpsolvers_.installed(), *(through_casadi if find_spec("casadi") else ())]
 
@@ -69,6 +73,8 @@ def ready(solver: str, programme: Programme, level: str) -> Ready:
         return _own(solver, programme)
     chosen = settings(solver, level)
     if isinstance(programme, StructuredProgramme) and (kind := programme.structure.kind) in (CONES, COULOMB):
+        if solver in mujoco_.SOLVERS:
+            return Ready(*mujoco_.ready(solver, programme, chosen))
         return Ready(*{CONES: conic, COULOMB: coulomb}[kind].ready(solver, programme, chosen))
     if solver in (*casadi_.SOLVERS, *casadi_.STAGEWISE):
         return Ready(*casadi_.ready(solver, programme, chosen))
@@ -90,9 +96,11 @@ def started(solver: str, programme: Programme, level: str, start: np.ndarray) ->
     return replace(cold, call=lambda: qpsolvers.solve_problem(problem, solver, initvals=start, **chosen))
 
 
-def suits(solver: str, structure: ProgrammeStructure) -> bool:
+def suits(solver: str, instance: Instance) -> bool:
     """Whether a solver takes programmes with such a structure; one's own get all."""
-    return ":" in solver or solver in contestants(structure.kind)
+    if solver in mujoco_.SOLVERS:
+        return instance.structure.kind == CONES and mujoco_.takes(instance.programme(FILE))
+    return ":" in solver or solver in contestants(instance.structure.kind)
 
 
 def takes(solver: str, programme: Programme) -> bool:

@@ -1,13 +1,14 @@
 """Error against time: which solvers no other beats in both, on one problem and over a class."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.bench.levels import OWN
-from gauss.bench.measure import middle
+from gauss.bench.measure import OURS, middle
 from gauss.bench.problems import SOLVABLE
-from gauss.bench.summary import complete, mean_time
+from gauss.bench.summary import complete, is_without_multipliers, mean_time
 from gauss.bench.verdicts import truth
 
 FORM = "F2s"  # of what is asked; programmes of files have their own
@@ -28,32 +29,53 @@ def cells(rows) -> dict[str, list[dict]]:
     return {f"{name} {level}" if several and level != OWN else name: mine for (name, level), mine in found.items()}
 
 
+def of_special_form(rows, general: Iterable[str]) -> list[dict]:
+    """Rows of the problems that solvers of a special form were asked, with those of all others."""
+    problems = {row["problem"] for row in rows if row["backend"] not in (*OURS, *general)}
+    return [row for row in rows if row["problem"] in problems]
+
+
 def in_time(row) -> bool:
     """Whether there is an answer: one that comes late is none."""
     return row["outcome"] == "answered"
 
 
 def error_of(row) -> float:
-    """Error of an answer; nan where there is none."""
-    return row["error"] if in_time(row) else np.nan
+    """Error of an answer; nan where there is none, or one without its multipliers."""
+    return row["error"] if in_time(row) and not is_without_multipliers(row) else np.nan
 
 
 def fronts(rows) -> tuple[list[str], dict[str, FrontPoint], dict[str, dict[str, FrontPoint]]]:
     """Names of the solvers, their points over all problems with a solution, and problem by problem.
 
     Times are relative to the least, of the means over all problems and of the answers to one. Errors over all problems are
-    medians, where no answer is worse than any; who has none to half of the problems has no point.
+    medians, where no answer is worse than any; who has none to half of the problems has no point. Solvers of a special form
+    stand on the problems that they take.
     """
     rows = [row for row in rows if truth(row) == SOLVABLE]
     mine = cells(rows)
     means = {name: mean_time(found) for name, found in mine.items()}
     errors = {name: middle([error_of(row) for row in found]) for name, found in mine.items()}
     overall = _points({name: (means[name], errors[name]) for name in mine})
+    everyone = (
+        mine
+        if _several_levels(rows)
+        else mine | {n: f for n, f in cells(of_special_form(rows, mine)).items() if n not in mine}
+    )
+    return list(everyone), overall, _panels(everyone)
+
+
+def _several_levels(rows) -> bool:
+    return len({row["level"] for row in rows} - {OWN}) > 1
+
+
+def _panels(found: dict[str, list[dict]]) -> dict[str, dict[str, FrontPoint]]:
+    """Points of each problem, by the names of those who answered it."""
     panels: dict[str, dict[str, tuple[float, float]]] = {}
-    for name, found in mine.items():
-        for row in found:
+    for name, rows in found.items():
+        for row in rows:
             panels.setdefault(row["problem"], {})[name] = row["seconds"], error_of(row)
-    return list(mine), overall, {problem: _points(found) for problem, found in panels.items()}
+    return {problem: _points(points) for problem, points in panels.items()}
 
 
 def _points(found: dict[str, tuple[float, float]]) -> dict[str, FrontPoint]:

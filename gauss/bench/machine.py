@@ -12,7 +12,7 @@ from gauss.versions import version_of
 
 def header(*packages: str) -> list[str]:
     """Lines of the header."""
-    versions = [f"{name} {version_of(name, 'not installed')}" for name in packages]
+    versions = [f"{name} {version_of(name) or 'not installed'}" for name in packages]
     lines = [
         f"date: {date.today().isoformat()}{_load()}",
         f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",

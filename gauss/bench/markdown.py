@@ -34,7 +34,8 @@ def in_time(seconds: float) -> str:
     """Time in the unit that fits."""
     if not np.isfinite(seconds):
         return "–"
-    return f"{1e6 * seconds:.3g} µs" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
+    factor, unit = (1e6, "µs") if seconds < 1e-3 else (1e3, "ms") if seconds < 1.0 else (1.0, "s")
+    return f"{factor * seconds:.3g} {unit}"
 
 
 def number(value: float) -> str:

@@ -65,7 +65,7 @@ def _called(backend: str, programme: Programme, level: str) -> tuple[Outcome, di
             outcome = Outcome(None, None, None, False, f"{type(last).__name__}: {last}")
         else:
             outcome = prepared.read(last)
-    return outcome, summary(seconds) | median_times(times)
+    return outcome, summary(seconds) | median_times(times, seconds)
 
 
 def _warm(instance: Instance, backend: str, programme: Programme, level: str) -> float:

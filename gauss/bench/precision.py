@@ -196,7 +196,7 @@ def attempt(
     tolerances = {"step": setting} if fixed else {"rtol": setting, "atol": setting}
     run: dict[str, Any] = {"integrator": method, "backend": backend or AUTO, "times": [0.0, duration], "progress": False}
     run |= tolerances
-    name = method if backend is None else f"{method}, {backend}"
+    name = method if backend is None else f"{method} with {backend}"
     try:
         began = time.perf_counter()
         trajectory = simulate(system, duration, **run)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.bench.class_page import class_page
+from gauss.bench.class_page import at_main_level, class_page
 from gauss.bench.classes import name_of
 from gauss.bench.fronts import front, fronts
 from gauss.bench.levels import OWN
@@ -30,7 +30,7 @@ def publish_class(folder: Path, kind: str, table: Path) -> list[Path]:
     """Write the page of a class, and its chart if its problems have solutions; return what was written."""
     rows, header, name = read_table(table), header_of(table), name_of(kind)
     chart, page = folder / f"{name}.png", folder / f"{name}.md"
-    names, overall, panels = fronts(rows)
+    names, overall, panels = fronts(at_main_level(rows))
     page.write_text(class_page(kind, rows, header, chart.name if overall else ""), encoding="utf-8")
     if not overall:
         return [page]

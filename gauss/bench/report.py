@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gauss.bench import compiled
+from gauss.bench.clocks import AROUND
 from gauss.bench.instances import FILE as FILE_FORM
 from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.markdown import head, in_time, number, share, table
@@ -22,6 +23,7 @@ from gauss.bench.summary import (
     clocks,
     groups,
     is_broken,
+    is_kept,
     is_right,
     is_wrong,
     sensitivity,
@@ -36,17 +38,18 @@ HOW = f"""Every backend gets the same quadratic programmes of mechanisms, in a p
 error of an answer is the largest relative error of a body's or joint's acceleration against a reference with residuals of
 50 digits. F2: accelerations of the bodies, in their units; F2s: scaled by Φ^½, rows of unit length. Levels are absolute
 tolerances of residuals and duality gap: low 1e-3, mid 1e-6, high 1e-9, tightest 1e-12 (HiGHS 1e-10). An answer after
-{LIMIT:g} s is none.
+{LIMIT:g} s of CPU time is none.
 
-Two rules, the same for all. **Right**: the error is at most {RIGHT:g}, whoever answered and whatever a certificate says.
-**Kept**: primal and dual residual and gap are within the tolerance that was asked for, as qpbenchmark judges; a solver
-that promised a residual is held to that, and its error is another column. **Claimed, beyond**: success was claimed, and a
-residual or the gap is above the tolerance and above ten times the rounding of its own terms, where forces of 1e9 leave no
-other choice.
+Two rules, the same for all. **Right**: the error is at most {RIGHT:g}, that of multipliers at most {WRONG:g}, whoever
+answered and whatever a certificate says. **Kept**: primal and dual residual and gap are within the tolerance that was
+asked for, as qpbenchmark judges; a solver that promised a residual is held to that, and its error is another column.
+**Claimed, beyond**: success was claimed, and a residual or the gap is above the tolerance and above ten times the
+rounding of its own terms, where forces of 1e9 leave no other choice.
 
 Times are medians of calls from Python, set-up included, on a problem in the form that the solver takes; making that form
-is not timed. The time of the library is what it reports of itself. Those of gauss's own methods include making their
-matrices in Python. Means are shifted geometric means over all problems of a class (shift {1e3 * SHIFT:g} ms), a problem
+is not timed. They are wall times, or CPU times of the process where these are less, so that a busy machine adds nothing.
+The time of the library is what it reports of itself. Those of gauss's own methods include making their matrices in
+Python. Means are shifted geometric means over all problems of a class (shift {1e3 * SHIFT:g} ms), a problem
 that is not solved right counting as {LIMIT:g} s. The machine may be shared: times side by side compare, single ones are
 no records. Errors of multipliers are those of the solver's own, constraint by constraint, without what redundant rows leave
 open; a solver that gives none is off by 1."""
@@ -78,7 +81,8 @@ def _errors(rows) -> list[str]:
         f"## Errors, {FORM}, level {LEVEL}",
         "",
         "In brackets: not certified. Bold: claimed, beyond. –: refused, or no finite "
-        f"answer; {compiled.NAME}, which has no certificate: errors of joints alone.",
+        f"answer; {compiled.NAME}, which has no certificate: errors of joints alone. Kept: residuals are within the "
+        "tolerance, of a problem without a reference.",
         "",
         *table(
             ["backend", *problems], ([name, *(_cell(cells.get((name, p))) for p in problems)] for name in backends(rows))
@@ -98,6 +102,8 @@ def _cell(row) -> str:
         return ""
     if row["outcome"] in ("crashed", "timed out"):
         return row["outcome"]
+    if row["outcome"] == "answered" and np.isnan(row["error"]):  # nothing is known of it but its residuals
+        return "kept" if is_kept(row) else "**claimed**" if is_broken(row) else "not kept"
     if not np.isfinite(row["error"]):
         return "**not finite**" if row["claimed"] else "–"
     text = number(row["error"])
@@ -177,10 +183,10 @@ def _times(rows) -> list[str]:
         if group == INCONSISTENT or not names:
             continue
         lines += [
-            f"## Times, class {group}, {FORM}, level {LEVEL}",
+            f"## Times, class {group}, {_form_of(rows, group)}, level {LEVEL}",
             "",
             "Microseconds of right answers: call from Python / reported by the library, – where it reports none (of "
-            "cvxopt, highs, qpax and quadprog: around the call of the library).",
+            f"{', '.join(AROUND)}: around the call of the library).",
             "",
             *table(["problem", *names], ([p, *(_both(cells.get((name, p))) for name in names)] for p in problems)),
             "",
@@ -191,6 +197,12 @@ def _times(rows) -> list[str]:
             "",
         ]
     return lines
+
+
+def _form_of(rows, group: str) -> str:
+    """Form of a class in tables that show one: of programmes of files their own."""
+    forms = {row["form"] for row in rows if row["group"] == group}
+    return FILE_FORM if FILE_FORM in forms else FORM
 
 
 CLOCKS = ("backend", "right", "cold / warm", "spread", "library / call", "set-up / library")
@@ -216,7 +228,7 @@ def _means(rows) -> list[str]:
         if group == INCONSISTENT or not found:
             continue
         lines += [
-            f"## What means hinge on, class {group}, {FORM}, level {LEVEL}",
+            f"## What means hinge on, class {group}, {_form_of(rows, group)}, level {LEVEL}",
             "",
             "Shifted geometric means by shift and by what a problem costs that is not solved right; in brackets the rank.",
             "",
@@ -272,19 +284,20 @@ def _beside(line: dict) -> list[str]:
 def _honesty(rows) -> list[str]:
     """Promises and certificates: the same questions to all who answered."""
     asked = [r for r in rows if r["group"] != INCONSISTENT and r["backend"] != compiled.NAME]
-    claims = [_claims(level, [r for r in asked if r["level"] == level and r["claimed"]]) for level in LEVELS]
-    foreign = _certified("QP solvers", [r for r in asked if r["level"] in LEVELS])
+    by_level = {level: [r for r in asked if r["level"] == level] for level in (*LEVELS, OWN)}
+    ours = by_level.pop(OWN)
     return [
         "## Honesty",
         "",
-        *claims,
-        foreign,
-        _certified("gauss's own methods", [r for r in asked if r["level"] == OWN]),
+        *(_claims(level, found) for level, found in by_level.items() if found),
+        _certified("QP solvers", [r for found in by_level.values() for r in found]),
+        _certified("gauss's own methods", ours),
         "",
     ]
 
 
-def _claims(level: str, claims: list[dict]) -> str:
+def _claims(level: str, asked: list[dict]) -> str:
+    claims = [r for r in asked if r["claimed"]]
     broken, wrong = [r for r in claims if is_broken(r)], [r for r in claims if is_wrong(r)]
     return (
         f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with a residual or a gap above the "

@@ -6,7 +6,7 @@ from gauss.backends.accuracy import DEFAULT_TOLERANCE, KEPT, own_settings
 from gauss.bench import casadi_
 from gauss.bench.clocks import AROUND
 from gauss.bench.contestants import contestants
-from gauss.bench.levels import settings
+from gauss.bench.levels import LIMIT, WALL_LIMIT, settings
 from gauss.bench.markdown import table
 
 COMPARED = ("backend", "called through", "matrices", "the library reports", "settings")
@@ -19,8 +19,9 @@ def settings_lines(solvers: list[str], level: str) -> list[str]:
     return [
         f"## Settings of the comparison, level {level}",
         "",
-        "Tolerances are those that qpbenchmark sets, limits of time and iterations are common to all that take them; "
-        "all others are the defaults of the solver, tuned for none. At other levels the tolerances differ and nothing "
+        f"Tolerances are those that qpbenchmark sets, limits of iterations are common to all that take them. {LIMIT:g} s of "
+        f"CPU time ends a call, whatever a solver can be told; its own limits, of wall time, are {WALL_LIMIT:g} s. "
+        "All others are the defaults of the solver, tuned for none. At other levels the tolerances differ and nothing "
         "else.",
         "",
         *table(COMPARED, (_compared(name, level) for name in known)),

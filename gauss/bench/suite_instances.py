@@ -15,11 +15,18 @@ from gauss.bench.suite.instance import SOLVED
 from gauss.bench.suite.optimality import plain_multipliers
 from gauss.bench.suite.refine import held_rows
 
-SUITE = tuple(kind for kind in CLASSES if kind != "equality")  # equality rows alone are in the selection
+INDEPENDENT = "independent"  # the suite's class "equality" in the comparison, whose selection has one of that name
+SUITE = (INDEPENDENT, *(kind for kind in CLASSES if kind != "equality"))
+
+
+def suite_class(kind: str) -> str:
+    """Name in the suite of a class of the comparison."""
+    return "equality" if kind == INDEPENDENT else kind
 
 
 def of_suite(kind: str, names: list[str]) -> Iterator[Instance]:
     """Instances of a class by name; steps of a sequence start at the answer of the step before, whoever is asked."""
+    kind = suite_class(kind)
     order = [recipe.name for recipe in recipes(kind)]
     for name in names:
         (found,) = made([kind], [name])

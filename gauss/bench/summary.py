@@ -1,9 +1,9 @@
 """What the rows of the comparison say together: shares and means over equal sets of problems, and who is fastest.
 
-One rule for all backends, gauss's own among them: an answer is right if its error beside the reference is at most 1e-6,
-and in time. A solver that was asked for a tolerance of its residuals is judged by these, too: it has kept what it
-promised if primal and dual residual and duality gap are within the tolerance, as qpbenchmark judges. Certificates are no
-part of either.
+One rule for all backends, gauss's own among them: an answer is right if its error beside the reference is at most
+1e-6, that of its multipliers at most 1e-3, and in time. A solver that was asked for a tolerance of its residuals is
+judged by these, too: it has kept what it promised if primal and dual residual and duality gap are within the
+tolerance, as qpbenchmark judges. Certificates are no part of either.
 """
 
 from collections.abc import Iterable
@@ -50,7 +50,7 @@ def groups(rows) -> dict[str, list[str]]:
 
 
 def is_right(row) -> bool:
-    """Whether an answer is within 1e-6 of the reference, and in time; whether kept, where there is no reference.
+    """Whether an answer is within 1e-6 of the reference, with multipliers, and in time; whether kept, if none is known.
 
     Of a problem that has no solution, whether its verdict is stated.
     """
@@ -58,7 +58,12 @@ def is_right(row) -> bool:
         return row["outcome"] != "timed out" and stated(row) == truth(row)
     if np.isnan(row["error"]):
         return is_kept(row)
-    return row["outcome"] == "answered" and bool(row["error"] <= RIGHT)
+    return row["outcome"] == "answered" and bool(row["error"] <= RIGHT) and not is_without_multipliers(row)
+
+
+def is_without_multipliers(row) -> bool:
+    """Whether an answer is right but for its multipliers: forces that are wrong for any purpose."""
+    return bool(row["error"] <= RIGHT and dual_error(row) > WRONG)
 
 
 def is_kept(row) -> bool:

@@ -41,9 +41,15 @@ class Worker:
     """A process that calls functions one after another; whatever happens to it, the caller goes on.
 
     Use it in a ``with`` block, which ends the process.
+
+    Parameters
+    ----------
+    environment : dict, optional
+        Environment variables of the process, beside those of one thread.
     """
 
-    def __init__(self):
+    def __init__(self, environment: dict[str, str] | None = None):
+        self.environment = ONE_THREAD | (environment or {})
         self.context = multiprocessing.get_context("spawn")
         self.process: BaseProcess | None = None
         self.pipe: Connection | None = None
@@ -65,9 +71,11 @@ class Worker:
             return Reply(*pipe.recv())
         except (EOFError, BrokenPipeError, ConnectionResetError):
             process.join()
-            reason = _death(process.exitcode)
+            code = process.exitcode
             self.stop()
-            return Reply("crashed", reason=f"the process of the solver died: {reason}")
+            if code is not None and code == -getattr(signal, "SIGPROF", 0):
+                return Reply("timed out", reason="the CPU time of a call was over")
+            return Reply("crashed", reason=f"the process of the solver died: {_death(code)}")
 
     def stop(self):
         """End the process, whatever it does."""
@@ -85,7 +93,7 @@ class Worker:
         pipe, far = self.context.Pipe()
         self.pipe = pipe
         self.process = process = self.context.Process(target=_serve, args=(far,), daemon=True)
-        with STARTING, _one_thread():
+        with STARTING, _environment(self.environment):
             process.start()
         far.close()
         if not pipe.poll(START) or pipe.recv() != "ready":
@@ -127,9 +135,9 @@ def _serve(pipe):
 
 
 @contextmanager
-def _one_thread():
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
+def _environment(given: dict[str, str]):
+    before = {name: os.environ.get(name) for name in given}
+    os.environ.update(given)
     try:
         yield
     finally:

@@ -45,8 +45,8 @@ def qp(
         list[str] | None,
         typer.Option(
             "--class",
-            help="A class of problems (see `gauss problems classes`), equality, inequality or inconsistent: a table and a "
-            "report of its own; may be repeated.",
+            help="A class of problems (see `gauss problems classes`), equality, inequality, inconsistent or friction, which "
+            "is cones and coulomb: a table and a report of its own; may be repeated.",
         ),
     ] = None,
     solver: Annotated[
@@ -78,10 +78,11 @@ def qp(
 
     given, usual = _instances(scene, problems), list(QUICK) if quick else None
     chosen = _selection(backend, form, level, solver, quick) | {"fresh": fresh}
-    if group and given is None:
+    if group:
         _compare_classes(output, group, problems=problem, quick=quick, **chosen)
-        return
-    table = compare(output, problems=problem or usual, groups=group, instances=given, **chosen)
+        if given is None:
+            return
+    table = compare(output, problems=problem or usual, instances=given, **chosen)
     along = motions and given is None and not quick
     again = compare_reuse(output, fresh=fresh).path if along else None
     _report(table, publish(output, table.path, again))
@@ -110,12 +111,12 @@ def _import_from_here():
 
 def _compare_classes(output: Path, kinds: list[str], **how):
     """Tables and pages of classes, whose solvers stay in the same processes."""
-    from gauss.bench.classes import compare_class
+    from gauss.bench.classes import classes_named, compare_class
     from gauss.bench.publish import publish_class
     from gauss.bench.worker import Workers
 
     with Workers() as workers:
-        for kind in kinds:
+        for kind in classes_named(kinds):
             table = compare_class(output, kind, workers=workers, **how)
             _report(table, publish_class(output, kind, table.path))
 
@@ -242,7 +243,8 @@ def chart(
         typer.echo(f"  {', '.join(methods)}: {reason}")
     typer.echo("Pareto front:")
     for one in front(done):
-        typer.echo(f"  {one.error:.1e} m in {1e3 * one.seconds:.3g} ms by {one.method} with {one.setting:.2g}")
+        error = f"{one.error:.1e} m" if one.error else "the reference to the last bit"
+        typer.echo(f"  {error} in {1e3 * one.seconds:.3g} ms by {one.method}, {one.setting:.2g}")
     name = found.name or scene
     title, note = f"What a digit costs: {name}, {duration:g} s", f"reference: {against.source}"
     plot_precision({name: done}, output, title, note, {name: against.uncertainty})

@@ -1,15 +1,16 @@
+from gauss.codegen.batch_code import BatchCode, batch_code
 from gauss.codegen.branches import branches
 from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
-from gauss.codegen.expression import Expression, Graph, Scalar, as_number, graph_of, reachable
+from gauss.codegen.expression import Entry, Expression, Graph, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.intrinsics import copy, external, intrinsic
-from gauss.codegen.ir_blocks import BODY, POINTER, constant_array, counted_loop, endless_loop
+from gauss.codegen.ir_blocks import BODY, POINTER, Buffers, constant_array, counted_loop, endless_loop
 from gauss.codegen.kernel import Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
@@ -26,8 +27,10 @@ from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
     "BODY",
+    "BatchCode",
     "DOUBLE",
     "EntryCode",
+    "Entry",
     "Expression",
     "FLAGS",
     "Function",
@@ -41,6 +44,7 @@ __all__ = [
     "LDLT",
     "LEAD",
     "LINE",
+    "Buffers",
     "Lanes",
     "NativeFunction",
     "POINTER",
@@ -50,6 +54,7 @@ __all__ = [
     "Series",
     "Writer",
     "as_number",
+    "batch_code",
     "branches",
     "compile_notice",
     "constant_array",

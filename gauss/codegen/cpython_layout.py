@@ -25,6 +25,9 @@ TABLE_ENTRIES = (
     "tuple_item",
     "float_value",
     "incref",
+    "new_float",
+    "new_tuple",
+    "set_item",
     "new_array",
 )  # names of the entries of the address table
 TYPE_OFFSET = 8  # offset of ob_type in PyObject
@@ -60,6 +63,9 @@ class PinnedObjects:
             "tuple_item": "PyTuple_GetItem",
             "float_value": "PyFloat_AsDouble",
             "incref": "Py_IncRef",
+            "new_float": "PyFloat_FromDouble",
+            "new_tuple": "PyTuple_New",
+            "set_item": "PyTuple_SetItem",
         }
         found = {name: id(pinned) for name, pinned in self.pinned.items()}
         for name, function in functions.items():

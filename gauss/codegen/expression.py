@@ -8,6 +8,7 @@ Evaluating Derivatives, 2nd ed., ch. 6).
 import math
 from collections.abc import Callable
 from numbers import Real
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -345,6 +346,10 @@ class Expression:
 _paths: list = []  # tracers of `if` over expressions, innermost last; see gauss.codegen.branches
 OPERANDS = (*NUMBERS, Expression)
 Scalar = float | Expression  # numbers over which the mechanics is written
+if TYPE_CHECKING:
+    Entry = Any  # a Scalar in a record: which of both is as open to the type checker as the elements of an array are
+else:
+    Entry = Scalar
 
 
 def graph_of(values) -> Graph:

@@ -12,6 +12,7 @@ The buffer protocol, which belongs to CPython's stable ABI, would read the same 
 
 import ctypes
 from collections.abc import Callable
+from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from gauss.codegen.function import Function
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.lanes import DOUBLE, INTEGER
 from gauss.codegen.native_function import NativeFunction
-from gauss.codegen.python_wrapper import Interface, PythonWrapper
+from gauss.codegen.python_wrapper import Interface, PythonWrapper, Shape
 
 FLAG, OBJECT = ir.IntType(32), ir.IntType(8).as_pointer()
 CALL = ir.FunctionType(OBJECT, [OBJECT, OBJECT.as_pointer(), INTEGER, OBJECT])  # PyCFunctionFastWithKeywords
@@ -87,7 +88,14 @@ def entry_code(function: Function | NativeFunction, interface: Interface) -> Ent
     return EntryCode(machine.load(str(writer.module)), len(function.outputs))
 
 
-def fastcall(entry: EntryCode, interface: Interface, over_limit: Callable, name: str, doc: str):
+def fastcall(
+    entry: EntryCode,
+    interface: Interface,
+    over_limit: Callable,
+    name: str,
+    doc: str,
+    batch: Callable[[], Callable] | None = None,
+):
     """Built-in function ``name(*vectors, out=None, number=0.0)`` of compiled code.
 
     Parameters
@@ -100,14 +108,16 @@ def fastcall(entry: EntryCode, interface: Interface, over_limit: Callable, name:
         Function of the same arguments, called where a limit is exceeded: its result or exception is the outcome.
     name, doc : str
         Name and docstring of the function.
+    batch : callable, optional
+        Maker of its code over rows of arrays, as of :class:`PythonWrapper`.
 
     Returns
     -------
     callable
-        Returns ``out``, or a new array (n_out,). It raises :class:`gauss.errors.StateError` if an argument does not fit.
+        Returns ``out``, or new arrays. It raises :class:`gauss.errors.StateError` if an argument does not fit.
     """
     code, outputs = entry
-    fallback = PythonWrapper(_CtypesCall(code, outputs), interface, outputs, over_limit, name, doc)
+    fallback = PythonWrapper(_CtypesCall(code, outputs), interface, outputs, over_limit, name, doc, batch)
     if not cpython_layout.is_known():
         return fallback
     called = _PythonEntry(cpython_layout.PinnedObjects(fallback, over_limit))
@@ -143,6 +153,7 @@ class _EntryWriter:
 
     def __init__(self, writer: Writer, function: Function | NativeFunction, interface: Interface):
         self.interface, self.sizes, module = interface, interface.sizes, writer.module
+        self.shapes = interface.result_shapes(len(function.outputs))
         self.n_out = len(function.outputs) - len(interface.limits)
         self.body = writer.body(function)
         self.table = ir.GlobalVariable(module, ir.ArrayType(INTEGER, len(cpython_layout.TABLE_ENTRIES)), "table")
@@ -168,7 +179,7 @@ class _EntryWriter:
         self._require(b.icmp_signed("<=", total, INTEGER(last + 2)))
         place = 0
         for k, size in enumerate(sizes):
-            data = self._data(b.load(b.gep(given, [INTEGER(k)])), size, cpython_layout.READABLE_FLAGS)
+            data = self._data(b.load(b.gep(given, [INTEGER(k)])), (size,), cpython_layout.READABLE_FLAGS)
             self._copy(b.gep(numbers, [INTEGER(place)]), data, size)
             place += size
         self._number(given, total, b.gep(numbers, [INTEGER(place)]))
@@ -177,9 +188,7 @@ class _EntryWriter:
         for k, limit in enumerate(self.interface.limits, start=self.n_out):
             within = b.fcmp_ordered("<=", b.load(b.gep(found, [INTEGER(k)])), ir.Constant(DOUBLE, limit))
             self._require(within, self.over_limit)
-        out, data = self._given_or_new(given, total)
-        self._copy(data, found, self.n_out)
-        b.ret(out)
+        b.ret(self._given_or_new(given, total, found))
         for name, block in (("fallback", self.fallback), ("over_limit", self.over_limit)):
             b.position_at_end(block)
             b.ret(b.call(self._pinned("vectorcall", CALL.as_pointer()), [self._pinned(name, OBJECT), given, count, names]))
@@ -234,14 +243,15 @@ class _EntryWriter:
         """Whether an object is of exactly this type."""
         return self.b.icmp_unsigned("==", self._field(thing, cpython_layout.TYPE_OFFSET, OBJECT), self._pinned(kind, OBJECT))
 
-    def _data(self, thing, size: int, flags: tuple[int, int]):
-        """Data of an argument, required to be a vector of ``size`` doubles; flags: mask, and value required under it."""
+    def _data(self, thing, shape: Shape, flags: tuple[int, int]):
+        """Data of an argument, required to be an array of doubles; flags: mask, and value required under it."""
         b, at = self.b, cpython_layout.ARRAY_OFFSETS
         self._require(self._is(thing, "ndarray"))
         self._require(b.icmp_unsigned("==", self._field(thing, at["descr"], OBJECT), self._pinned("double", OBJECT)))
-        self._require(b.icmp_signed("==", self._field(thing, at["nd"], FLAG), FLAG(1)))
-        length = b.load(self._field(thing, at["dimensions"], INTEGER.as_pointer()))
-        self._require(b.icmp_signed("==", length, INTEGER(size)))
+        self._require(b.icmp_signed("==", self._field(thing, at["nd"], FLAG), FLAG(len(shape))))
+        for k, size in enumerate(shape):
+            length = b.load(b.gep(self._field(thing, at["dimensions"], INTEGER.as_pointer()), [INTEGER(k)]))
+            self._require(b.icmp_signed("==", length, INTEGER(size)))
         looked_at, needed = flags
         found = b.and_(self._field(thing, at["flags"], FLAG), FLAG(looked_at))
         self._require(b.icmp_unsigned("==", found, FLAG(needed)))
@@ -259,30 +269,58 @@ class _EntryWriter:
         has_number = b.icmp_signed(">", total, INTEGER(place))
         b.store(self._either(has_number, value, lambda: ir.Constant(DOUBLE, 0.0)), target)
 
-    def _given_or_new(self, given, total):
-        """Array of the results, with a reference for the caller, and its data."""
+    def _given_or_new(self, given, total, found):
+        """Results with a reference for the caller: in the array that is given, or in new ones."""
         b, none, place = self.b, self._pinned("none", OBJECT), len(self.sizes)
         asked = b.icmp_signed(">", total, INTEGER(place))
         out = self._either(asked, lambda: b.load(b.gep(given, [INTEGER(place)])), lambda: none)
+        is_given = b.icmp_unsigned("!=", out, none)
+        if len(self.shapes) > 1:
+            self._require(b.not_(is_given))
+            return self._new_tuple(found)
 
         def taken():
-            self._data(out, self.n_out, cpython_layout.WRITEABLE_FLAGS)
+            self._copy(self._data(out, self.shapes[0], cpython_layout.WRITEABLE_FLAGS), found, self.n_out)
             b.call(self._pinned("incref", ir.FunctionType(ir.VoidType(), [OBJECT]).as_pointer()), [out])
             return out
 
-        array = self._either(b.icmp_unsigned("!=", out, none), taken, self._new)
-        return array, self._field(array, cpython_layout.ARRAY_OFFSETS["data"], DOUBLE.as_pointer())
+        return self._either(is_given, taken, lambda: self._new(self.shapes[0], found))
 
-    def _new(self):
-        """New array; if numpy has no memory, the call ends with numpy's error."""
+    def _new_tuple(self, found):
+        """New tuple of new results."""
+        b, place = self.b, 0
+        parts = []
+        for shape in self.shapes:
+            parts.append(self._new(shape, b.gep(found, [INTEGER(place)])))
+            place += prod(shape)
+        made = b.call(self._pinned("new_tuple", ir.FunctionType(OBJECT, [INTEGER]).as_pointer()), [INTEGER(len(parts))])
+        self._end_if_null(made)
+        keep = self._pinned("set_item", ir.FunctionType(FLAG, [OBJECT, INTEGER, OBJECT]).as_pointer())
+        for k, part in enumerate(parts):
+            b.call(keep, [made, INTEGER(k), part])  # which takes the reference
+        return made
+
+    def _new(self, shape: Shape, found):
+        """New array with the results, or a new number; if there is no memory, the call ends with the error of its maker."""
         b, nothing, zero = self.b, ir.Constant(OBJECT, None), FLAG(0)
+        if not shape:
+            made = b.call(self._pinned("new_float", ir.FunctionType(OBJECT, [DOUBLE]).as_pointer()), [b.load(found)])
+            self._end_if_null(made)
+            return made
         with b.goto_entry_block():
-            length = b.alloca(INTEGER)
-        b.store(INTEGER(self.n_out), length)
+            lengths = b.alloca(INTEGER, len(shape))
+        for k, size in enumerate(shape):
+            b.store(INTEGER(size), b.gep(lengths, [INTEGER(k)]))
         signature = [OBJECT, FLAG, INTEGER.as_pointer(), FLAG, OBJECT, OBJECT, FLAG, FLAG, OBJECT]
         make = self._pinned("new_array", ir.FunctionType(OBJECT, signature).as_pointer())
         kind, number = self._pinned("ndarray", OBJECT), FLAG(cpython_layout.NPY_DOUBLE)
-        array = b.call(make, [kind, FLAG(1), length, number, nothing, nothing, zero, zero, nothing])
-        with b.if_then(b.icmp_unsigned("==", array, nothing), likely=False):
-            b.ret(nothing)
+        array = b.call(make, [kind, FLAG(len(shape)), lengths, number, nothing, nothing, zero, zero, nothing])
+        self._end_if_null(array)
+        self._copy(self._field(array, cpython_layout.ARRAY_OFFSETS["data"], DOUBLE.as_pointer()), found, prod(shape))
         return array
+
+    def _end_if_null(self, made):
+        """Return null to Python where an object could not be made."""
+        nothing = ir.Constant(OBJECT, None)
+        with self.b.if_then(self.b.icmp_unsigned("==", made, nothing), likely=False):
+            self.b.ret(nothing)

@@ -6,12 +6,15 @@ from contextlib import contextmanager
 import numpy as np
 from llvmlite import ir
 
+from gauss.codegen.intrinsics import external
 from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes
+from gauss.codegen.recurrences import LINE
 from gauss.codegen.text_builder import TextBuilder
 
-POINTER = DOUBLE.as_pointer()
+POINTER, BYTES = DOUBLE.as_pointer(), ir.IntType(8).as_pointer()
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
 PAGE = 4096  # bytes
+LARGEST_ON_STACK = 8192  # entries of a buffer; stacks of threads may be as small as 512 kB
 
 
 def begin_function(module: ir.Module, name: str, width: int, kind: ir.FunctionType = BODY) -> tuple[ir.Function, Lanes]:
@@ -36,6 +39,43 @@ def _at_a_page(b: ir.IRBuilder):
     room.align = PAGE
     keep = ir.InlineAsm(ir.FunctionType(ir.VoidType(), [room.type]), "", "r", side_effect=True)  # against removal
     b.call(keep, [room])
+
+
+class Buffers:
+    """Buffers of a function: on its stack, large ones on the heap.
+
+    Parameters
+    ----------
+    b : llvmlite.ir.IRBuilder
+        Builder of the function.
+    width : int
+        Numbers in an entry of a buffer.
+    """
+
+    def __init__(self, b: ir.IRBuilder, width: int = 1):
+        self.b, self.width, self._on_heap = b, width, list[ir.Value]()
+
+    def room(self, kind: ir.Type, size: int, align: int | None = None) -> ir.Value:
+        """Buffer of ``size`` values of a kind, numbers or vectors, allocated in the entry block."""
+        with self.b.goto_entry_block():
+            if size > LARGEST_ON_STACK * self.width:
+                return self._heap_room(kind, size)
+            room = self.b.alloca(kind, max(size, 1))
+        room.align = room.align if align is None else align
+        return room
+
+    def _heap_room(self, kind: ir.Type, size: int) -> ir.Value:
+        b, module = self.b, self.b.function.module
+        bytes_ = 8 * size * getattr(kind, "count", 1) + LINE
+        raw = b.call(external(module, "malloc", BYTES, [INTEGER]), [INTEGER(bytes_)])
+        self._on_heap.append(raw)
+        first = b.and_(b.add(b.ptrtoint(raw, INTEGER), INTEGER(LINE - 1)), INTEGER(-LINE))
+        return b.inttoptr(first, kind.as_pointer())
+
+    def free(self):
+        """Free those on the heap, at the end of the function."""
+        for raw in self._on_heap:
+            self.b.call(external(self.b.function.module, "free", ir.VoidType(), [BYTES]), [raw])
 
 
 def constant_array(module: ir.Module, name: str, values: np.ndarray) -> ir.GlobalVariable:

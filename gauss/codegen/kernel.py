@@ -7,6 +7,7 @@ import numpy as np
 from gauss.codegen import machine
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function, write
+from gauss.codegen.native_function import NativeFunction
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
 
@@ -16,7 +17,7 @@ class Kernel:
 
     Parameters
     ----------
-    function : Function
+    function : Function or NativeFunction
         Traced function, or one that emits its own code.
     batch : bool
         Whether many states will be given at once: SIMD code is then compiled as well.
@@ -27,7 +28,7 @@ class Kernel:
         Number of operations of each kind.
     """
 
-    def __init__(self, function: Function, batch: bool = True):
+    def __init__(self, function: Function | NativeFunction, batch: bool = True):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
         writer = Writer()

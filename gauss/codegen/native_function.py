@@ -7,9 +7,10 @@ that traced code, kernels and integrator loops call them.
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
 from llvmlite import ir
 
-from gauss.codegen.expression import Expression, Graph
+from gauss.codegen.expression import Expression, Graph, graph_of
 from gauss.codegen.ir_blocks import BODY
 
 if TYPE_CHECKING:
@@ -42,6 +43,11 @@ class NativeFunction:
         """Symbols of the outputs."""
         return list(Graph().symbols("result", self.arity[1]))
 
+    def __call__(self, *arguments) -> np.ndarray:
+        """Outputs (n_out,) for arguments that contain at least one expression; they are joined to one vector."""
+        given = np.concatenate([np.ravel(np.asarray(argument, dtype=object)) for argument in arguments])
+        return graph_of(given).call(self, given)
+
     def operations(self) -> dict[str, int]:
         """Approximate number of operations of each kind."""
         raise NotImplementedError
@@ -58,7 +64,7 @@ class NativeFunction:
 
     def begin(self, module: ir.Module) -> ir.Function:
         """Begin the code under a name of its own."""
-        function = ir.Function(module, BODY, module.get_unique_name(self.name))
+        function = ir.Function(module, BODY, module.get_unique_name(f"{self.name}_body"))
         function.linkage = "internal"
         return function
 

@@ -7,7 +7,17 @@ from functools import partial
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
-from gauss.codegen import EntryCode, Function, Interface, NativeFunction, PythonWrapper, entry_code, fastcall, write
+from gauss.codegen import (
+    EntryCode,
+    Function,
+    Interface,
+    NativeFunction,
+    PythonWrapper,
+    batch_code,
+    entry_code,
+    fastcall,
+    write,
+)
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
@@ -32,9 +42,10 @@ DOC = """Joint accelerations (n_v,) of a state under generalised forces, in mach
 
 Parameters
 ----------
-q, v, load : ndarray, shape (n_q,), (n_v,), (n_v,)
-    Coordinates (quaternions of unit length), rates, generalised forces added to the loads of the scene [N m, N].
-out : ndarray, shape (n_v,), optional
+q, v, load : ndarray, shape (…, n_q), (…, n_v), (…, n_v)
+    Coordinates (quaternions of unit length), rates, generalised forces added to the loads of the scene [N m, N]; vectors, or
+    batches of them where the system is compiled as a whole.
+out : ndarray, shape (…, n_v), optional
     Array for the result.
 t : float
     Time [s].
@@ -114,7 +125,8 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
             return PythonWrapper(lambda given: kernels.refined(given, loads), interface, system.n_v + 3, last, NAME, DOC)
         if plan.dynamics == "tree recursion":
             entry = written(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
-            return fastcall(entry, interface, last, NAME, DOC)
+            rows = batched(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
+            return fastcall(entry, interface, last, NAME, DOC, rows)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
 
         def to_roundoff():
@@ -122,11 +134,17 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
             entry = written(refined, strict, lambda: write(partial(refined, program), *sizes, name=NAME))
             return fastcall(entry, strict, last, NAME, DOC)
 
-        entry = written(refined_once, interface, lambda: write(partial(refined_once, program), *sizes, name=NAME))
-        return fastcall(entry, interface, TieredFunction(last, to_roundoff), NAME, DOC)
+        once = lambda: write(partial(refined_once, program), *sizes, name=NAME)  # noqa: E731
+        rows = batched(refined_once, interface, once)
+        entry = written(refined_once, interface, once)
+        return fastcall(entry, interface, TieredFunction(last, to_roundoff), NAME, DOC, rows)
 
     def written(what: Callable, interface: Interface, trace: Callable[[], Function | NativeFunction]) -> EntryCode:
         return cached_on_disk(system, (entry_code, what, laws.key), lambda: entry_code(trace(), interface))
+
+    def batched(what: Callable, interface: Interface, trace: Callable[[], Function | NativeFunction]) -> Callable:
+        key = batch_code, what, laws.key
+        return lambda: cached_on_disk(system, key, lambda: batch_code(trace(), interface)).entry()
 
     if plan.dynamics == "unilateral":
         return _unilateral(system, Laws(smooth_system(system), laws.trace))

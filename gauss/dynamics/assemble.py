@@ -145,7 +145,7 @@ def impressed(motion: Kinematics, applied: Applied) -> np.ndarray:
 def position_residual(motion: Kinematics) -> np.ndarray:
     """Position residual φ (r,) of all constraints [rad, m]; zero for tree joints and velocity rows."""
     system, constraints = motion.system, motion.system.structure.constraints
-    phi = np.zeros(system.structure.n_rows)
+    phi: np.ndarray = np.zeros(system.structure.n_rows)
     for index in system.structure.closures:
         rows = constraints[index].rows
         name = constraints[index].name

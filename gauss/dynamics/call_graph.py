@@ -72,10 +72,10 @@ class CallGraph:
         tables = {body: ((kind, pattern if zeros else ()), numbers) for body, (kind, pattern, numbers) in keys.items()}
         self.numbers = self._parameters(tables)
         found = {i: loop_joint_numbers(self.subsystem, i, joint_sides(self.subsystem, links, i)) for i in self.loops}
-        keys = {i: loop.key() for i, loop in self.loops.items()}
-        kinds = list(dict.fromkeys(keys.values()))
-        self.loop_kind = {i: kinds.index(key) for i, key in keys.items()}
-        self.loop_numbers = self._parameters({i: ((keys[i], tuple(n == 0)), n) for i, n in found.items()})
+        loop_keys = {i: loop.key() for i, loop in self.loops.items()}
+        loop_kinds = list(dict.fromkeys(loop_keys.values()))
+        self.loop_kind = {i: loop_kinds.index(key) for i, key in loop_keys.items()}
+        self.loop_numbers = self._parameters({i: ((loop_keys[i], tuple(n == 0)), n) for i, n in found.items()})
 
     def _parameters(self, tables) -> dict:
         """Numbers of members of kinds, {member: (kind, numbers)}, with slots for those that vary within a kind."""
@@ -179,13 +179,13 @@ class CallGraph:
 
     def _sum_blocks(self, joint_forces: dict[int, list]):
         """Sum the blocks uᵀ D⁻¹ w over the joints that two loops share."""
-        self.S: dict[tuple[int, int], np.ndarray] = {}
+        self.S: dict[tuple[int, int], Operand] = {}
         for body, shares in joint_forces.items():
             D_inverse = self.eliminated[body][1]
             for i, (one, u) in enumerate(shares):
                 for other, w in shares[: i + 1]:
                     key, first, second = ((one, other), u, w) if one >= other else ((other, one), w, u)
-                    known = self.S.get(key, np.zeros((first.shape[1], second.shape[1])))
+                    known = self.S[key] if key in self.S else np.zeros((first.shape[1], second.shape[1]))
                     (self.S[key],) = self.recorder.call("gram", _gram, known, first, D_inverse, second)
 
     def _sum(self, one, other):
@@ -217,8 +217,8 @@ class CallGraph:
         for edge in self.edges:
             body = edge.outer
             bias = nothing if still else self.bias[body]
-            across, inner = (*self.kinematics[body], *self.eliminated[body][:2]), accelerations[edge.inner]
-            own, accelerations[body] = self._at_link("carry", body, acceleration, *across, u[body], bias, inner)
+            across, before = (*self.kinematics[body], *self.eliminated[body][:2]), accelerations[edge.inner]
+            own, accelerations[body] = self._at_link("carry", body, acceleration, *across, u[body], bias, before)
             rates[self.joint[body].v] = self.recorder.array(own)
         return rates, self._values(rates, accelerations, still)
 

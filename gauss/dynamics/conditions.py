@@ -8,6 +8,7 @@ from collections.abc import Callable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
+from gauss.integrators import ExplicitPair, FixedStep
 from gauss.system import System, build, phase_scene, sides
 from gauss.system.build import slips
 from gauss.system.elimination_cost import MOST_WORK
@@ -99,6 +100,18 @@ def narrow(ask: Question) -> list[str]:
     return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST else []
 
 
+def explicit(ask: Question) -> list[str]:
+    """The integrator solves no equations."""
+    method = ask.method
+    found = isinstance(method, ExplicitPair | FixedStep) and not method.mechanical
+    return [] if found else [f"integrator {getattr(method, 'name', method)!r} is implicit"]
+
+
+def no_held_inputs(ask: Question) -> list[str]:
+    """Inputs are not held between samples: the machine code of the step has none."""
+    return ["its inputs are held between samples"] if ask.held else []
+
+
 def large_tree(ask: Question) -> bool:
     """Whether kernels of links are faster than straight-line code."""
     return is_large(ask.system)
@@ -128,7 +141,7 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 def smooth_system(system: System) -> System:
     """The system without unilateral and set-valued elements, built once."""
-    make = lambda: build(phase_scene(system.scene), system.dynamics.anew())  # noqa: E731
+    make = lambda: build(phase_scene(system.scene), system.mechanics.anew())  # noqa: E731
     return cached(system, (smooth_system,), make)
 
 

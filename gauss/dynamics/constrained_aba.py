@@ -179,7 +179,8 @@ class ConstrainedArticulatedBody:
 
     def response(self, tau, target) -> tuple[np.ndarray, np.ndarray]:
         """Rates (n_v,) x and multipliers y with M x + Kᵀ y = tau and K x = target."""
-        return self._constrained(*self.articulated.response(tau, self._with_loop_forces({}, tau)), still=True, target=target)
+        rates, accelerations = self.articulated.response(tau, self._with_loop_forces({}, tau))
+        return self._constrained(rates, accelerations, still=True, target=target)
 
     def released(self, tau, multipliers) -> np.ndarray:
         """Rates (n_v,) x with M x + Kᵀ y = tau for given multipliers y."""

@@ -1,5 +1,6 @@
 """Contact terms of a time step, in machine code: gap functions, tangential and slip rates, u = J q̇, u̇ = J q̈ + J̇ q̇."""
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import NamedTuple
 
@@ -57,7 +58,7 @@ class ContactTermsKernel:
             motion = kinematics(system, State(t[0], q, v))
             found = watched.values(motion)
             width, rate = found[:m], found[m:]
-            apart = guarded.values(motion)[: len(whole)] if whole else []
+            apart: Iterable = guarded.values(motion)[: len(whole)] if whole else ()
             bias = forward(rate, [*t, *q], [1.0, *coordinate_rates(system, q, v)])
             return [[*width, *apart, *rate, *jacobian(rate, v).ravel(), *bias]]
 

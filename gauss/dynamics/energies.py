@@ -7,6 +7,7 @@ from gauss.codegen import Scalar
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import stretch
 from gauss.scene import ElasticLink, JointSpring, Spring
+from gauss.system import System
 
 PARTING = 1e-10  # rad, lengths of the scene: backlash sides closer than this still touch, and keep their elastic energy
 
@@ -19,7 +20,7 @@ def kinetic_energy_of_bodies(motion: Kinematics) -> Scalar:
 
 def potential_energy(motion: Kinematics) -> Scalar:
     """Potential energy of gravity and springs [J]."""
-    return sum(_stored(motion), start=-sum(_lifted(motion)))
+    return sum(stored_energies(motion), start=-sum(_lifted(motion)))
 
 
 def look_at_energies(motion: Kinematics, work) -> np.ndarray:
@@ -34,12 +35,22 @@ def look_at_energies(motion: Kinematics, work) -> np.ndarray:
     work : array_like, shape (3,)
         Work of drives and of forces on bodies, and energy dissipated, since the start [J].
     """
-    lifted, stored, Phi = _lifted(motion), _stored(motion), motion.system.Phi
-    gravity = np.array(motion.system.scene.gravity)
-    thick = [math.sqrt(mass * sum(Phi[6 * i : 6 * i + 3])) for i, mass in enumerate(Phi[3::6])]  # mass × radius of gyration
-    kinetic, potential = kinetic_energy_of_bodies(motion), sum(stored, start=-sum(lifted))
-    magnitude = sum(np.abs(part) for part in (*lifted, *stored)) + math.sqrt(gravity @ gravity) * sum(thick)
+    lifted, stored = _lifted(motion), stored_energies(motion)
+    potential = sum(stored, start=-sum(lifted))
+    magnitude = sum(math.abs(part) for part in (*lifted, *stored)) + least_magnitude(motion.system)
+    return energy_sample(kinetic_energy_of_bodies(motion), potential, magnitude, work)
+
+
+def energy_sample(kinetic: Scalar, potential: Scalar, magnitude: Scalar, work) -> np.ndarray:
+    """Energy sample (4,) of :func:`look_at_energies`."""
     return np.array([kinetic, potential, kinetic + potential - work[0] - work[1] + work[2], magnitude])
+
+
+def least_magnitude(system: System) -> Scalar:
+    """Potential energy of all bodies at heights of their radii of gyration [J]."""
+    gravity, Phi = np.array(system.scene.gravity), system.Phi
+    thick = [math.sqrt(mass * sum(Phi[6 * i : 6 * i + 3])) for i, mass in enumerate(Phi[3::6])]  # mass × radius of gyration
+    return math.sqrt(gravity @ gravity) * sum(thick)
 
 
 def _lifted(motion: Kinematics) -> list[Scalar]:
@@ -48,7 +59,7 @@ def _lifted(motion: Kinematics) -> list[Scalar]:
     return [mass * (gravity @ motion.x[i]) for i, mass in enumerate(motion.system.Phi[3::6])]
 
 
-def _stored(motion: Kinematics) -> list[Scalar]:
+def stored_energies(motion: Kinematics) -> list[Scalar]:
     """Energy in each spring [J]."""
     energies = []
     for load in (bound.load for bound in motion.system.loads):

@@ -4,8 +4,11 @@ The recursive Newton–Euler algorithm (Luh, Walker, Paul 1980) on the bodies of
 an independent check of compiled forward dynamics.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from gauss.backends.structure import Edge
 from gauss.dynamics.assemble import impressed
 from gauss.dynamics.constraint_rows import joint_rows
 from gauss.dynamics.kinematics import Kinematics
@@ -31,18 +34,9 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
         Zero for the accelerations of a tree without loop constraints. Loop joints exert no force here, and their coordinates
         are left out.
     """
-    system, inertial_forces = motion.system, impressed(motion, applied)
-    accelerations, wrenches = {-1: (np.zeros(3), np.zeros(3))}, {}
+    system, inertial_forces, wrenches = motion.system, impressed(motion, applied), {}
     residual = np.zeros(system.n_v, dtype=np.result_type(float, inertial_forces, rates))
-    for edge in system.structure.tree:
-        joint, at = system.joints[edge.constraint], motion.joints[edge.constraint]
-        _, (B,), D = joint_rows(motion, joint, at)
-        sign, inner_arm, outer_arm = _sides(edge, joint, at)
-        alpha, linear = accelerations[edge.inner]
-        across = sign * (D - B @ rates[joint.v])
-        outer = alpha + across[:3]
-        moved = linear - cross(inner_arm, alpha) + across[3:] + cross(outer_arm, outer)
-        accelerations[edge.outer] = outer, moved
+    for edge, outer, moved in outward_accelerations(motion, rates):
         R, place = motion.R[edge.outer], slice(6 * edge.outer, 6 * edge.outer + 6)
         left = inertial_forces[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
         wrenches[edge.outer] = R @ left[:3], left[3:]
@@ -51,6 +45,36 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
         place = system.joints[edge.constraint].v
         residual[place] = applied.P[place] + along[place]
     return residual
+
+
+def outward_accelerations(motion: Kinematics, rates) -> Iterator[tuple[Edge, np.ndarray, np.ndarray]]:
+    """Accelerations of the bodies, A a + B q̈ = D outward along the spanning tree; numbers or expressions.
+
+    Parameters
+    ----------
+    motion : Kinematics
+        Poses and velocities, with the joints.
+    rates : ndarray, shape (n_v,)
+        Joint accelerations.
+
+    Yields
+    ------
+    edge : Edge
+        Edge of the tree to the body.
+    alpha, acceleration : ndarray, shape (3,)
+        Angular acceleration, and acceleration of the centre of mass, in world axes.
+    """
+    accelerations = {-1: (np.zeros(3), np.zeros(3))}
+    for edge in motion.system.structure.tree:
+        joint, at = motion.system.joints[edge.constraint], motion.joints[edge.constraint]
+        _, (B,), D = joint_rows(motion, joint, at)
+        sign, inner_arm, outer_arm = _sides(edge, joint, at)
+        alpha, linear = accelerations[edge.inner]
+        across = sign * (D - B @ rates[joint.v])
+        outer = alpha + across[:3]
+        moved = linear - cross(inner_arm, alpha) + across[3:] + cross(outer_arm, outer)
+        accelerations[edge.outer] = outer, moved
+        yield edge, outer, moved
 
 
 def along_rates(motion: Kinematics, wrenches: dict[int, tuple]) -> np.ndarray:

@@ -168,11 +168,11 @@ def _reach_child(motion: _Poses, index: int, joint: PlacedJoint):
     r = motion.R[c] @ joint.p_child
     P = motion.x[p] + s
     motion.x[c] = P - r
-    E_omega, E_v, *bias = _subspace(joint, R, motion.state)
+    E_omega, E_v, bias_omega, bias_v = _subspace(joint, R, motion.state)
     rates = motion.state.v[joint.v]
     motion.W[c] = motion.W[p] + E_omega @ rates
     motion.u[c] = motion.u[p] + cross(motion.W[p], s) + E_v @ rates - cross(motion.W[c], r)
-    motion.joints[index] = JointMotion(P, r, s, E_omega, E_v, *bias, R_predicted)
+    motion.joints[index] = JointMotion(P, r, s, E_omega, E_v, bias_omega, bias_v, R_predicted)
 
 
 def _reach_parent(motion: _Poses, index: int, joint: PlacedJoint):
@@ -185,11 +185,11 @@ def _reach_parent(motion: _Poses, index: int, joint: PlacedJoint):
     s = motion.R[p] @ joint.p_parent + R @ p_pose
     P = motion.x[c] + r
     motion.x[p] = P - s
-    E_omega, E_v, *bias = _subspace(joint, R, motion.state)
+    E_omega, E_v, bias_omega, bias_v = _subspace(joint, R, motion.state)
     rates = motion.state.v[joint.v]
     motion.W[p] = motion.W[c] - E_omega @ rates
     motion.u[p] = motion.u[c] + cross(motion.W[c], r) - E_v @ rates - cross(motion.W[p], s)
-    motion.joints[index] = JointMotion(P, r, s, E_omega, E_v, *bias, R_predicted)
+    motion.joints[index] = JointMotion(P, r, s, E_omega, E_v, bias_omega, bias_v, R_predicted)
 
 
 def _close(motion: _Poses, index: int, joint: PlacedJoint):
@@ -198,4 +198,5 @@ def _close(motion: _Poses, index: int, joint: PlacedJoint):
     R = motion.R[p] @ joint.R_parent
     r = motion.R[c] @ joint.p_child
     s = motion.R[p] @ joint.p_parent + R @ p_pose
-    motion.joints[index] = JointMotion(motion.x[c] + r, r, s, *_subspace(joint, R, motion.state), R @ R_pose)
+    E_omega, E_v, bias_omega, bias_v = _subspace(joint, R, motion.state)
+    motion.joints[index] = JointMotion(motion.x[c] + r, r, s, E_omega, E_v, bias_omega, bias_v, R @ R_pose)

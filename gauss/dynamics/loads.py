@@ -9,7 +9,7 @@ from gauss.codegen import as_number
 from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import SceneError
 from gauss.rotations import cross
-from gauss.scene import GROUND, Drive, ElasticLink, Force, JointSpring, Slipping, Spring
+from gauss.scene import GROUND, Drive, ElasticLink, Force, Input, JointSpring, Slipping, Spring
 from gauss.scene.values import evaluated
 
 
@@ -72,6 +72,16 @@ def _(load: Drive, laws, motion: Kinematics, applied: Applied):
         effort = math.clip(effort, -load.limit, load.limit)
     applied.P[joint.v] += effort
     applied.driven += effort @ motion.state.v[joint.v]
+
+
+@apply.register
+def _(load: Input, laws, motion: Kinematics, applied: Applied):
+    low, high = load.bounds
+    value = laws[0](motion.state.t, motion)
+    effort = value if load.limits is None else math.clip(value, low, high)
+    column = motion.system.column(load.joint)
+    applied.P[column] += effort
+    applied.driven += effort * motion.state.v[column]
 
 
 @apply.register

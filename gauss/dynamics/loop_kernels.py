@@ -89,10 +89,8 @@ class LoopJointKind:
     def _sides(self, wrenches) -> tuple[np.ndarray, np.ndarray]:
         """Wrenches (6, m) on parent and child."""
         none = np.zeros(6)
-        return tuple(
-            np.array([wrench.get(body, none) for wrench in wrenches], dtype=object).reshape(-1, 6).T
-            for body in (PARENT, CHILD)
-        )
+        on = lambda body: np.array([wrench.get(body, none) for wrench in wrenches], dtype=object).reshape(-1, 6).T  # noqa: E731
+        return on(PARENT), on(CHILD)
 
 
 def loop_joint_numbers(subsystem: Subsystem, index: int, sides) -> np.ndarray:

@@ -46,4 +46,4 @@ def parametrised(pattern: System, members: np.ndarray) -> ParametrisedSystem:
     varied = np.flatnonzero((members != members[0]).any(axis=0))
     values, graph = members[0].astype(object), Graph(shared=True)
     values[varied] = [graph.symbol(f"p[{k}]") for k in range(len(varied))]
-    return ParametrisedSystem(pattern, with_numbers(pattern, values, pattern.dynamics), varied)
+    return ParametrisedSystem(pattern, with_numbers(pattern, values, pattern.mechanics), varied)

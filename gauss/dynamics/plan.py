@@ -2,9 +2,9 @@
 
 Motions, by :func:`gauss.simulate`:
 
-==================  ==============  ==========================================================================
+==================  ==============  =====================================================================================
 driver              dynamics        applies to
-==================  ==============  ==========================================================================
+==================  ==============  =====================================================================================
 constant            none            scenes without degrees of freedom
 time stepping       compiled        ``integrator="time_stepping"``
 time stepping       certified       the same, where the dynamics cannot be compiled
@@ -12,12 +12,14 @@ events              compiled        unilateral constraints, joint friction, limi
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
+compiled loop       tree recursion  large trees, by explicit integrators
 Python loop         call graph      many kinematic loops
-Python loop         tree recursion  large trees
+Python loop         tree recursion  large trees with opaque laws
 Python loop         compiled        opaque laws, and systems too large for a compiled step
 library             certified       all other scenes, by integrators of other libraries
+samples             compiled        inputs held between samples of a control law, where no rule of machine code applies
 Python loop         certified       all other scenes
-==================  ==============  ==========================================================================
+==================  ==============  =====================================================================================
 
 Single states: "unilateral" where frictionless contacts are the only non-smooth elements, "call graph" for many loops, "tree
 recursion" for large trees, "compiled", and "certified" for all others. See :class:`gauss.dynamics.rules.Plan`.
@@ -29,12 +31,14 @@ from gauss.codegen import IdentityKey, content_key
 from gauss.dynamics.conditions import (
     compilable,
     contacts_alone,
+    explicit,
     few_bodies,
     has_contacts,
     large_loops,
     large_tree,
     named,
     narrow,
+    no_held_inputs,
     own_backend,
     small_contact_problem,
     smooth,
@@ -44,7 +48,7 @@ from gauss.dynamics.conditions import (
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.dynamics.store import cached
-from gauss.integrators import METHODS, FixedStep, Library
+from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Library, Taylor
 from gauss.system import System
 
 Condition = Callable[[Question], list[str]]  # question → violations in words
@@ -70,6 +74,15 @@ def _library(ask: Question) -> bool:
     return isinstance(ask.method, Library)
 
 
+def no_inputs_of_series(ask: Question) -> list[str]:
+    """The method is no Taylor series, or no inputs are held between samples: series have no inputs."""
+    return no_held_inputs(ask) if isinstance(ask.method, Taylor) else []
+
+
+def _held(ask: Question) -> bool:
+    return ask.held
+
+
 def _by_accelerations(ask: Question) -> bool:
     """Whether a step needs no more than accelerations of single states."""
     return not _beyond_accelerations(ask)
@@ -78,7 +91,7 @@ def _by_accelerations(ask: Question) -> bool:
 def _beyond_accelerations(ask: Question) -> str:
     """What needs the equations of motion beyond the accelerations of single states; empty if nothing does."""
     method = ask.method
-    if method.implicit if isinstance(method, Library) else method.mechanical:
+    if method is not None and (method.implicit if isinstance(method, Library) else method.mechanical):
         return f"integrator {method.name!r}"
     return "stabilisation 'partitioning'" if ask.drift.partitioned else ""
 
@@ -96,17 +109,21 @@ _CODE = own_backend, compilable
 _WHOLE = *_CODE, written_out, traced_laws, narrow
 _STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
 _ALONE = _both(_smooth, _by_accelerations)
+_LOOP = *_WHOLE, no_inputs_of_series
+_TREE_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
 
 MOTIONS = RuleTable(
     (
         Rule("constant", "none", when=lambda ask: not ask.system.n_v),
         Rule("time stepping", "compiled", "certified", is_time_stepping, _STEP),
-        Rule("time stepping", "certified", when=is_time_stepping),
-        Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend,)),
-        Rule("events", "certified", when=_is_nonsmooth),
-        Rule("library", "compiled", "", _library, _WHOLE),
-        Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _WHOLE),
-        Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _WHOLE),
+        Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs,)),
+        Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs)),
+        Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs,)),
+        Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
+        Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _LOOP),
+        Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _LOOP),
+        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _TREE_LOOP),
+        Rule("samples", "compiled", "certified", _both(_held, _by_accelerations)),
         Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
         Rule("Python loop", "compiled", "certified", _ALONE, (*_CODE, written_out)),
@@ -182,7 +199,7 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
     make = lambda: MOTIONS.plan(ask, wanted)  # noqa: E731
     if ask.system.dynamics is None or ask.laws.called:
         return make()
-    key = plan_of, method_key(ask.method), ask.stabilisation, ask.drift, named(ask.backend), ask.laws.key, wanted
+    key = plan_of, method_key(ask.method), ask.stabilisation, ask.drift, named(ask.backend), ask.laws.key, ask.held, wanted
     return cached(ask.system, key, make)
 
 
@@ -190,7 +207,8 @@ def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
     key = _KEYS.get(id(method))
     if key is None:
-        if METHODS.get(method.name) is not method:
+        known = (*LIBRARIES, *IMPLICIT) if isinstance(method, Library) else (METHODS.get(method.name),)
+        if not any(method is one for one in known):
             return content_key(method)
         key = _KEYS[id(method)] = IdentityKey(method)  # immutable: identity stands for content
     return key

@@ -47,19 +47,21 @@ class PointLayout:
         """Numbers of y."""
         return 2 * self.n_v + 3
 
-    def pack(self, point: Point) -> np.ndarray:
-        """Vector of a point; its parameters are those of the graph that it is traced in."""
+    def pack(self, point: Point, parameters=None) -> np.ndarray:
+        """Vector of a point; its parameters are those of the graph that it is traced in, unless they are given."""
         state = point.state
         memory = point.rates.acceleration if point.method_state is None else point.method_state
         parts: list = [[state.t], state.q, state.v, point.work, *point.rates, memory[: self.memory]]
-        if self.parameters:
+        if parameters is not None:
+            parts.append(parameters)
+        elif self.parameters:
             graph = next(entry.graph for part in parts for entry in part if isinstance(entry, Expression))
             parts.append([graph.parameter(name) for name in self.parameters])
         return np.concatenate(parts)
 
     def state(self, x: np.ndarray) -> State:
         """State in a vector; where it is traced, its parameters hold from then on."""
-        if self.parameters:
+        if self.parameters and isinstance(x[0], Expression):
             x[0].graph.bind(self.parameters, x[self.size - len(self.parameters) : self.size])
         return State(x[0], x[1 : 1 + self.n_q], x[1 + self.n_q : 1 + self.n_q + self.n_v])
 

@@ -43,7 +43,8 @@ class Plan:
     ----------
     driver : str
         Who advances time: "compiled loop", "Python loop", "events" (smooth phases between located events), "time stepping",
-        "library", "batch", or "constant" without degrees of freedom; "state" for a single state.
+        "library", "batch", "samples" (one motion from each sample of a control law to the next), or "constant" without
+        degrees of freedom; "state" for a single state.
     dynamics : str
         Where accelerations come from: "compiled" (straight-line code of the scene), "call graph" (a kernel for each kind of
         link and loop), "tree recursion" (a kernel for each kind of link), "unilateral" (compiled, with an active set of
@@ -119,6 +120,8 @@ class Question(NamedTuple):
         Constraint stabilisation with its gains.
     stabilisation : str
         Its name, as given by the user.
+    held : bool
+        Whether inputs are held between samples of a control law.
     """
 
     system: System
@@ -127,6 +130,7 @@ class Question(NamedTuple):
     method: Integrator | None = None
     drift: Drift = Drift()
     stabilisation: str = "projection"
+    held: bool = False
 
 
 class Asked(Protocol):

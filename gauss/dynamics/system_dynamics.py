@@ -72,17 +72,17 @@ class SystemDynamics(Store):
 
         return forward_dynamics(system)
 
-    def inverse_dynamics(self, system: System) -> Callable:
-        """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
-        from gauss.dynamics.equations import inverse_dynamics
+    def function(self, system: System, names, reference: str, independent) -> Callable:
+        """Compiled function of a state, or of several at once."""
+        from gauss.dynamics.state_functions import state_function
 
-        return inverse_dynamics(system)
+        return state_function(system, names, reference, independent)
 
-    def loop_constraints(self, system: System) -> Callable:
-        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
-        from gauss.dynamics.equations import LoopConstraintKernel
+    def evaluate(self, system: System, names, given: dict, t, reference: str, independent) -> dict:
+        """Results of several functions of a state, by their names, for arguments by their names."""
+        from gauss.dynamics.state_functions import evaluate
 
-        return self.on_demand((LoopConstraintKernel,), lambda: LoopConstraintKernel(system))
+        return evaluate(system, names, given, t, reference, independent)
 
     def consistent(self, system: System, state: State, kept=(), required=False, least_violation=False, rough=False) -> State:
         """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent_states.consistent`."""

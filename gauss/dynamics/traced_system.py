@@ -3,6 +3,7 @@
 Integrator loops and engines are compiled from them. Points are vectors (:class:`gauss.dynamics.point_layout.PointLayout`).
 """
 
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from gauss.dynamics.error_scale import (
     centrifugal_scale,
     consistent_states,
 )
+from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.switching_functions import SwitchingFunctions
@@ -72,6 +74,8 @@ class Program:
         Numbers of the state of the method.
     family : ParametrisedSystem, optional
         The parametrised system, if some numbers of the system are parameters.
+    inputs : bool
+        Whether the inputs of the scene are parameters, held in each step; otherwise they are zero.
     """
 
     def __init__(
@@ -81,11 +85,14 @@ class Program:
         drift: Drift = Drift(),  # noqa: B008 (frozen)
         memory: int = 0,
         family: ParametrisedSystem | None = None,
+        inputs: bool = False,
     ):
         self.system, self.drift, self.laws = system, drift, laws
         self.loads = laws.traced if family is None else family.system.loads
+        self.inputs = tuple(system.scene.inputs) if inputs else ()
+        self.loads = [*self.loads, *input_loads(system)] if inputs else self.loads
         self.pattern = system if family is None else family.pattern  # a system of numbers alone
-        self.layout = PointLayout(system.n_q, system.n_v, memory, () if family is None else family.parameters)
+        self.layout = PointLayout(system.n_q, system.n_v, memory, self.inputs if family is None else family.parameters)
 
     @cached_property
     def watch(self) -> SwitchingFunctions:
@@ -115,6 +122,11 @@ class Program:
     def has_redundant_rows(self) -> bool:
         """Whether the loop constraints of what is projected are redundant at every configuration."""
         return self.projects and not self.has_full_rank
+
+    @property
+    def checks_bodies(self) -> bool:
+        """Whether the check of accelerations is by inverse dynamics of all bodies, independent of link frames."""
+        return not self.system.has_closures
 
     @property
     def may_lose_rank(self) -> bool:
@@ -238,6 +250,16 @@ class Program:
         """Check of a point, and its energies: what loops evaluate at intervals."""
         return self.check(x), self.energies(x)
 
+    @cached_property
+    def point_check(self) -> Function:
+        """Function of a point → its check, and its energies."""
+        return write(self.held_point if self.inputs else self.watched_point, self.layout.size, name="check")
+
+    def held_point(self, x):
+        """Check of a point, and its energies, with the rates under its inputs instead of those that it holds."""
+        point = self.layout.point(x)
+        return self.watched_point(self.layout.pack(replace(point, rates=self.evaluate(point.state))))
+
     def instant(self, state: State, tau=None) -> tuple[Mechanism, Rates]:
         """Eliminated traced state, and its rates, inlined; generalised forces may be added."""
         mechanism, *rates = self._evaluated([state.t], state.q, state.v, tau)
@@ -247,10 +269,17 @@ class Program:
         return self._evaluated(t, q, v, tau)[1:]
 
     def _monitored_rates(self, t, q, v):
+        self._order_inputs(t)
         acceleration, power, _, monitored = self.shared.motion(self.shared.place(t, q, often=True), v, often=True)
         return acceleration, power, monitored
 
+    def _order_inputs(self, t):
+        """Let the inputs of the scene be the last ones of a function that is traced, in the order of the scene."""
+        for name in self.inputs:
+            t[0].graph.parameter(name)
+
     def _evaluated(self, t, q, v, tau=None):
+        self._order_inputs(t)
         state = State(t[0], q, v)
         own, forces, power = self.applied(state)
         mechanism = Mechanism(self.system, q, v, state.t)

@@ -1,7 +1,8 @@
 """Recursions along large trees, by kernels traced once for each kind of link.
 
 Forward dynamics (articulated-body algorithm, three passes) and inverse dynamics (recursive Newton–Euler, three passes):
-Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 7.3 and 5.3.
+Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 7.3 and 5.3. Energies of the links, T = ½ Vᵀ I V and −m g · x, in
+one outward pass.
 """
 
 from collections.abc import Callable
@@ -13,12 +14,13 @@ from gauss.codegen import as_number, write
 from gauss.codegen.kernels import LinkStep, TreeRecursion
 from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
 from gauss.dynamics.link_frames import Link, link_frames
-from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
+from gauss.dynamics.rnea import JointKinematics, apply, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.rotations import skew
 from gauss.scene import Pair
 from gauss.system import System, whole
 
 OMEGA, INERTIA, FORCE, ACCELERATION, OWN = 0, 3, 24, 30, 36  # slots of the record of a link
+TWIST, HEIGHT = 0, 32  # slots in the recursion of energies; after the height, the upward direction
 MOST_KINDS = 24  # beyond, links are not distinguished by the zeros among their constants
 UPPER = np.triu_indices(3)
 
@@ -45,7 +47,16 @@ def inverse_tree_recursion(system: System) -> TreeRecursion:
     return _recursion(system, "inverse", _inverse_steps, ("q", "v", "rates"))
 
 
-def _recursion(system: System, name: str, steps: Callable, vectors) -> TreeRecursion:
+def energy_recursion(system: System) -> TreeRecursion:
+    """(q, v, acceleration of the ground) → kinetic and potential energy of every link [J].
+
+    The potential energy of mass that is regrouped to the ground is left out: it is constant.
+    """
+    return _recursion(system, "energies", _energy_steps, ("q", "v"), 2)
+
+
+def _recursion(system: System, name: str, steps: Callable, vectors, per_link: int = 0) -> TreeRecursion:
+    """Recursion whose result has ``per_link`` numbers for every link; if 0, one for every rate."""
     subsystem = whole(system)
     edges, links = subsystem.tree, link_frames(subsystem)
     joints = [subsystem.joints[edge.constraint] for edge in edges]
@@ -54,14 +65,16 @@ def _recursion(system: System, name: str, steps: Callable, vectors) -> TreeRecur
     parameters, built, record = _built(steps, joints, kinds, names, [link_numbers(links[edge.outer]) for edge in edges])
     place = {edge.outer: i for i, edge in enumerate(edges)} | {-1: -1}
     passes = list(zip(*built.values(), strict=True))
+    starts = {vector: _starts(joints, vector) for vector in vectors}
+    starts["result"] = per_link * np.arange(len(joints)) if per_link else _starts(joints, "result")
     return TreeRecursion(
         name,
         {vector: system.n_q if vector == "q" else system.n_v for vector in vectors} | {"base": 6},
-        system.n_v,
+        per_link * len(joints) or system.n_v,
         [({k: step for k, (step, _) in enumerate(found)}, found[0][1]) for found in passes],
         np.array([names.index(kind) for kind in kinds]),
         np.array([place[edge.inner] for edge in edges]),
-        {vector: _starts(joints, vector) for vector in (*vectors, "result")},
+        starts,
         parameters,
         record,
         [(ACCELERATION + k, "base", k) for k in range(6)],
@@ -253,3 +266,20 @@ def _inverse_steps(link: _LinkCode):
     reads = {"kinematics": stored, "omega": _slots("own", OMEGA, 3), "acceleration": own, "collected": collected}
     third = link.step(inward, reads, {"result": link.vector("result"), "onward": onward}, () if kind.is_first else onward)
     return [(first, False), (second, False), (third, True)], link.next_slot
+
+
+def _energy_steps(link: _LinkCode):
+    """Step of an outward pass to the twist, the height times g, and the upward direction times g."""
+    parts = {"twist": (TWIST, 6), "height": (HEIGHT, 1), "up": (HEIGHT + 1, 3)}
+
+    def outward(constants, q, v, twist, height, up):
+        kin, _ = kinematics_of_joint(link.pair, link.kind.forward, constants, q, v, np.zeros(3))
+        twist = to_outer(constants, kin, np.zeros(6) if link.kind.is_root else twist) + kin.S @ v
+        height, up = height + up @ (constants.p + constants.R @ kin.p), kin.R.T @ (constants.R.T @ up)
+        mass = constants.inertia[2][0, 0]
+        return twist, height, up, [0.5 * twist @ apply(constants.inertia, twist)], mass * height + up @ constants.first
+
+    reads = {"q": link.vector("q"), "v": link.vector("v")} | {name: _slots("inner", *place) for name, place in parts.items()}
+    writes = {name: _slots("own", *place) for name, place in parts.items()}
+    step = link.step(outward, reads, writes | {"kinetic": [("result", 0)], "potential": [("result", 1)]})
+    return [(step, False)], OWN

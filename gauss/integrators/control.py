@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Scalar
+from gauss.codegen import Entry, Scalar
 from gauss.integrators.step import Chart, Cost, Equations, Point
 from gauss.system import State, System, sizes
 
@@ -45,9 +45,9 @@ class Tolerance:
         Smallest of the factors, where these are tolerances and not units of the scene.
     """
 
-    rtol: Scalar
-    atol: Scalar
-    atol_rates: Scalar
+    rtol: Entry
+    atol: Entry
+    atol_rates: Entry
     shares: np.ndarray | None = None
     least: float = 1.0
 
@@ -94,8 +94,8 @@ class TrialStep:
     """
 
     point: Point
-    error: Scalar
-    factor: Scalar
+    error: Entry
+    factor: Entry
     kept: np.ndarray
     cost: Cost
 

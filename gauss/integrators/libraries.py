@@ -16,7 +16,7 @@ LEAST_PROGRESS = 0.01  # of the interval in that window; IDA is stopped below it
 class LibrarySolution(NamedTuple):
     """Times (k,), values (k, n), steps, evaluations, factorisations, and the reason of an early stop.
 
-    Steps are 0 where the library does not report them.
+    Steps are 0 where the library does not report them. After Ctrl-C the values end early, too.
     """
 
     t: np.ndarray
@@ -25,6 +25,7 @@ class LibrarySolution(NamedTuple):
     evaluations: int
     factorisations: int
     failure: str | None
+    interruption: KeyboardInterrupt | None = None
 
 
 @dataclass(frozen=True)
@@ -59,18 +60,67 @@ class Library:
 
 def _scipy(method: str) -> Callable:
     def solve(f, times, y0, rtol, atol, largest) -> LibrarySolution:
-        from scipy.integrate import solve_ivp
+        from scipy import integrate
 
+        begin, end = float(times[0]), float(times[-1])
+        sampled, pieces, interruption, failure = len(times) > 2, [], None, None
+        t, y = [begin], [y0]
         with np.errstate(all="ignore"):  # divergence is reported
-            options = {"rtol": max(rtol, 3e-14), "atol": atol, "max_step": largest, "dense_output": len(times) > 2}
-            found = solve_ivp(f, (times[0], times[-1]), y0, method=method, **options)
-        failure, counts = None if found.success else found.message, (len(found.t) - 1, found.nfev, int(found.nlu))
-        if len(times) == 2:
-            return LibrarySolution(found.t, found.y.T, *counts, failure)
-        t = times[times <= found.t[-1]]
-        return LibrarySolution(t, found.sol(t).T, *counts, failure)
+            solver = getattr(integrate, method)(f, begin, y0, end, rtol=max(rtol, 3e-14), atol=atol, max_step=largest)
+            try:  # the loop of solve_ivp, which loses all steps when it is interrupted
+                while solver.status == "running":
+                    failure = solver.step()
+                    if solver.status == "failed":
+                        break
+                    piece = solver.dense_output() if sampled else None
+                    if not sampled or solver.t != t[-1]:
+                        t.append(solver.t)
+                        y.append(solver.y)
+                        pieces.append(piece)
+            except KeyboardInterrupt as error:
+                interruption = error
+        counts = len(t) - 1, solver.nfev, int(solver.nlu)
+        if not sampled or not pieces:
+            return LibrarySolution(np.array(t), np.array(y), *counts, failure, interruption)
+        inside = times[times <= t[-1]]
+        later_piece = method == "LSODA"  # at the end of a piece; as by solve_ivp
+        found = integrate.OdeSolution(np.array(t[: len(pieces) + 1]), pieces, alt_segment=later_piece)
+        return LibrarySolution(inside, found(inside).T, *counts, failure, interruption)
 
     return solve
+
+
+class _Interruptible:
+    """A callback (…, out) of compiled code, which loses its steps where a callback raises: after Ctrl-C it gives NaN.
+
+    Parameters
+    ----------
+    function : callable
+        Writes into its last argument.
+    """
+
+    def __init__(self, function: Callable):
+        self.function = function
+        self.interruption: KeyboardInterrupt | None = None
+
+    def __call__(self, *given):
+        """Call the function, before the interruption."""
+        if self.interruption is None:
+            try:
+                self.function(*given)
+            except KeyboardInterrupt as error:
+                self.interruption = error
+        if self.interruption is not None:
+            given[-1][:] = np.nan
+
+    def solution(self, found, steps: int, failure: str | None) -> LibrarySolution:
+        """Solution from a result of SUNDIALS, as far as it is one."""
+        if self.interruption is None:
+            return LibrarySolution(found.t, found.y, steps, found.nfev, int(found.njev), failure)
+        kept = np.isfinite(found.y).all(axis=1)
+        kept[1:] &= np.arange(1, kept.size) < kept.size - 1  # the last step was in progress
+        counts = found.nfev, int(found.njev)
+        return LibrarySolution(found.t[kept], found.y[kept], steps, *counts, None, self.interruption)
 
 
 def _cvode(method: str) -> Callable:
@@ -85,11 +135,10 @@ def _cvode(method: str) -> Callable:
 
         largest = 0.0 if np.isinf(largest) else largest
         options = {"method": method, "rtol": max(rtol, 1e-15), "atol": atol, "max_step": largest}
-        found = CVODE(rate, max_num_steps=MOST_STEPS, **options).solve(times, y0)
+        callback = _Interruptible(rate)
+        found = CVODE(lambda t, y, out: callback(t, y, out), max_num_steps=MOST_STEPS, **options).solve(times, y0)
         steps = len(found.t) - 1 if len(times) == 2 else 0
-        return LibrarySolution(
-            found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message)
-        )
+        return callback.solution(found, steps, None if found.success else str(found.message))
 
     return solve
 
@@ -102,8 +151,10 @@ def _ida(residual, times, start, rtol, atol, largest, algebraic) -> LibrarySolut
     options = {"rtol": max(rtol, 1e-15), "atol": atol, "max_step": 0.0 if np.isinf(largest) else largest}
     monitor = _StallMonitor(times[0], times[-1])
 
+    callback = _Interruptible(residual)
+
     def watched(t, y, slope, out):
-        residual(t, y, slope, out)
+        callback(t, y, slope, out)
         if monitor.stalls(t):
             out[:] = np.nan  # ends the integration
 
@@ -111,7 +162,7 @@ def _ida(residual, times, start, rtol, atol, largest, algebraic) -> LibrarySolut
     found = solver.solve(times, *start)
     steps = len(found.t) - 1 if len(times) == 2 else 0
     failure = None if found.success else monitor.reason or str(found.message)
-    return LibrarySolution(found.t, found.y, steps, found.nfev, int(found.njev), failure)
+    return callback.solution(found, steps, failure)
 
 
 class _StallMonitor:

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from gauss.codegen import Scalar
+from gauss.codegen import Entry, Scalar
 from gauss.integrators.tableaus import Tableau
 from gauss.shapes import Shaped
 from gauss.system import State, System, chart_rate, displacement, retract
@@ -184,9 +184,9 @@ class Cost(NamedTuple):
         Above 0 where the iteration of implicit equations did not converge.
     """
 
-    evaluations: Scalar
-    factorisations: Scalar = 0
-    unsolved: Scalar = 0.0
+    evaluations: Entry
+    factorisations: Entry = 0
+    unsolved: Entry = 0.0
 
 
 @dataclass(frozen=True)

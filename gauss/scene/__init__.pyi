@@ -7,6 +7,7 @@ from gauss.scene.contact_distances import FeaturePair
 from gauss.scene.elastic import Elastic, ElasticLink
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
+from gauss.scene.inputs import Input, Output
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.losses import IdealCounterpart, JointAtRest, LossyGear
@@ -47,6 +48,7 @@ __all__ = [
     "Guard",
     "Guided",
     "HalfSpace",
+    "Input",
     "Joint",
     "JointFriction",
     "JointAtRest",
@@ -60,6 +62,7 @@ __all__ = [
     "OnLine",
     "OnPlane",
     "OneSidedConstraint",
+    "Output",
     "Pair",
     "FeaturePair",
     "Points",

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from gauss import math
+from gauss.codegen import Scalar
 from gauss.errors import SceneError
 from gauss.scene import values
 
@@ -104,7 +105,7 @@ class ElasticLink(Elastic):
         """Driven and driver joint, with the factors of the force on them."""
         return {self.driven: 1.0, self.driver: -1.0 / self.ratio}
 
-    def ends(self, at):
+    def ends(self, at) -> tuple[Scalar, Scalar]:
         """Twist [rad, m] and lead [rad/s, m/s], by a view of the mechanism."""
         twist = -sum(factor * at.coordinate(joint) for joint, factor in self.acts_on.items())
         return twist, -sum(factor * at.rate(joint) for joint, factor in self.acts_on.items())

@@ -2,16 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, cast
 
 from gauss.arguments import named_arguments, named_methods
 from gauss.errors import SceneError, did_you_mean
-from gauss.scene import builder, contact_builder, values
+from gauss.scene import builder, contact_builder, inputs, values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, Element, name_of
 from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
 from gauss.scene.degrees import warn_of_start
 from gauss.scene.elastic import ElasticLink
+from gauss.scene.inputs import SENSORS, Input, InputBuilder, Output
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Prescribed
@@ -20,12 +22,16 @@ from gauss.scene.set_valued import LimitedDrive, SetValued
 from gauss.scene.unilateral import Unilateral
 from gauss.versions import FormerAttribute
 
+if TYPE_CHECKING:
+    from gauss.scene.clutches import JointLink
+    from gauss.scene.losses import LossyGear
+
 GROUND = "ground"
 LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
 
 
 @dataclass(frozen=True)
-class Scene(ConstraintBuilder, ContactBuilder):
+class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
     """Mechanism and its surroundings.
 
     Parameters
@@ -39,7 +45,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     Attributes
     ----------
-    bodies, frames, joints, couplings, relations, shapes, contacts, set_valued, loads, starts : dict
+    bodies, frames, joints, couplings, relations, shapes, contacts, set_valued, loads, starts, inputs, outputs : dict
         Elements by name; the methods fill them.
 
     Examples
@@ -63,6 +69,8 @@ class Scene(ConstraintBuilder, ContactBuilder):
     set_valued: dict[str, SetValued] = field(default_factory=dict)
     loads: dict[str, Drive | ElasticLink | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
+    inputs: dict[str, Input] = field(default_factory=dict)
+    outputs: dict[str, Output] = field(default_factory=dict)
     source: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self):
@@ -73,7 +81,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     # Every element enters through `add`, so that a scene is consistent in its names at any time.
 
     def add(self, element: Element) -> Element:
-        """Add a Body, Frame, Joint, Coupling, Relation, Collider, load or Start and return it.
+        """Add a Body, Frame, Joint, Coupling, Relation, Collider, load, Start, Input or Output and return it.
 
         Raises
         ------
@@ -82,6 +90,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         """
         checks: dict[type, Callable] = {Body: self._place_body, Frame: self._place_frame, Joint: self._place_joint}
         checks |= {Coupling: self._place_coupling, Start: self._place_start}
+        checks |= {Input: self._place_input, Output: self._place_output}
         if isinstance(element, Relation):
             self._place_relation(element)
         elif isinstance(element, Collider):
@@ -91,7 +100,10 @@ class Scene(ConstraintBuilder, ContactBuilder):
         elif type(element) in checks:
             checks[type(element)](element)
         else:
-            raise SceneError(f"expected a Body, Frame, Joint, Coupling, Relation, Collider, load or Start, got {element!r}.")
+            raise SceneError(
+                "expected a Body, Frame, Joint, Coupling, Relation, Collider, load, Start, Input or Output, "
+                f"got {element!r}."
+            )
         return element
 
     def body(self, name: str, mass: float, inertia=(0.0, 0.0, 0.0), com=(0.0, 0.0, 0.0), **options) -> Body:
@@ -286,9 +298,10 @@ class Scene(ConstraintBuilder, ContactBuilder):
         self.shapes[shape.name] = shape
 
     @property
-    def losses(self) -> dict[str, Relation]:
+    def losses(self) -> "dict[str, LossyGear | JointLink]":
         """Non-ideal links that lose power: gears, then set-valued elements."""
-        return {name: link for name, link in (self.relations | self.set_valued).items() if link.loses}
+        links = {name: link for name, link in (self.relations | self.set_valued).items() if link.loses}
+        return cast("dict[str, LossyGear | JointLink]", links)  # no other kinds are non-ideal
 
     @property
     def backlashes(self) -> dict[str, ElasticLink]:
@@ -310,7 +323,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     def _place_load(self, load):
         what = f"{values.kind(load)} {load.name!r}"
-        self._require_new(load.name, "load", self.loads | self._constraints)
+        self._require_new(load.name, "load", self.loads | self._constraints | self.inputs)
         if isinstance(load, Drive):
             count = self.require_joint(load.joint, what).pair.n_v
             if count == 0:
@@ -337,6 +350,20 @@ class Scene(ConstraintBuilder, ContactBuilder):
                 raise SceneError(f"start of joint {start.joint!r}: {key} needs {count} numbers, got {value!r}.")
         warn_of_start(start, self.joints[start.joint])
         self.starts[start.joint] = start
+
+    def _place_input(self, given: Input):
+        self._require_new(given.name, "input", self.inputs | self.loads | self._constraints)
+        self._require_coordinate(given.joint, f"input {given.name!r}")
+        self.inputs[given.name] = given
+
+    def _place_output(self, output: Output):
+        what = f"output {output.name!r}"
+        self._require_new(output.name, "output", self.outputs)
+        if SENSORS[output.kind][0] == "joint":
+            self.require_joint(output.of, what)
+        else:
+            self._require_place(output.of, what)
+        self.outputs[output.name] = output
 
     def require_joint(self, name: str, what: str) -> Joint:
         """Return the joint of this name, or raise a SceneError that tells which joints exist."""
@@ -385,9 +412,10 @@ class Scene(ConstraintBuilder, ContactBuilder):
         return name if not count else f"{name} {count + 1}"
 
 
-_HERE = (*vars(builder).values(), *vars(contact_builder).values(), *list(globals().values()))
+_MODULES = builder, contact_builder, inputs
+_HERE = (*(value for module in _MODULES for value in vars(module).values()), *list(globals().values()))
 _KINDS = {kind for kind in _HERE if isinstance(kind, type) and kind.__module__.startswith("gauss.scene.")}
 for _kind in _KINDS:
     named_arguments(_kind)
-for _builder in (Scene, ConstraintBuilder, ContactBuilder):
+for _builder in (Scene, ConstraintBuilder, ContactBuilder, InputBuilder):
     named_methods(_builder)

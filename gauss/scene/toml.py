@@ -47,6 +47,8 @@ CLASSES = {
     "joint_spring": "JointSpring",
     "spring": "Spring",
     "start": "Start",
+    "input": "Input",
+    "output": "Output",
 }
 SECTIONS = LazyTable(CLASSES, partial(getattr, package))
 HEADER_KEYS = ("name", "gravity")
@@ -210,7 +212,8 @@ def _text(value) -> str:
 
 def _elements(scene: Scene):
     constraints = scene.couplings | scene.relations | scene.contacts | scene.set_valued
-    for group in (scene.bodies, scene.frames, scene.shapes, scene.joints, constraints, scene.loads, scene.starts):
+    groups = (scene.bodies, scene.frames, scene.shapes, scene.joints, constraints, scene.loads, scene.starts)
+    for group in (*groups, scene.inputs, scene.outputs):
         yield from group.values()
 
 

@@ -65,6 +65,8 @@ class ServoEngine(Engine):
         Number of evaluations of the accelerations.
     """
 
+    evaluations, rescued = 0, 0
+
     def __init__(self, servo: Servo, plan: RelationPlan):
         self.servo, self.plan = servo, plan
         self.worst = 0.0

@@ -1,6 +1,7 @@
 from gauss.simulation.batch.rollout import Rollout, rollout
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.simulate import simulate
+from gauss.simulation.simulator import Simulator
 from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 from gauss.simulation.zero_crossings import crossings
 
@@ -8,6 +9,7 @@ __all__ = [
     "INTEGRATORS",
     "BodyMotion",
     "Rollout",
+    "Simulator",
     "Stats",
     "Trajectory",
     "crossings",

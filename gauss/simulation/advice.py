@@ -4,6 +4,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from gauss.dynamics.inputs import HeldLaw
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.integrators import METHODS, FixedStep
 from gauss.system import System
@@ -29,12 +30,18 @@ def advice(system: System, settings: dict, events=(), stepped: bool = False) -> 
     impacts = sum(event.kind == "impact" for event in events)
     if impacts:
         said.append(f"the losses at {impacts} impacts are booked and not the cause")
-    if laws.called:
+    opaque = [name for name in laws.reasons if not _is_held(system, name)]
+    if opaque:
         said.append(
-            f"{_laws(laws.reasons)} untraceable, so switching times are not known: give them as breaks=[…] [s], or "
+            f"{_laws(opaque)} untraceable, so switching times are not known: give them as breaks=[…] [s], or "
             "the longest step as step= [s]"
         )
     return "; ".join(said)
+
+
+def _is_held(system: System, name: str) -> bool:
+    """Whether a load stands for an input that is held between samples, at which steps end."""
+    return isinstance(getattr(system.scene.loads.get(name), "effort", None), HeldLaw)
 
 
 def _method(settings: dict, stepped: bool) -> str:

@@ -14,6 +14,7 @@ from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
+from gauss.simulation.held_inputs import HeldInputs
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
@@ -79,6 +80,15 @@ def checked_problem(
     return problem
 
 
+def held_inputs(problem: Problem, control, rate: float | None) -> HeldInputs | None:
+    """Inputs of a motion, as of :class:`gauss.simulation.held_inputs.HeldInputs`; None without a control law."""
+    if control is None:
+        if rate is not None:
+            raise SimulationError("rate: goes with control=, the law that is sampled.")
+        return None
+    return HeldInputs(problem.system, control, rate, problem.start.t, problem.end)
+
+
 def described(problem: Problem, duration: float, integrator: str | Integrator, rtol: float, atol) -> dict:
     """Settings of a motion by name, as its trajectory records them."""
     return {
@@ -89,6 +99,7 @@ def described(problem: Problem, duration: float, integrator: str | Integrator, r
         "atol": atol,
         "backend": named(problem.backend),
         "stabilisation": problem.stabilisation,
+        **({} if problem.held is None else {"rate": problem.held.rate}),
     }
 
 

@@ -1,5 +1,6 @@
 """A motion by a compiled loop of adaptive steps, which end at the switching times of the laws."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from gauss.codegen.kernels import LoopStatus
 from gauss.dynamics.laws.switching import endless
+from gauss.dynamics.laws.switching_times import APART, NO_TIMES, Timetable
 from gauss.dynamics.plan import method_key
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, Taylor, crossed_time
@@ -43,20 +45,26 @@ class CompiledAdaptiveRun(CompiledRun):
         control.largest = control.largest if self.problem.step is None else self.problem.step
         control.order = method.order_for(tolerance) if isinstance(method, Taylor) else method.order
         size = self.layout.size
+        if self.held is not None:
+            self.inputs = self.held.at(0, self.start.t, self.start.q.copy(), self.start.v.copy())
         begun = self._started(self.start.t, self.start.q, self.start.v)
         control.h = float(begun[-1])
         self._begin(begun[:size], begun[size:-1])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
         out = np.empty((grid.size if control.samples else self.budget, self.layout.row))
-        stops = iter(self.switching.times.stops(self.start.t, self.end)) if self.switching.times else iter([(self.end,) * 2])
+        samples = NO_TIMES if self.held is None else Timetable(NO_TIMES.switches, self.held.times[1:])
+        times = self.switching.times.join(samples) if samples else self.switching.times
+        stops = iter(times.stops(self.start.t, self.end)) if times else iter([(self.end,) * 2])
         control.end, self.after = next(stops)
-        self.trials, self.measured_from = 0.0, self.start.t
+        self.trials, self.measured_from, self.next_sample = 0.0, self.start.t, 1
 
         def advance():
             if self.point[0] >= control.end:
                 if self.after > control.end:
                     self._cross(self.after)
+                if self.held is not None:
+                    self._renew()
                 control.end, self.after = next(stops)
             loop(control, self.point, self.confirmed, grid, out, self.budget)
             self._refuse_chatter(grid, out)
@@ -91,16 +99,30 @@ class CompiledAdaptiveRun(CompiledRun):
 
     def _started(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Packed point of a state, its check, and its first step, by machine code."""
-        tolerance, given = self.problem.tolerance, np.empty(4 + q.size + v.size)
-        given[0], given[1 : 1 + q.size], given[1 + q.size : -3] = t, q, v
-        given[-3], given[-2], given[-1] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
+        tolerance, given = self.problem.tolerance, np.empty(4 + q.size + v.size + len(self.inputs))
+        end = 1 + q.size + v.size
+        given[0], given[1 : 1 + q.size], given[1 + q.size : end], given[end + 3 :] = t, q, v, self.inputs
+        given[end], given[end + 1], given[end + 2] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         return self.loop.evaluate("start", given)
+
+    def _renew(self):
+        """Set the inputs of a sample of the control law that begins at the present point, and the rates under them."""
+        k = self.next_sample
+        assert self.held is not None  # asked for motions with held inputs only
+        if k == len(self.held.times) or self.held.times[k] - self.point[0] > 4.0 * APART * abs(self.end):
+            return
+        self._hold(k)
+        self.next_sample += 1
+        point = self.layout.point(self.point)
+        self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
+        first = self._started(point.state.t, point.state.q, point.state.v)[-1]
+        self.control.h = max(float(first), self.control.h)
 
     def _cross(self, t: float):
         """Continue just after a switching time, with the rates there."""
         if self._jumped(t) and self.samples is None:
             self.rows.append(self._row())
-        equations = SimpleNamespace(system=self.system, evaluate=self._evaluate)
+        equations = SimpleNamespace(system=self.system, evaluate=self.evaluated)
         point = crossed_time(equations, self.layout.point(self.point), t)
-        self.point, state = self.layout.pack(point), point.state
+        self.point, state = self._pack(point), point.state
         self.control.h = max(float(self._started(t, state.q, state.v)[-1]), LEAST_RESTART_STEP * (self.end - self.start.t))

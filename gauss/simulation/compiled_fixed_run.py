@@ -1,16 +1,16 @@
 """A motion by a compiled loop of fixed steps on a grid, interrupted where prescribed velocities jump."""
 
-from collections.abc import Sequence
+from bisect import bisect_right
 from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen.kernels import Due, Fixed, LoopStatus
+from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus
 from gauss.dynamics.plan import method_key
 from gauss.integrators import FixedStep, Point
 from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import fixed
-from gauss.simulation.grid import grid_of
+from gauss.simulation.grid import grid_of, with_samples
 from gauss.simulation.step_limits import steps_per_check
 
 
@@ -29,21 +29,40 @@ class CompiledFixedRun(CompiledRun):
         assert self.problem.step is not None
         return self.problem.step
 
+    def prepared(self) -> Loop:
+        """Machine code of the steps."""
+        return self._loop_of(method_key(self.method), lambda: self._functions().compile())
+
     def run(self):
         """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`."""
         method, step = self.method, self.step
-        loop = self._loop_of(method_key(method), lambda: self._functions().compile())
-        point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.method_state))
+        loop = self.prepared()
+        if self.held is not None:
+            self.inputs = self.held.at(0, self.start.t, self.start.q.copy(), self.start.v.copy())
+        point = self._pack(Point(self.start, np.zeros(3), self.evaluated(self.start), self.method_state))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = steps_per_check(method.evaluations)
         pairs = grid_of(method, self.start.t, self.end, step, self.samples, self.switching)
         out = np.empty((self.budget, self.layout.row))
         self.crossings: dict[int, float] = {}
-        self.renewed: Sequence[int] | np.ndarray = ()
+        self.renewed: set[int] = set()
+        self.holds: dict[int, int] = {}
+        if self.held is not None:
+            pairs, self.holds = with_samples(pairs, self.held.times[1:], step, self.samples is None)
         if self.switching.times:
-            self.crossings, self.renewed = self._interruptions(pairs, method)
+            self.crossings, renewed = self._interruptions(pairs, method)
+            self.renewed = set(map(int, renewed))
+        if method.starts_from_accelerations:
+            self.renewed |= set(self.holds)
+        self.stops = sorted({*self.renewed, *self.crossings, *self.holds})
         self._drive(lambda: self._advance(pairs, out), out)
         self.control.unseen += self.switching.times.unresolved(self.start.t, self.end, step)
+
+    def _is_confirmed(self) -> bool:
+        if self.held is not None:  # the rates of a point are those at the begin of its last step
+            point = self.layout.point(self.point)
+            self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
+        return super()._is_confirmed()
 
     def _functions(self) -> Fixed:
         """Functions of the step loop."""
@@ -66,13 +85,16 @@ class CompiledFixedRun(CompiledRun):
         if int(control.sample) in self.crossings:
             self._cross(pairs, self.crossings.pop(int(control.sample)))
         done = int(control.sample)
-        until = min([k for k in (*self.renewed, *self.crossings) if k > done], default=len(pairs))
+        following = bisect_right(self.stops, done)
+        until = self.stops[following] if following < len(self.stops) else len(pairs)
         part = pairs[done : min(until, done + self.budget)]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
+        if int(control.sample) == until and until in self.holds:
+            self._hold(self.holds[until])
         if int(control.sample) == until and until in self.renewed:  # the method state holds accelerations from before
             point = self.layout.point(self.point)
-            rates = self._evaluate(point.state)
-            self.point = self.layout.pack(replace(point, rates=rates, method_state=rates.acceleration))
+            rates = self.evaluated(point.state)
+            self.point = self._pack(replace(point, rates=rates, method_state=rates.acceleration))
         if control.status == LoopStatus.DONE and control.sample < len(pairs):
             control.status = LoopStatus.PAUSED
 

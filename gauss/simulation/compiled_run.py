@@ -7,7 +7,7 @@ the loop stops at a failed check, and the fallback dynamics of the plan continue
 """
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from operator import attrgetter
 
 import numpy as np
@@ -16,8 +16,10 @@ from gauss.codegen.kernels import ENERGY_RECORD, Control, Loop, LoopStatus
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
+from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
+from gauss.errors import SimulationError
 from gauss.integrators import ExplicitPair, FixedStep, Point, Rates, Taylor
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.compiled_steps.taylor_step import compensation_size
@@ -43,18 +45,25 @@ class CompiledRun:
     ----------
     problem : Problem
         Initial value problem whose loads are all traced.
+    program : type
+        Makes the functions of the system.
     """
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, program: type[Program] = Program):
         self.began = time.perf_counter()
         self.problem, self.system, self.start, self.end = problem, problem.system, problem.start, problem.end
         self.samples, self.switching, self.drift = problem.samples, problem.switching, problem.drift
         self.events: list[Event] = []
         self.rows: list[np.ndarray] = []
-        self.certified, self.key = CertifiedEngine("auto", self.drift.gains), (self.drift, problem.laws.key)
+        self.held = problem.held
+        self.certified = CertifiedEngine("auto", self.drift.gains)
+        self.key = (self.drift, problem.laws.key, self.held is not None)
         self.method_state, size = self._initial_method_state()
-        self.program = self._on_demand((Program, size), lambda: Program(self.system, problem.laws, self.drift, size))
+        make = lambda: program(self.system, problem.laws, self.drift, size, inputs=self.held is not None)  # noqa: E731
+        self.program = self._on_demand((program, size), make)
         self.layout = self.program.layout
+        self.inputs = np.zeros(len(self.layout.parameters))
+        self.input_forces = InputForces(self.system) if self.held else None
         duration = self.end - self.start.t
         work = max(1, self.system.n_v) ** 2 * problem.method.evaluations
         self.budget = max(1, int(BUDGET * min(1.0, BUDGET_WORK / work)))
@@ -84,7 +93,7 @@ class CompiledRun:
         return ()
 
     def _on_demand(self, what: tuple, make: Callable):
-        return self.system.dynamics.on_demand((*what, self.key), make)
+        return self.system.mechanics.on_demand((*what, self.key), make)
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
         """Start from a compiled point if it passes the check or is confirmed, else from a certified one."""
@@ -101,14 +110,35 @@ class CompiledRun:
         """Present time, state and work as one row of the trajectory."""
         return self.point[None, : self.layout.row].copy()
 
-    def _evaluate(self, state: State) -> Rates:
+    def evaluated(self, state: State) -> Rates:
         """Rates by machine code."""
-        found, n_v = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v])), self.system.n_v
+        found = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v, self.inputs]))
+        n_v = self.system.n_v
         return Rates(found[:n_v], found[n_v : n_v + 3])
 
+    def _pack(self, point: Point) -> np.ndarray:
+        """Vector of a point with the present inputs."""
+        return self.layout.pack(point, self.inputs)
+
+    def _hold(self, k: int):
+        """Set the inputs of the sample k of the control law, at the present point."""
+        assert self.held is not None
+        n_q, end = self.system.n_q, 1 + self.system.n_q + self.system.n_v
+        t, q, v = float(self.point[0]), self.point[1 : 1 + n_q].copy(), self.point[1 + n_q : end].copy()
+        self.inputs = self.held.at(k, t, q, v)
+        self.point[-self.inputs.size :] = self.inputs
+
+    def _certified_rates(self, state: State, inputs: np.ndarray) -> Rates:
+        """Rates by the certified recursion; the power of the inputs is counted."""
+        if self.input_forces is None:
+            return self.certified.rates(self.system, state)
+        load = self.input_forces.forces(inputs)
+        found = self.certified.rates(self.system, state, load)
+        return found._replace(power=found.power + np.array([load @ state.v, 0.0, 0.0]))
+
     def _certified_start(self) -> np.ndarray:
-        rates = self.certified.rates(self.system, self.start)
-        return self.layout.pack(Point(self.start, np.zeros(3), rates, self.method_state))
+        rates = self._certified_rates(self.start, self.inputs)
+        return self._pack(Point(self.start, np.zeros(3), rates, self.method_state))
 
     def _jumped(self, after: float) -> AfterJump | None:
         """Impact at a switching time, after which the motion continues; None if no prescribed velocity jumps."""
@@ -119,8 +149,8 @@ class CompiledRun:
         if found is not None:
             self.events.append(found.event)
             confirmed = self.confirmed[0] == self.point[0]
-            rates = self._evaluate(found.state)
-            self.point = self.layout.pack(Point(found.state, found.work, rates, self.method_state))
+            rates = self.evaluated(found.state)
+            self.point = self._pack(Point(found.state, found.work, rates, self.method_state))
             self.confirmed = self.point.copy() if confirmed else self.confirmed
         return found
 
@@ -144,6 +174,11 @@ class CompiledRun:
             self._gather(out)
             error.trajectory = self.trajectory()  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the motion so far
             raise
+        except SimulationError as error:  # of a control law
+            if error.trajectory is None:
+                self._gather(out)
+                error.trajectory = self.trajectory()
+            raise
         finally:
             bar.close()
 
@@ -155,16 +190,17 @@ class CompiledRun:
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion confirms the accelerations at the end.
 
-        It is used for systems with loop, coupling or relation constraints: at both ends of the first run, and later where
-        the check fails. Other systems are checked body by body in machine code, at their last point, too.
+        It is used for large trees and systems with loop, coupling or relation constraints: at both ends of the first run,
+        and later where the check fails. Other systems are checked body by body in machine code, at their last point, too.
         """
-        if not self.system.has_closures:
+        if self.program.checks_bodies:
             return True
-        packed, checked = self.point, (self.control.constraint_residual,)  # the error by which the loop decides
+        packed = self.point
+        checked: Sequence | np.ndarray = (self.control.constraint_residual,)  # the error by which the loop decides
         if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
-            packed = self.layout.pack(Point(state, point.work, self._evaluate(state), point.method_state))
+            packed = self._pack(Point(state, point.work, self.evaluated(state), point.method_state))
             checked = self.loop.evaluate("check", packed)
         if self._is_enough(checked):
             return True
@@ -177,7 +213,8 @@ class CompiledRun:
     def _certified_error(self, packed: np.ndarray) -> float:
         """Relative error of the accelerations of a point, by the certified recursion."""
         point = self.layout.point(packed)
-        exact = self.certified.rates(self.system, point.state).acceleration
+        inputs = packed[self.layout.size - self.inputs.size :]
+        exact = self._certified_rates(point.state, inputs).acceleration
         return relative_error(self.system, point.rates.acceleration, exact, point.state.v)
 
     def _is_enough(self, checked) -> bool:
@@ -185,7 +222,7 @@ class CompiledRun:
 
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
-        known = not self.system.has_closures or self.kind in self._certified_loops()
+        known = self.program.checks_bodies or self.kind in self._certified_loops()
         return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECK_ERRORS])
 
     def _certified_loops(self) -> set[Hashable]:

@@ -29,8 +29,8 @@ def constant(problem: Problem) -> Trajectory:
     system, start, end, samples = problem.system, problem.start, problem.end, problem.samples
     began = time.perf_counter()
     if samples is None:
-        fixed = isinstance(problem.method, FixedStep) and problem.step is not None
-        pairs = grid(start.t, end, problem.step, None) if fixed else np.array([[end, Due.SAMPLE]])
+        step = problem.step if isinstance(problem.method, FixedStep) else None
+        pairs = grid(start.t, end, step, None) if step is not None else np.array([[end, Due.SAMPLE]])
         samples = np.append(start.t, pairs[:, 0])
     _refuse_overlap(system, samples)
     empty = np.zeros((len(samples), 0))

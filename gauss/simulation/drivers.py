@@ -4,21 +4,25 @@ Each imports what it runs: one motion needs one of them.
 """
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from gauss.dynamics import engines
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.load_forces import LoadForces
+from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
-from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.handover import finished
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+    from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
 T = TypeVar("T")
 
@@ -48,19 +52,40 @@ def _constant(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
-    run = _compiled_run(problem)
+    run = _compiled_run(problem, _program(plan))
     run.run()
     return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
 
-def _compiled_run(problem: Problem) -> CompiledRun:
+def _samples(problem: Problem, plan: Plan) -> Trajectory:
+    from gauss.simulation.held_motion import held_motion
+
+    chosen: list[Plan] = []
+
+    def drive(alone: Problem) -> Trajectory:
+        chosen[:] = chosen or [plan_of(alone.question)]
+        return DRIVERS[chosen[0].driver](alone, chosen[0])
+
+    return held_motion(problem, drive)
+
+
+def _program(plan: Plan) -> type[Program]:
+    """Class of the functions of the compiled loop of a plan."""
+    if plan.dynamics == "tree recursion":
+        from gauss.dynamics.tree_program import TreeProgram
+
+        return TreeProgram
+    return Program
+
+
+def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledAdaptiveRun | CompiledFixedRun":
     if isinstance(problem.method, FixedStep):
         from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
-        return CompiledFixedRun(problem)
+        return CompiledFixedRun(problem, program)
     from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
 
-    return CompiledAdaptiveRun(problem)
+    return CompiledAdaptiveRun(problem, program)
 
 
 def _fallback(problem: Problem, plan: Plan) -> Trajectory:
@@ -69,6 +94,10 @@ def _fallback(problem: Problem, plan: Plan) -> Trajectory:
         raise SimulationError(
             f"Integrator {problem.method.name!r} needs the equations of motion in machine code; use 'dop853' here."
         )
+    if problem.held is not None:
+        from gauss.simulation.held_motion import held_motion
+
+        return held_motion(problem, lambda alone: _stepped(alone, plan.fallback))
     return _stepped(problem, plan.fallback)
 
 
@@ -96,7 +125,7 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
         return CompiledMoreauRun(problem, smooth_question(problem.question).laws).collect()
     from gauss.simulation.moreau.moreau_jean import MoreauRun
 
-    run = MoreauRun(problem.system, problem.backend, problem.step, problem.end, problem.switching)
+    run = MoreauRun(problem.system, problem.backend, cast(float, problem.step), problem.end, problem.switching)
     return run.collect(problem.start, problem.samples, problem.progress)
 
 
@@ -126,6 +155,7 @@ DRIVERS: dict[str, Callable[[Problem, Plan], Trajectory]] = {
     "library": _library,
     "compiled loop": _compiled_loop,
     "Python loop": _python_loop,
+    "samples": _samples,
 }
 
 

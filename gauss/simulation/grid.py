@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.codegen.kernels import Due
 from gauss.dynamics.laws.switching import Switching
-from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
+from gauss.dynamics.laws.switching_times import APART, NO_TIMES, Timetable
 from gauss.integrators import FixedStep
 
 EQUAL_TIMES = 1e-9  # relative to the step: closer times are one
@@ -68,6 +68,37 @@ def _with_ends(pairs: np.ndarray, movable: np.ndarray, afters: list[float], begi
             k = int(np.searchsorted(pairs[:, 0], after))
             pairs, movable = np.insert(pairs, k, (after, Due.STEP), axis=0), np.insert(movable, k, False)
     return pairs
+
+
+def with_samples(pairs: np.ndarray, times: np.ndarray, step: float, rows: bool) -> tuple[np.ndarray, dict[int, int]]:
+    """Pairs with steps that end at the samples of a control law, too, and the sample that begins after so many pairs.
+
+    Parameters
+    ----------
+    pairs : ndarray, shape (m, 2)
+        Pairs as of :func:`grid`.
+    times : ndarray, shape (k,)
+        Samples after the start [s], ascending.
+    step : float
+        Step [s].
+    rows : bool
+        Whether every end of a step is a row of the trajectory.
+
+    Returns
+    -------
+    pairs : ndarray, shape (n, 2)
+        Pairs; a step that nearly ends at a sample serves it.
+    begins : dict of int to int
+        Number of pairs before a sample → its number, the first of ``times`` being 1.
+    """
+    equal = np.maximum(EQUAL_TIMES * step, 4.0 * APART * np.abs(times))
+    ends = pairs[pairs[:, 1] != Due.OFF_GRID_SAMPLE, 0]
+    near = np.abs(ends[np.minimum(np.searchsorted(ends, times - equal), ends.size - 1)] - times) <= equal
+    due = Due.SAMPLE if rows else Due.STEP
+    pairs = np.concatenate([pairs, np.column_stack([times[~near], np.full((~near).sum(), float(due))])])
+    pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+    begins = np.searchsorted(pairs[:, 0], times + equal, side="right")
+    return pairs, {int(place): k for k, place in enumerate(begins, start=1)}
 
 
 def _even(begin: float, end: float, step: float, samples) -> np.ndarray:

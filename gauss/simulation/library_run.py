@@ -101,6 +101,9 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
         stats = stats._replace(unseen=found.steps or 1)  # libraries do not locate switching events
     q, v = (np.array([getattr(state, part) for state in states]).reshape(len(states), -1) for part in "qv")
     whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
+    if found.interruption is not None:
+        found.interruption.trajectory = whole  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the motion so far
+        raise found.interruption
     if found.failure is not None:
         raise SimulationError(f"t = {found.t[-1]:.6g} s: {method.name!r} gave up: {found.failure}", whole)
     if not worst <= ACCELERATION_TOLERANCE:
@@ -126,19 +129,20 @@ def _between_switching_times(solve: Callable, times: np.ndarray, y0: np.ndarray,
         inside = times[(times > begin) & (times < before)]
         part = solve(np.array([begin, *inside, before]), y0)
         asked = np.isin(part.t, times) | (len(times) == 2)
-        between = times[(times >= before) & (times <= after)]  # samples at the switching time itself
-        goes_on = after > before and part.failure is None
+        complete = part.failure is None and part.interruption is None
+        between = times[(times >= before) & (times <= after) & complete]  # samples at the switching time itself
+        goes_on = after > before and complete
         begin, y0 = after, across(before, after, part.y[-1]) if goes_on else part.y[-1]
         rows = np.vstack([part.y[asked], *[y0] * between.size])
         parts.append(part._replace(t=np.append(part.t[asked], between), y=rows))
-        if part.failure is not None:
+        if not complete:
             break
     t, y = (np.concatenate([getattr(part, name) for part in parts]) for name in "ty")
     distinct = np.unique(t, return_index=True)[1]
     steps, evaluations, factorisations = (
         sum(getattr(part, name) for part in parts) for name in ("steps", "evaluations", "factorisations")
     )
-    return LibrarySolution(t[distinct], y[distinct], steps, evaluations, factorisations, parts[-1].failure)
+    return LibrarySolution(t[distinct], y[distinct], steps, evaluations, factorisations, *parts[-1][-2:])
 
 
 def _absolute_tolerances(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarray]:

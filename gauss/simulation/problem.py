@@ -10,6 +10,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.stabilisation import Baumgarte, Drift
 from gauss.integrators import Integrator, Tolerance
+from gauss.simulation.held_inputs import HeldInputs
 from gauss.system import State, System
 
 
@@ -44,6 +45,8 @@ class Problem(NamedTuple):
         Times to return [s]; every step when None.
     progress : bool
         Whether a progress bar is shown.
+    held : HeldInputs, optional
+        Inputs, held between samples; they are zero when not given.
     """
 
     system: System
@@ -59,9 +62,11 @@ class Problem(NamedTuple):
     end: float
     samples: np.ndarray | None
     progress: bool
+    held: HeldInputs | None = None
 
     @property
     def question(self) -> Question:
         """Facts that the rules of :data:`gauss.dynamics.plan.MOTIONS` are evaluated on."""
         stabilisation = "baumgarte" if isinstance(self.stabilisation, Baumgarte) else self.stabilisation
-        return Question(self.system, self.laws, self.backend, self.method, self.drift, stabilisation)
+        held = self.held is not None
+        return Question(self.system, self.laws, self.backend, self.method, self.drift, stabilisation, held)

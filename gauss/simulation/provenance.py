@@ -28,7 +28,7 @@ def provenance(trajectory: Trajectory) -> dict[str, str | float]:
 
 def made_by() -> dict[str, str]:
     """Versions of the packages that results depend on."""
-    versions = {f"version_{name}": version_of(name, "not installed as a package") for name in MADE_BY}
+    versions = {f"version_{name}": version_of(name) or "not installed as a package" for name in MADE_BY}
     return versions | {"version_python": platform.python_version()}
 
 

@@ -80,7 +80,8 @@ class PythonRun:
         switching: Switching = Switching(),  # noqa: B008 (frozen)
     ):
         self.system, self.method, self.solver = system, method, solver
-        self.tolerance, self.step, self.end, self.projects, self.switching = tolerance, step, end, projects, switching
+        self.tolerance = cast(Tolerance, tolerance)  # unused by a fixed-step method
+        self.step, self.end, self.projects, self.switching = step, end, projects, switching
         self.steps = self.rejected = self.factorisations = self.unseen = 0
         self.longest = self.crossings = 0.0
         self.events: list[Event] = []
@@ -103,7 +104,7 @@ class PythonRun:
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted points of adaptive steps and of switching times, with dense output."""
-        h, duration = first_step(self, point, self.tolerance, method.order), self.end - point.state.t
+        h, duration = self._first_step(method, point), self.end - point.state.t
         for before, after in self.switching.times.stops(point.state.t, self.end):
             for reached, following, dense in self._until(method, point, h, before, duration):
                 point, h = reached, following
@@ -113,7 +114,10 @@ class PythonRun:
                 point = jumped or self.crossed_to(point, after)
                 if jumped:
                     yield point, None
-                h = max(first_step(self, point, self.tolerance, method.order), LEAST_RESTART_STEP * duration)
+                h = max(self._first_step(method, point), LEAST_RESTART_STEP * duration)
+
+    def _first_step(self, method: Controlled, point: Point) -> float:
+        return cast(float, first_step(self, point, self.tolerance, method.order))
 
     def crossed_to(self, point: Point, t: float) -> Point:
         """Point just after a switching time, with the rates there."""
@@ -191,7 +195,7 @@ class PythonRun:
         share, crossings = self.switching.share(begin, trial.point) if shortest < 1.0 else (1.0, 0.0)
         self.crossings += crossings
         if share < 1.0:
-            return onward(share, shortest)
+            return cast(float, onward(share, shortest))
         if not self.switching.called or h * SMALLEST_STEP <= RESOLVED_STEP * smallest:
             return 1.0
         allowed = self.tolerance.scale(self.system, trial.point.state)[self.system.n_v :]
@@ -206,7 +210,7 @@ class PythonRun:
         if not self.solver.hand_over(point.state.t):
             raise error
         point = replace(point, rates=self.evaluate(point.state))
-        return point, first_step(self, point, self.tolerance, method.order)
+        return point, self._first_step(method, point)
 
     def _dense(self, method: Controlled, begin: Point, h: float, kept: np.ndarray) -> Callable:
         coefficients = cache(lambda: method.dense(self, begin, h, kept)[0])
@@ -214,10 +218,11 @@ class PythonRun:
 
     def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
         """Points of fixed steps; samples between them are the ends of separate shorter steps."""
-        self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.step)
+        step = cast(float, self.step)
+        self.unseen = self.switching.times.unresolved(point.state.t, self.end, step)
         stops = dict(stop for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1])
         after, passed = set(stops.values()), point.state.t
-        for t, due in grid_of(method, point.state.t, self.end, self.step, samples, self.switching):
+        for t, due in grid_of(method, point.state.t, self.end, step, samples, self.switching):
             if t <= passed:  # within the switching time of an impact
                 continue
             if due != Due.OFF_GRID_SAMPLE:

@@ -19,7 +19,7 @@ from gauss.dynamics.store import is_first_use
 from gauss.errors import SimulationError, judged_later, require
 from gauss.integrators import Integrator
 from gauss.scene import Scene
-from gauss.simulation.arguments import checked_problem, described
+from gauss.simulation.arguments import checked_problem, described, held_inputs
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.energy_balance import watch_balance
 from gauss.simulation.history import History
@@ -45,6 +45,8 @@ def simulate(
     state: State | None = None,
     times=None,
     breaks=(),
+    control=None,
+    rate: float | None = None,
     verify: bool = False,
     progress: bool = True,
     plan: Plan | None = None,
@@ -97,6 +99,13 @@ def simulate(
         Switching times of opaque (untraceable) laws [s], counted from the start. No step crosses one. Conditions of traced
         laws, on time or state, are located without it. A jump of a prescribed speed is an impact: an event of the
         trajectory.
+    control : callable or array_like, shape (k, n_u), optional
+        Law of the inputs of the scene (:meth:`gauss.Scene.input`), ``law(t, q, v)`` → values (n_u,) [N m, N]: any Python
+        callable, called once for each sample and free to keep a state; or a table with a row for each sample. The values
+        are held from one sample to the next (zero-order hold), where steps end, and cut off at the limits of the inputs. The
+        system of the trajectory has drives by these values for its inputs. Without it the inputs are zero.
+    rate : float, optional
+        Samples of the law in a second [Hz]; the first is at the start.
     verify : bool
         Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool
@@ -126,8 +135,8 @@ def simulate(
     Raises
     ------
     SimulationError
-        Before the first step, if a prescribed position jumps; later, if the motion cannot continue: its ``trajectory`` holds
-        the motion so far.
+        Before the first step, if a prescribed position jumps; later, if the motion cannot continue, or the control law
+        returns a value that is no finite number: its ``trajectory`` holds the motion so far.
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """
@@ -138,13 +147,15 @@ def simulate(
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
+        problem = problem._replace(held=held_inputs(problem, control, rate))
         settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
         found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)
     history.warn(found)
-    if plan is None and found.stats.plan.rejected and not own_backend(problem.question):
-        warn_of_slow_route(problem.system, found.stats.plan, found.stats.evaluations)
+    chosen = found.stats.plan
+    if plan is None and chosen is not None and chosen.rejected and not own_backend(problem.question):
+        warn_of_slow_route(problem.system, chosen, found.stats.evaluations)
     return found
 
 
@@ -156,10 +167,10 @@ def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: 
         found = verified(found, problem, partial(_again, problem, plan)) if verify else found
     except (SimulationError, KeyboardInterrupt) as error:
         reached = found if found is not None else getattr(error, "trajectory", None)
-        recorded = None if reached is None else reached.with_settings(settings, plan.ran(run.ran))
+        recorded = None if reached is None else _recorded(problem, reached, settings, plan.ran(run.ran))
         error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
         raise
-    return found.with_settings(settings, plan.ran(run.ran))
+    return _recorded(problem, found, settings, plan.ran(run.ran))
 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
@@ -179,3 +190,8 @@ def _again(problem: Problem, plan: Plan, step, tolerance, samples, mesh=()) -> T
     if len(mesh):
         switching = switching._replace(times=switching.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
     return _motion(problem._replace(step=step, tolerance=tolerance, samples=samples, switching=switching), plan)
+
+
+def _recorded(problem: Problem, found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
+    """Trajectory with its settings and its plan, and with the system of its inputs."""
+    return found.recorded(found.system if problem.held is None else problem.held.recorded(), settings, plan)

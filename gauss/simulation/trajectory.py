@@ -10,8 +10,9 @@ import numpy as np
 
 from gauss.codegen import content_key, trace
 from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.outputs import INERTIAL, measured, shape_of
 from gauss.dynamics.rules import Plan
-from gauss.errors import StateError
+from gauss.errors import StateError, did_you_mean
 from gauss.shapes import Shaped
 from gauss.system import State, System
 
@@ -195,10 +196,11 @@ class Trajectory:
         span = f"{self.t[0]:.6g} … {self.t[-1]:.6g} s" if len(self) else "empty"
         return f"Trajectory({self.system.scene.name!r}, {len(self)} samples, {span})"
 
-    def with_settings(self, settings: dict, plan: Plan) -> "Trajectory":
-        """Trajectory with the arguments of the simulation, and with its plan."""
+    def recorded(self, system: System, settings: dict, plan: Plan) -> "Trajectory":
+        """Trajectory with the arguments of the simulation and its plan, of a system."""
         made = object.__new__(Trajectory)  # a fifth of the time of dataclasses.replace
-        made.__dict__.update(vars(self), settings=settings, stats=self.stats._replace(plan=plan))
+        fields = {name: value for name, value in vars(self).items() if name in Trajectory.__dataclass_fields__}
+        made.__dict__.update(fields, system=system, settings=settings, stats=self.stats._replace(plan=plan))
         return made
 
     def state(self, index: int) -> State:
@@ -265,13 +267,32 @@ class Trajectory:
         def traced(t, q, v):
             return function(kinematics(system, State(t[0], q, v)))
 
-        kernel = system.dynamics.on_demand(
+        kernel = system.mechanics.on_demand(
             (trace, name, content_key(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
         )
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
 
     def __getstate__(self) -> dict:
         return {field.name: getattr(self, field.name) for field in fields(self)}  # without cached poses
+
+    def output(self, name: str) -> np.ndarray:
+        """Values of an output of the scene at every sample, (k,), (k, n), or (k, 3, 3) of a rotation.
+
+        Raises
+        ------
+        StateError
+            If the scene has no such output.
+        """
+        outputs = self.system.scene.outputs
+        if name not in outputs:
+            raise StateError(f"no output {name!r}. {did_you_mean(name, outputs)}")
+        output = outputs[name]
+        if output.kind in INERTIAL:
+            rates = [self.system.accelerations(self.state(k)) for k in range(len(self))]
+            found = np.array([measured(output, *pair) for pair in zip(self.motions, rates, strict=True)])
+        else:
+            found = self.sampled(f"output {name}", lambda motion: measured(output, motion))
+        return found.reshape(len(self), *shape_of(output, self.system))
 
     def coordinate(self, joint: str) -> np.ndarray:
         """Coordinates (k,) or (k, n) of a joint [rad, m]."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -37,7 +38,8 @@ def verified(motion: Trajectory, problem: Problem, again: Callable[..., Trajecto
     times, rows = np.unique(motion.t, return_index=True)
     try:
         if isinstance(method, FixedStep):
-            finer, share = again(step / 2.0, tolerance, times, ()), 2.0**method.order / (2.0**method.order - 1.0)
+            finer = again(cast(float, step) / 2.0, tolerance, times, ())
+            share = 2.0**method.order / (2.0**method.order - 1.0)
         else:
             finer, share = _finer(motion, step, tolerance, times, again), 1.0
     except SimulationError:

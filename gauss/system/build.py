@@ -12,7 +12,6 @@ from gauss.system import frames
 from gauss.system.frozen_functions import written_laws
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.relations import place_relations
-from gauss.system.spanning_tree import spanning_tree
 from gauss.system.system import Dynamics, System
 
 
@@ -24,7 +23,7 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     SceneError
         If no chain of joints leads to a body, or frames given twice disagree.
     """
-    edges, _ = spanning_tree(scene)
+    edges = spanning_tree(scene)
     index = {name: i for i, name in enumerate(scene.bodies)} | {GROUND: -1}
     joints = _place_joints(scene, index)
     constraints = _constraints(scene, joints)
@@ -144,3 +143,41 @@ def _check_inertia(system: System):
                 f"body {body!r} has no mass, yet joint {joint!r} lets it move and nothing hangs on it: "
                 "its acceleration is undetermined. Give it a mass > 0."
             )
+
+
+def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
+    """Tree edges (joint, outer body, inner body), inner bodies first.
+
+    Joints are taken in the order in which the scene names them: of the joints of a loop the last one is cut.
+
+    Raises
+    ------
+    SceneError
+        If no chain of joints leads from the ground to some body.
+    """
+    reached, edges = {GROUND}, []
+    waiting = list(scene.joints.values())
+    while waiting:
+        later = []
+        for joint in waiting:
+            ends = joint.parent in reached, joint.child in reached
+            if all(ends):
+                continue
+            if any(ends):
+                inner, outer = (joint.parent, joint.child) if ends[0] else (joint.child, joint.parent)
+                reached.add(outer)
+                edges.append((joint.name, outer, inner))
+            else:
+                later.append(joint)
+        if len(later) == len(waiting):
+            break
+        waiting = later
+    lost = [name for name in scene.bodies if name not in reached]
+    if lost:
+        raise SceneError(
+            f"no chain of joints leads from the ground to {', '.join(map(repr, lost))}; "
+            f"add one, e.g. scene.free('{lost[0]} floats', 'ground', {lost[0]!r}) for a body that moves freely."
+        )
+    if not scene.bodies:
+        raise SceneError(f"scene {scene.name!r} has no bodies; add one with scene.body(...).")
+    return edges

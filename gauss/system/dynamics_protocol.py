@@ -37,11 +37,11 @@ class Dynamics(Protocol):
     def forward_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
 
-    def inverse_dynamics(self, system: "System") -> Callable:
-        """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
+    def function(self, system: "System", names, reference: str, independent) -> Callable:
+        """Compiled function of a state, or of several at once, by their names."""
 
-    def loop_constraints(self, system: "System") -> Callable:
-        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
+    def evaluate(self, system: "System", names, given: dict, t, reference: str, independent) -> dict:
+        """Results of several functions of a state, by their names, for arguments by their names."""
 
     def operations(self, system: "System", subsystems: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of subsystems; None if these are not traced."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.errors import StateError
-from gauss.scene import Drive, ElasticLink, Force, JointSpring, Pair, Slipping, Spring
+from gauss.scene import Drive, ElasticLink, Force, Input, JointSpring, Pair, Slipping, Spring
 
-SceneLoad = Drive | ElasticLink | Force | JointSpring | Slipping | Spring
+SceneLoad = Drive | ElasticLink | Force | Input | JointSpring | Slipping | Spring
 
 
 @dataclass(frozen=True)
@@ -77,4 +77,4 @@ class BoundLoad:
     @property
     def on_coordinates(self) -> bool:
         """Whether it acts along joint coordinates, and needs no poses of bodies."""
-        return isinstance(self.load, Drive | ElasticLink | JointSpring | Slipping)
+        return isinstance(self.load, Drive | ElasticLink | Input | JointSpring | Slipping)

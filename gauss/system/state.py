@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.codegen import Scalar
+from gauss.codegen import Entry
 from gauss.shapes import Shaped
 
 
@@ -22,6 +22,6 @@ class State:
         Joint rates [rad/s, m/s], in the order of ``System.coordinates``.
     """
 
-    t: Scalar
+    t: Entry
     q: Shaped[np.ndarray, " nq"]
     v: Shaped[np.ndarray, " nv"]

@@ -24,6 +24,7 @@ from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
+from gauss.system.state_functions import StateFunctions
 from gauss.system.subsystem import Subsystem
 from gauss.versions import FormerAttribute
 
@@ -31,7 +32,7 @@ UNIT_QUATERNION = 1e-6  # error of the length of a quaternion typed with 7 digit
 
 
 @dataclass(frozen=True)
-class System:
+class System(StateFunctions):
     """Mechanism with indices. Made by :func:`gauss.compile_scene`.
 
     Parameters
@@ -79,13 +80,13 @@ class System:
         return rebuilding(self)
 
     def __copy__(self) -> "System":
-        made = object.__new__(System)
-        made.__dict__.update(self.__dict__)  # with what was computed so far
+        made = object.__new__(System)  # with what was computed so far, but for compiled functions
+        made.__dict__.update({name: value for name, value in self.__dict__.items() if name not in vars(StateFunctions)})
         return made
 
     @property
-    def _supplier(self) -> Dynamics:
-        """Dynamics of the system.
+    def mechanics(self) -> Dynamics:
+        """Its supplier of the mechanics.
 
         Raises
         ------
@@ -286,10 +287,10 @@ class System:
         refuse_changed(self)
         given = q is not None or v is not None
         if not given and t == 0.0 and keep is None and not least_violation:
-            return self._supplier.scene_start(self)
+            return self.mechanics.scene_start(self)
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
-        return self._supplier.consistent(self, state, kept, keep is not None, least_violation, given)
+        return self.mechanics.consistent(self, state, kept, keep is not None, least_violation, given)
 
     def projected(self, state: State) -> State:
         """Consistent state nearest to a given one, projected onto the constraints in the mass metric.
@@ -309,7 +310,7 @@ class System:
         StateError
             If the state does not fit the system.
         """
-        return self._supplier.projected(self, self.state(state.q, state.v, state.t))
+        return self.mechanics.projected(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: Scalar = 0.0) -> State:
         """State of the starts of the scene, consistent or not."""
@@ -343,7 +344,7 @@ class System:
         """
         require(state, (State,), "accelerations")
         refuse_changed(self)
-        return self._supplier.accelerations(self, state, load)
+        return self.mechanics.accelerations(self, state, load)
 
     @property
     def forward_dynamics(self) -> Callable:
@@ -359,7 +360,7 @@ class System:
             If the system cannot be compiled, with the reasons.
         """
         refuse_changed(self)
-        return self._supplier.forward_dynamics(self)
+        return self.mechanics.forward_dynamics(self)
 
     @property
     def inverse_dynamics(self) -> Callable:
@@ -374,17 +375,16 @@ class System:
         SimulationError
             If a law of a load cannot be compiled, with the reason.
         """
-        return self._supplier.inverse_dynamics(self)
+        return self.function("inverse_dynamics")
 
     @property
     def loop_constraints(self) -> Callable:
-        """Compiled function ``f(q, v, t=0.0)`` → residual c (r,) [rad, m], Jacobian J (r, n_v), bias γ (r,): J q̈ = γ.
+        """Compiled function ``f(q, v, out=None, t=0.0)`` → residual c (r,) [rad, m], Jacobian J (r, n_v), bias γ (r,).
 
-        Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J multiplies
-        the rates of the tree, those of joints that close loops follow from them.
+        J q̈ = γ. Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J
+        multiplies the rates of the tree, those of joints that close loops follow from them.
         """
-        refuse_changed(self)
-        return self._supplier.loop_constraints(self)
+        return self.function("loop_constraints")
 
     def explain(self) -> str:
         """Report of the system: bodies, freedoms, loops, loads, plans and reduction."""

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from gauss.backends.programme import Outcome
+from gauss.bench import casadi_, mujoco_
 from gauss.bench.classes import compare_class
 from gauss.bench.contestants import contestants, everyone, suits
 from gauss.bench.coulomb import projected
 from gauss.bench.folders import of_folder
 from gauss.bench.instances import FILE, of_selection
-from gauss.bench.measure import measure
-from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, ProgrammeStructure
+from gauss.bench.measure import TINY, measure
+from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES
 from gauss.bench.suite import export_suite, instances
 from gauss.bench.suite_instances import of_suite
 from gauss.bench.summary import is_broken, is_kept, is_right
@@ -21,14 +22,16 @@ SMALL = {
     CONES: ("cones velocities block tilt 1 friction 0.25", "cones grasp 5", "cones whole body hyq_no_sensors"),
     COULOMB: ("coulomb balls 1", "coulomb table 3"),
 }
+MUJOCO_ERROR = 1e-6  # relative: softness of contacts as MuJoCo has it would leave more than 1e-4
+STAGES_ERROR = 1e-6  # relative
 FINE = 1e-5  # relative error of x where residuals of 1e-9 are kept: contact forces of soft stacks amplify them
-STRUCTURES = {
-    ROWS: ProgrammeStructure(),
-    CONES: ProgrammeStructure(cones=(3,)),
-    COULOMB: ProgrammeStructure(cones=(3,), friction=(0.5,)),
-    STAGES: ProgrammeStructure(stages=(1, 1, 1)),
-}
-CASES = [(kind, name, solver) for kind, names in SMALL.items() for name in names for solver in contestants(kind)]
+CASES = [
+    (kind, name, solver)
+    for kind, names in SMALL.items()
+    for name in names
+    for solver in contestants(kind)
+    if solver not in mujoco_.SOLVERS
+]
 
 
 def judged(instance, solver: str, level: str = "high") -> dict:
@@ -40,11 +43,11 @@ def small() -> dict:
     return {instance.name: instance for kind, names in SMALL.items() for instance in of_suite(kind, [*names])}
 
 
-@pytest.mark.parametrize("kind", STRUCTURES)
+@pytest.mark.parametrize("kind", TINY)
 def test_solvers_are_asked_what_they_take(kind):
-    structure = STRUCTURES[kind]
-    asked = {solver for solver in everyone() if suits(solver, structure)}
-    assert structure.kind == kind and asked == set(contestants(kind)) and suits("mine:Solver", structure)
+    instance = TINY[kind]
+    asked = {solver for solver in everyone() if suits(solver, instance)}
+    assert instance.structure.kind == kind and asked == set(contestants(kind)) and suits("mine:Solver", instance)
     assert ("daqp" in asked) == (kind in (ROWS, STAGES)) and ("newton" in asked) == (kind == COULOMB)
 
 
@@ -131,3 +134,28 @@ def test_a_class_of_cones_has_a_table(tmp_path):
     names, asked = ["coulomb balls 1"], ["newton", "admm", "daqp", "recursion"]
     table = compare_class(tmp_path, COULOMB, problems=names, backends=asked, levels=["high"], progress=False)
     assert {row["backend"] for row in table.rows.values()} == {"newton", "admm"}
+
+
+@pytest.mark.peer
+@pytest.mark.parametrize("name", ["cones block tilt 1 friction 0.75", "cones stack 4 pushed", "cones balls 8"])
+def test_mujoco_is_asked_the_very_problem(name):
+    """Its Newton method finds the reference to rounding: nothing of the problem is regularised away."""
+    pytest.importorskip("mujoco")
+    (instance,) = of_suite(CONES, [name])
+    row = judged(instance, "mujoco_newton")
+    assert row["claimed"] and row["error"] <= MUJOCO_ERROR
+
+
+def test_mujoco_is_not_asked_for_other_cones(small):
+    for name in SMALL[CONES]:
+        assert not any(suits(solver, small[name]) for solver in mujoco_.SOLVERS)
+        with pytest.raises(BackendError, match="impulses of contacts"):
+            measure(small[name], "mujoco_newton", FILE, "high")
+
+
+@pytest.mark.parametrize("solver", [name for name in casadi_.STAGEWISE if name in contestants(STAGES)])
+def test_solvers_of_stages_find_the_reference(solver):
+    """To what the tolerance leaves; Fatrop's bounds are loose by 1e-8."""
+    (instance,) = of_suite("mpc", ["mpc cart and pole 10"])
+    row = judged(instance, solver)
+    assert row["claimed"] and row["error"] <= STAGES_ERROR and row["dual_error"] <= 10.0 * STAGES_ERROR

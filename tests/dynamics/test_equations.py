@@ -41,7 +41,7 @@ def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
                 load[system.joints[closing].v] = 0.0
         acceleration = system.accelerations(state, load)
         found = system.inverse_dynamics(state.q, state.v, acceleration, t=state.t)
-        _, J, _ = system.loop_constraints(state.q, state.v, state.t)
+        _, J, _ = system.loop_constraints(state.q, state.v, t=state.t)
         multipliers = np.linalg.lstsq(J.T, found - load, rcond=1e-10)[0]
         assert np.abs(J.T @ multipliers - (found - load)).max() <= 1e-9 * max(1.0, np.abs(found).max())
 
@@ -51,7 +51,7 @@ def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
 def test_closing_rows_hold_along_the_motion(name):
     system = gauss.compile_scene(LOOPS[name]())
     for state, load in zip(*mechanisms.consistent_states(system), strict=True):
-        c, J, gamma = system.loop_constraints(state.q, state.v, state.t)
+        c, J, gamma = system.loop_constraints(state.q, state.v, t=state.t)
         acceleration = system.accelerations(state, load)
         size = np.abs(gamma).max() + np.abs(acceleration).max()
         assert np.abs(c).max() <= 1e-10

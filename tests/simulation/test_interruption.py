@@ -61,6 +61,9 @@ SIMULATED = {
     "implicit": (lambda: _scene("pendulum"), {"integrator": "radau5", "rtol": 1e-8}),
     "Python": (_called_law, {}),
     "certified": (lambda: _scene("double_pendulum"), {"backend": "recursion"}),
+    "SciPy": (lambda: _scene("double_pendulum"), {"integrator": "scipy_dop853", "rtol": 1e-8}),
+    "CVODE": (lambda: _scene("double_pendulum"), {"integrator": "cvode_adams", "rtol": 1e-8}),
+    "IDA": (lambda: _scene("double_pendulum"), {"integrator": "ida", "rtol": 1e-8}),
     "time stepping": (lambda: _scene("box_on_plane_4"), {"integrator": "time_stepping", "step": 1e-2}),
 }
 
@@ -81,6 +84,27 @@ def test_a_motion_is_kept_as_far_as_it_came(name):
     times = found.t[: min(len(found), 5)] - found.t[0]
     again = gauss.simulate(system, max(times[-1], 1e-9), times=times, progress=False, **short)
     np.testing.assert_allclose(again.q, found.q[: len(times)], atol=1e-6)  # it is the beginning of that motion
+
+
+@pytest.mark.parametrize("samples", [None, 11])
+@pytest.mark.parametrize("integrator", ["scipy_dop853", "cvode_adams", "dop853"])
+def test_an_interrupted_law_keeps_the_steps_before(integrator, samples):
+    scene, interrupted = gauss.load("pendulum"), True
+    joint = next(iter(scene.joints))
+
+    def law(t, motion):
+        if interrupted and float(t) > 0.1 and float(motion.rate(joint)) != 0.0:  # not where it is sampled, at the start
+            raise KeyboardInterrupt
+        return 0.1 * float(np.sin(float(t)))
+
+    scene.drive(joint, torque=law)
+    times = None if samples is None else np.linspace(0.0, 0.2, samples)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gauss.simulate(scene, 0.2, integrator=integrator, rtol=1e-4, atol=1e-4, times=times, progress=False)
+    found, interrupted = caught.value.trajectory, False
+    assert 0.0 < found.t[-1] < 0.2 and np.isfinite(found.q).all()
+    again = gauss.simulate(scene, 0.2, integrator=integrator, rtol=1e-4, atol=1e-4, times=found.t, progress=False)
+    np.testing.assert_allclose(again.q, found.q, atol=1e-2)  # a hundred times the tolerance
 
 
 @pytest.mark.slow

@@ -25,8 +25,11 @@ FUZZ_MOTIONS = Measurement(
 SCENE_TIME = 400.0  # [s] that a scene may take by the clock: four routes on a machine that others use
 RENEWED = 200  # scenes after which a new process begins, for machine code stays in memory
 
-HOW = """Every scene is moved by what users get (compiled, the integrator of the scene, an estimate of the global error)
-and by the certified recursion with a tenth of the tolerance, some by `rollout`, too. *Agree*: within a small multiple
+ENVIRONMENT = {"GAUSS_TIER": "quick", "GAUSS_CACHE": ""}  # every scene is moved once: nothing is optimised or kept on disk
+
+HOW = """Every scene is moved by machine code (the integrator of the scene, rtol 1e-7, an estimate of the global error)
+and by the certified recursion in numpy with a tenth of the tolerance, some by `rollout`, too. Phases between events are
+compiled at once; of every fourth scene above the compile threshold only, as users get it. *Agree*: within a small multiple
 of the claimed error and the tolerance. *Told*: apart, and a warning or the estimate says so. *Refused*: a `GaussError` by
 both, *refused once*: by one. *Sensitive*: a third route (dopri5, kkt) differs from both, too. Bad are: *silent*: apart, and
 nothing says so; *raised*: an exception that is no `GaussError`; *stray*: a warning that is none of gauss's; *timed out*: a
@@ -55,7 +58,7 @@ def fuzz_motions(
     """
     table = FUZZ_MOTIONS.table(folder, fresh)
     numbers = [number for number in range(first, first + count) if not table.has(seed=seed, number=number)]
-    with Worker() as worker:
+    with Worker(ENVIRONMENT) as worker:
         for done, number in enumerate(tqdm(numbers, unit="scene", disable=not progress, desc="bench fuzz-motions")):
             if done % RENEWED == RENEWED - 1:
                 worker.stop()

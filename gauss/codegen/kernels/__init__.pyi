@@ -6,7 +6,7 @@ from gauss.codegen.kernels.call_table import CallTable
 from gauss.codegen.kernels.checked_recursion import CorrectedRecursion, Correction
 from gauss.codegen.kernels.checked_switch import CheckedSwitch
 from gauss.codegen.kernels.column_pivoting import Pivots
-from gauss.codegen.kernels.compiled_loop import Loop
+from gauss.codegen.kernels.compiled_loop import Loop, address
 from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record, updated_energy_record
@@ -37,6 +37,7 @@ __all__ = [
     "Correction",
     "Due",
     "ENERGY_RECORD",
+    "address",
     "TaylorStep",
     "Fixed",
     "CheckedSwitch",

@@ -7,6 +7,7 @@ import numpy as np
 
 from gauss.codegen import Function, NativeFunction, Writer, machine
 from gauss.codegen.kernels.loop_control import Control, Numbers
+from gauss.codegen.tiers import EntryPoint
 
 FLOAT = np.dtype(float)
 BYTE = ctypes.c_char
@@ -54,6 +55,11 @@ class Loop:
             if array.dtype is not FLOAT or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
         self._run.call(ctypes.byref(control), *map(address, arrays), budget)
+
+    @property
+    def entry(self) -> EntryPoint:
+        """Machine code of the loop: (control, point, confirmed, grid, out, budget), all but the last by address."""
+        return self._run
 
     def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n_out,) of one of the functions for inputs (n_in,).

@@ -7,7 +7,7 @@ samples do not change the motion, and have the order of the method.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from gauss.codegen import INTEGER, Function, Writer
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import LoopStatus
@@ -21,6 +21,7 @@ class Due(IntEnum):
     STEP = 0  # step
     SAMPLE = 1  # step and write a sample
     OFF_GRID_SAMPLE = 2  # write the sample of a step, but continue from the point before
+    UNCHECKED = 3  # step, without a check where the call ends
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Fixed:
     ----------
     size, row : int
         Length of a point, and of a sample.
-    step : Function
+    step : Function or NativeFunction
         (point, h) → (point after, constraint residual, evaluations, factorisations, unsolved equations, switching surfaces
         passed undetected).
     project : Function or None
@@ -48,7 +49,7 @@ class Fixed:
 
     size: int
     row: int
-    step: Function
+    step: Function | NativeFunction
     project: Function | None
     check: Function
     evaluations: int
@@ -85,13 +86,15 @@ def _write(code: LoopCode, method: Fixed):
         i = b.add(i, INTEGER(1))
         kind = b.load(code.at(pair, 1))
         goes_on = b.fcmp_ordered("!=", kind, code.number(Due.OFF_GRID_SAMPLE))
-        due = b.and_(goes_on, b.or_(b.icmp_signed("==", i, code.budget), code.is_multiple("steps", "every")))
+        is_end = b.and_(b.icmp_signed("==", i, code.budget), b.fcmp_ordered("!=", kind, code.number(Due.UNCHECKED)))
+        due = b.and_(goes_on, b.or_(is_end, code.is_multiple("steps", "every")))
         b.store(code.number(0.0), error)
         with b.if_then(due):
             code.check(method.check, reached, error)
         code.set("status", LoopStatus.UNCONFIRMED)
         leave_if(b.fcmp_unordered(">", b.load(error), code.get("acceleration_tolerance")))
-        with b.if_then(b.fcmp_ordered("!=", kind, code.number(Due.STEP))):
+        is_sample = b.or_(*(b.fcmp_ordered("==", kind, code.number(due)) for due in (Due.SAMPLE, Due.OFF_GRID_SAMPLE)))
+        with b.if_then(is_sample):
             code.copy(code.row(method.row), reached, method.row)
             code.add("rows")
         with b.if_then(goes_on):

@@ -31,8 +31,10 @@ class BatchSpan(Numbers):
         Number of steps before and after the call. Before step 0 the rates of the points are computed.
     h : float
         Length of a step [s].
-    keep, every : float
-        Steps between samples, and between checks of the accelerations.
+    keep, every, hold : float
+        Steps between samples, between checks of the accelerations, and between changes of the inputs.
+    motions, changes : float
+        Number of motions with inputs, and of rows of inputs of each.
     """
 
     columns: float
@@ -44,6 +46,9 @@ class BatchSpan(Numbers):
     h: float = 0.0
     keep: float = 1.0
     every: float = 1.0
+    hold: float = 1.0
+    motions: float = 0.0
+    changes: float = 0.0
 
 
 class FixedStepBatchLoop(BatchLoop):
@@ -57,15 +62,18 @@ class FixedStepBatchLoop(BatchLoop):
         Initial point → (point with its rates, constraint residual, energy sample).
     written : slice
         Part of a point that is a sample.
+    inputs : int
+        Number of inputs, the last entries of a point: each motion has a row of them for every ``hold`` steps.
     """
 
-    def __init__(self, method: Fixed, start: Function, written: slice):
-        self.size, self.evaluations, self.written = method.size, method.evaluations, written
-        writer = Writer()
-        _write(LoopCode(writer, "fixed_step_batch", POINTERS, BatchSpan, machine.width()), method, start, written)
-        super().__init__(writer, "fixed_step_batch", BatchSpan, len(POINTERS) - 1)
+    def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0):
+        self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
+        writer, pointers = Writer(), (*POINTERS, *(["inputs"] if inputs else []))
+        code = LoopCode(writer, "fixed_step_batch", pointers, BatchSpan, machine.width())
+        _write(code, method, start, written, inputs)
+        super().__init__(writer, "fixed_step_batch", BatchSpan, len(pointers) - 1)
 
-    def __call__(self, span: BatchSpan, points, worst, out):
+    def __call__(self, span: BatchSpan, points, worst, out, *inputs):
         """Make steps of a range of motions; releases Python's global lock.
 
         Parameters
@@ -79,11 +87,13 @@ class FixedStepBatchLoop(BatchLoop):
             changed.
         out : ndarray, shape (columns, rows, row)
             Sample k of each motion is that after ``k * keep`` steps.
+        inputs : ndarray, shape (motions, changes, n_u)
+            Inputs of each motion, of a loop that has some; those of the last one serve the columns beyond.
         """
-        self._run.call(span, points, worst, out, 0)
+        self._run.call(span, points, worst, out, *inputs, 0)
 
 
-def _write(code: LoopCode, method: Fixed, start: Function, written: slice):
+def _write(code: LoopCode, method: Fixed, start: Function, written: slice, inputs: int):
     b, size = code.b, method.size
     given, reached = code.buffer(size + 1), code.buffer(max(len(method.step.outputs), len(start.outputs)))
     error, worst = code.buffer(len(method.check.outputs)), code.buffer(len(WORST_RECORD))
@@ -105,6 +115,8 @@ def _write(code: LoopCode, method: Fixed, start: Function, written: slice):
         with code.loop() as leave_if:
             done = b.load(step)
             leave_if(b.icmp_signed(">=", done, last))
+            if inputs:
+                _take_inputs(code, code.at(given, size - inputs), inputs, column, b.sdiv(done, code.index("hold")))
             done = b.add(done, INTEGER(1))
             b.store(done, step)
             code.call(method.step, given, reached)
@@ -125,6 +137,18 @@ def _write(code: LoopCode, method: Fixed, start: Function, written: slice):
         _scatter(code, worsts, worst, columns, len(WORST_RECORD))
         b.store(b.add(column, INTEGER(code.width)), motion)
     code.finish()
+
+
+def _take_inputs(code: LoopCode, room, count: int, column, row):
+    """Load a row of inputs of each motion to a buffer."""
+    b, last = code.b, code.b.sub(code.index("motions"), INTEGER(1))
+    with code.each(code.width) as k:
+        motion = b.add(column, k)
+        motion = b.select(b.icmp_signed("<", motion, last), motion, last)
+        place = b.mul(b.add(b.mul(motion, code.index("changes")), row), INTEGER(count))
+        source, target = b.gep(code.pointer["inputs"], [place]), b.gep(room, [k])
+        for j in range(count):
+            b.store(b.load(b.gep(source, [INTEGER(j)])), code.at(target, j))
 
 
 def _gather(code: LoopCode, room, source, columns, size: int):

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, NativeFunction, Writer, copy, endless_loop
+from gauss.codegen import DOUBLE, INTEGER, LINE, Buffers, Function, Lanes, NativeFunction, Writer, copy, endless_loop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, update
 from gauss.codegen.kernels.loop_control import Control, Numbers
 from gauss.codegen.text_builder import TextBuilder
@@ -38,19 +38,17 @@ class LoopCode:
         self.budget = self.function.args[-1]
         self.kind = DOUBLE
         self.b = TextBuilder(self.function.append_basic_block("entry"))
-        self.lanes = Lanes(writer.module, width, self.b)
+        self.lanes, self.buffers = Lanes(writer.module, width, self.b), Buffers(self.b)
 
     def number(self, value: float) -> ir.Constant:
         """Return a constant."""
         return ir.Constant(DOUBLE, float(value))
 
     def buffer(self, size: int, aligned: bool = False):
-        """Buffer on the stack, allocated in the entry block."""
+        """Buffer, allocated in the entry block."""
+        room = self.buffers.room(self.lanes.kind, size, LINE if aligned else None)
         with self.b.goto_entry_block():
-            room = self.b.alloca(self.lanes.kind, max(size, 1))
-            room.align = LINE if aligned else room.align
-            room = self.b.bitcast(room, DOUBLE.as_pointer())
-        return room
+            return self.b.bitcast(room, DOUBLE.as_pointer())
 
     def counter(self, start):
         """Integer variable on the stack."""
@@ -155,4 +153,5 @@ class LoopCode:
 
     def finish(self):
         """End the function."""
+        self.buffers.free()
         self.b.ret_void()

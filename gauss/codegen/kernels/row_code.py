@@ -15,6 +15,7 @@ from gauss.codegen import (
     DOUBLE,
     INTEGER,
     LINE,
+    Buffers,
     Function,
     Lanes,
     NativeFunction,
@@ -50,14 +51,11 @@ class RowCode:
         self.writer, self.function, self.width = writer, function, width
         self.given, _, self.found, _ = self.function.args
         self.b = TextBuilder(self.function.append_basic_block("entry"))
-        self.motions = Lanes(writer.module, width, self.b)
+        self.motions, self.buffers = Lanes(writer.module, width, self.b), Buffers(self.b, width)
 
     def room(self, size: int):
         """Buffer of ``size`` numbers."""
-        with self.b.goto_entry_block():
-            room = self.b.alloca(DOUBLE, max(size * self.width, 1))
-        room.align = LINE
-        return room
+        return self.buffers.room(DOUBLE, size * self.width, LINE)
 
     def at(self, pointer, offset):
         """Pointer to an entry."""
@@ -126,6 +124,7 @@ class RowCode:
 
     def done(self) -> ir.Function:
         """End the function."""
+        self.buffers.free()
         self.b.ret_void()
         return self.function
 
@@ -148,6 +147,7 @@ class RowFunction(NativeFunction):
     n_in: int
     n_out: int
     emit: Callable[[RowCode], None]
+    parameters = ()  # see :class:`gauss.codegen.Function`
 
     @property
     def arity(self) -> tuple[int, int]:

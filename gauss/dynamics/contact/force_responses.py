@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from gauss.backends import Backend
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.engines.certified import CertifiedEngine
-from gauss.dynamics.engines.compiled import CompiledEngine
+from gauss.dynamics.engines.compiled import CompiledEngine, StateKernels
 from gauss.dynamics.engines.engine import DistrustError
 from gauss.dynamics.engines.tree_recursion import tree_recursion_kernels
 from gauss.dynamics.kinematics import kinematics
@@ -39,8 +40,9 @@ class ForceResponses:
         Engine.
     """
 
-    def __init__(self, system: System, backend: str = "auto"):
-        self.system, self.solver = system, CertifiedEngine(backend)
+    def __init__(self, system: System, backend: str | Backend | type = "auto"):
+        self.system = system
+        self.solver: CompiledEngine | CertifiedEngine = CertifiedEngine(backend)
         laws = Laws(system)
         plan = RESPONSES.plan(Question(system, laws, backend))
         if plan.dynamics == "tree recursion":
@@ -51,7 +53,13 @@ class ForceResponses:
     @property
     def compiled(self) -> bool:
         """Whether machine code is in use."""
-        return isinstance(self.solver, CompiledEngine) and self.solver.handed_over is None
+        return self.kernels is not None
+
+    @property
+    def kernels(self) -> StateKernels | None:
+        """Machine code in use; None where there is none, or it failed a check."""
+        engine = self.solver
+        return engine.kernels if isinstance(engine, CompiledEngine) and engine.handed_over is None else None
 
     def free(self, state: State, last: bool = False) -> Rates:
         """Accelerations and powers without further forces."""
@@ -66,12 +74,13 @@ class ForceResponses:
         """Accelerations (k, n_v) that generalised forces (k, n_v) add, each by itself."""
         if not len(forces):
             return np.zeros((0, self.system.n_v))
-        if self.compiled:
+        kernels = self.kernels
+        if kernels is not None:
             where, size = np.concatenate([[state.t], state.q, state.v]), self._test_factors(state, forces)
             inputs = np.zeros((where.size + self.system.n_v, len(forces) + 1))
             inputs[: where.size] = where[:, None]
             inputs[where.size :, 1:] = size * forces.T
-            found = self.solver.kernels.forward(inputs)[: self.system.n_v]
+            found = kernels.forward(inputs)[: self.system.n_v]
             return ((found[:, 1:] - found[:, :1]) / size).T
         motion = kinematics(self.system, state)
         problem = assemble_motion(motion, Applied(motion))

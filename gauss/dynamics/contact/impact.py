@@ -67,7 +67,7 @@ def impact(
     state: State,
     touching: np.ndarray,
     restitution: np.ndarray,
-    backend: str = "auto",
+    backend: str | Backend | type = "auto",
     since: float | None = None,
     driven: Sequence[str] = (),
 ) -> Impact:

@@ -130,7 +130,7 @@ class ModeSelector:
         """System of a mode without unilateral constraints, and its links with losses."""
         if mode not in self.cases:
             smooth = not (self.names or self.losses or self.backlashes)
-            system = self.system if smooth else build(phase_scene(self.system.scene, (), mode), self.system.dynamics.anew())
+            system = self.system if smooth else build(phase_scene(self.system.scene, (), mode), self.system.mechanics.anew())
             self.cases[mode] = system, non_ideal_rows(system, self.system, mode)
         return self.cases[mode]
 
@@ -151,7 +151,7 @@ class ModeSelector:
         motion, found = Kinematics(self.system, state), {}
         for name, play in self.backlashes.items():
             touch = {side: float(play.touch(*play.ends(motion), side)) for side in (-1, 1)}
-            best = max(touch, key=touch.get)
+            best = max(touch, key=touch.__getitem__)
             found[name] = best if touch[best] > 0.0 else 0
         return found
 
@@ -244,9 +244,10 @@ class ModeSelector:
             try:
                 found = self._consistent(at, mode)
             except SimulationError as error:
-                found = self._slipping(at, mode, rests & np.array(free, dtype=bool), J, D)
-                if found is None:
+                slipping = self._slipping(at, mode, rests & np.array(free, dtype=bool), J, D)
+                if slipping is None:
                     raise error
+                found = slipping
             signs = np.array([found.mode.set_valued[name] for name in self.names], dtype=int)
             force = np.array([found.forces[name] for name in self.names])
             over = self.beyond(signs, force, at.state.t)
@@ -318,7 +319,8 @@ class ModeSelector:
     def _trial(self, at: ModeProblem, mode: ContactMode) -> ModeTrial:
         system, links = self.case(mode)
         motion, extra, what = kinematics(system, at.state), links.W - links.R, f"what holds at t = {at.state.t:.6g} s"
-        applied, found = Applied(motion), None
+        applied = Applied(motion)
+        found: Solution
         if links.names and not at.touching.size:
             problem = assemble_motion(motion, applied, at.load)
             Q, found = with_losses(problem, links, lambda problem: certified(problem, at.backend, what))
@@ -379,13 +381,16 @@ def has_joint_modes(system: System) -> bool:
 
 def forces_of(whole: System, system: System, mode: ContactMode, state: State, solution: Solution | None) -> dict[str, float]:
     """Forces of all set-valued elements and links with losses: multipliers if they stick, laws if they slip."""
+    multipliers = np.zeros(0) if solution is None else solution.multipliers
     rows = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     motion, found = Kinematics(whole, state), {}
     for name, link in (whole.scene.losses | whole.scene.set_valued).items():
         sign = mode.set_valued.get(name, 0)
-        law = as_function(link.effort(sign)) if sign else None
-        force = evaluated(law, (state.t, motion), link.what, 1)[0] if sign else 0.0
-        found[name] = float(force) if sign else float(-solution.multipliers[rows[name]])
+        if sign:
+            effort = as_function(whole.scene.set_valued[name].effort(sign))
+            found[name] = float(evaluated(effort, (state.t, motion), link.what, 1)[0])
+        else:
+            found[name] = float(-multipliers[rows[name]])
     return found
 
 

@@ -9,11 +9,12 @@ Friction and set-valued elements act on the rates after the step. The forces f s
 """
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from gauss import math
+from gauss.backends import Backend
 from gauss.codegen import Expression, Scalar, write
 from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
@@ -35,7 +36,7 @@ from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
-from gauss.scene import Box, Contact, Scene
+from gauss.scene import Box, Contact, JointDryFriction, Scene
 from gauss.system import State, System, guards, retract, sides
 from gauss.system.build import slips
 
@@ -81,16 +82,17 @@ class MoreauStepper:
     ----------
     system : System
         With unilateral constraints, friction or set-valued elements.
-    backend : str
+    backend : str, Backend or class
         Backend of the free accelerations.
     """
 
-    def __init__(self, system: System, backend: str = "auto"):
+    def __init__(self, system: System, backend: str | Backend | type = "auto"):
         scene = system.scene
         self.system, self.smooth = system, smooth_system(system)
         self.backend, self.kernel = backend, ContactTermsKernel(system)
         self.unit, self.deep = system.scale.time / contact_scales(system), START_OVERLAP * system.scale.time
-        gaps, rough, set_valued = sides(scene), slips(scene), list(scene.set_valued.values())
+        gaps, rough = sides(scene), slips(scene)
+        set_valued = cast(list[JointDryFriction], [*scene.set_valued.values()])  # others are refused
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
         self.owners = [side.whole.name for side in gaps]
@@ -366,7 +368,10 @@ def shortest_edge(scene: Scene, contact: Contact) -> float:
 def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
     """Laws of some rows, in ascending order."""
     kept = np.isin(laws.under, rows)
-    place = lambda which: np.searchsorted(rows, which)  # noqa: E731
+
+    def place(which: np.ndarray) -> np.ndarray:
+        return np.searchsorted(rows, which)
+
     return ContactLaws(
         normal=place(laws.normal[np.isin(laws.normal, rows)]),
         across=place(laws.across[kept]),
@@ -377,7 +382,7 @@ def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
     )
 
 
-def moreau_stepper(system: System, backend: str = "auto") -> MoreauStepper:
+def moreau_stepper(system: System, backend: str | Backend | type = "auto") -> MoreauStepper:
     """Stepper of a system, cached."""
     key = backend if isinstance(backend, str) else id(backend)  # kept alive by the stepper
     return cached(system, (MoreauStepper, key), lambda: MoreauStepper(system, backend))

@@ -136,7 +136,8 @@ class CallGraphKernels:
 
     def _run(self, section: str) -> tuple[np.ndarray, np.ndarray]:
         self._memory.run(section)
-        return tuple(vector.read(self._memory) for vector in self._found[section])
+        along, across = self._found[section]
+        return along.read(self._memory), across.read(self._memory)
 
     def _feedback(self, v):
         """Baumgarte feedback: targets of the scaled rows, and accelerations along loop joints (n_v,)."""

@@ -34,6 +34,8 @@ class CertifiedEngine(Engine):
         Baumgarte gains α and β [1/s] of the feedback −2α ċ − β² c.
     """
 
+    evaluations, rescued = 0, 0
+
     def __init__(self, backend: str | Backend | type = "auto", gains: tuple[float, float] | None = None):
         self.gains = gains
         self.backend = "auto" if isinstance(backend, str) and backend == "auto" else ready(backend)

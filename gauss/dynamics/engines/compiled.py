@@ -1,24 +1,41 @@
 """Compiled forward dynamics called from Python: with opaque callbacks, and for systems too large for a compiled step."""
 
+from collections.abc import Callable
+from typing import Protocol
+
 import numpy as np
 
-from gauss.codegen import Kernel
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE, project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.load_forces import LoadForces
-from gauss.dynamics.traced_system import Kernels
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
 
-def projected(system: System, kernel: Kernel, state: State) -> State:
-    """State projected onto the constraints by machine code, see :class:`Kernels`; by numpy where a residual is left."""
+def projected(system: System, kernel: Callable[[np.ndarray], np.ndarray], state: State) -> State:
+    """State projected onto the constraints by machine code, see :class:`StateKernels`; by numpy where a residual is left."""
     found, n_q = kernel(np.concatenate([[state.t], state.q, state.v])), system.n_q
     if found[-1] <= RESIDUAL_TOLERANCE:
         return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
     return project(system, state)
+
+
+class StateKernels(Protocol):
+    """Functions of single states in machine code, as those of :class:`gauss.dynamics.traced_system.Kernels`."""
+
+    @property
+    def forward(self) -> Callable[[np.ndarray], np.ndarray]:
+        """(t, q, v, generalised forces added) → (q̈, power of the loads)."""
+
+    @property
+    def check(self) -> Callable[[np.ndarray], np.ndarray]:
+        """(point, generalised forces added) → error of its accelerations, …."""
+
+    @property
+    def project(self) -> Callable[[np.ndarray], np.ndarray] | None:
+        """(t, q, v) → (q and v on the constraints, …, position residual); None where nothing is projected."""
 
 
 class CompiledEngine(Engine):
@@ -28,7 +45,7 @@ class CompiledEngine(Engine):
     ----------
     system : System
         A smooth system (see :func:`gauss.dynamics.conditions.obstacles`).
-    kernels : Kernels
+    kernels : StateKernels
         Its machine code.
     loads : LoadForces, optional
         Loads beside the machine code; none when not given.
@@ -38,7 +55,9 @@ class CompiledEngine(Engine):
         Baumgarte gains of the certified engine; those of the machine code are compiled in.
     """
 
-    def __init__(self, system: System, kernels: Kernels, loads: LoadForces | None = None, slow=(), gains=None):
+    evaluations = 0
+
+    def __init__(self, system: System, kernels: StateKernels, loads: LoadForces | None = None, slow=(), gains=None):
         self.system, self.kernels, self.slow = system, kernels, slow
         self.loads = LoadForces(system) if loads is None else loads
         self.certified = CertifiedEngine("auto", gains)

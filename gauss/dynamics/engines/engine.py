@@ -16,17 +16,21 @@ class Engine(ABC):
 
     Attributes
     ----------
-    evaluations : int
-        Number of accelerations computed.
-    rescued : int
-        Solutions that another backend found.
     handed_over : float or None
         Time from which the certified engine is in use [s]; None while this one is.
     """
 
-    evaluations: int = 0
-    rescued: int = 0
     handed_over: float | None = None
+
+    @property
+    @abstractmethod
+    def evaluations(self) -> int:
+        """Number of accelerations computed."""
+
+    @property
+    @abstractmethod
+    def rescued(self) -> int:
+        """Solutions that another backend found."""
 
     @property
     @abstractmethod

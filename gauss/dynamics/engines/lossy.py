@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends import Backend
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
@@ -141,15 +142,16 @@ class LossyEngine(Engine):
         The same without the rows of the links with losses.
     links : NonIdealRows
         These links.
-    backend : str
+    backend : str, Backend or class
         How accelerations are solved.
     may_compile : bool
         Whether the phase may be compiled.
     """
 
-    def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str, may_compile: bool):
+    def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str | Backend | type, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
-        self.certified, self.compiled, self.counted = CertifiedEngine(backend), None, 0
+        self.certified, self.counted = CertifiedEngine(backend), 0
+        self.compiled: CompiledEngine | None = None
         self.Q = np.zeros(len(links.names))  # initial guess
 
     @property
@@ -176,7 +178,7 @@ class LossyEngine(Engine):
         """Accelerations, and the power of the loads; losses of the links count as dissipation."""
         if self.compiled is None and self.may_compile:
             self._compile()
-        found = self._solved(state)[0] if self.compiled is None else self._compiled(state)
+        found = self._solved(state)[0] if self.compiled is None else self._compiled(self.compiled, state)
         lost = self.Q @ (self.links.W @ state.v)
         return Rates(found.acceleration, found.power - np.array([0.0, 0.0, lost]))
 
@@ -199,12 +201,12 @@ class LossyEngine(Engine):
         driven = driven - solution.multipliers @ solution.compulsion.C
         return Rates(solution.qdd, np.array([driven, loaded, dissipated])), solution
 
-    def _compiled(self, state: State) -> Rates:
-        found = None
+    def _compiled(self, engine: CompiledEngine, state: State) -> Rates:
+        found: Rates
 
         def residual(Q):
             nonlocal found
-            found = self.compiled.rates(self.cut, state, Q @ self.links.W)
+            found = engine.rates(self.cut, state, Q @ self.links.W)
             return self.links.R @ found.acceleration
 
         self.Q = piecewise_affine_root(residual, self.Q, self.links.units)
@@ -221,5 +223,5 @@ class LossyEngine(Engine):
     def check(self, point: Point, last: bool = False):
         """Check compiled accelerations with the forces of the links as loads."""
         if self.compiled is not None:
-            self._compiled(point.state)
+            self._compiled(self.compiled, point.state)
             self.compiled.check(point, last, self.Q @ self.links.W)

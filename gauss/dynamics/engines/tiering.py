@@ -4,7 +4,9 @@ So a motion takes at most twice as long as with the better of both. The time to 
 which is known once the equations are traced; tracing costs little. Thresholds are numbers of evaluations.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from threading import Lock
 
 from gauss.dynamics.laws.traced_laws import Laws
@@ -17,6 +19,21 @@ COMPILE_THRESHOLD = 500  # certified evaluations that take as long as compiling 
 CONTACT_THRESHOLD = 100  # quadratic programmes that take as long as compiling the active set of a few contacts
 LEAST_THRESHOLD = 25  # evaluations by numpy that take as long as the machine code of a few operations
 PER_OPERATION = 0.25  # further ones for each operation of an evaluation: 0.4 ms of compiling, of 1.6 ms by numpy
+
+_at_once: ContextVar[bool] = ContextVar("compiled at once", default=False)
+
+
+@contextmanager
+def compiled_at_once() -> Iterator[None]:
+    """Within this context phases and active sets are compiled before their first evaluation, however short the motion is.
+
+    So short motions test machine code; the thresholds only save time.
+    """
+    token = _at_once.set(True)
+    try:
+        yield
+    finally:
+        _at_once.reset(token)
 
 
 class CompileThreshold:
@@ -34,7 +51,7 @@ class CompileThreshold:
     def passed(self) -> bool:
         """Count one evaluation; whether it is beyond the threshold."""
         self.left -= 1
-        return self.left < 0
+        return self.left < 0 or _at_once.get()
 
 
 class TieredFunction:
@@ -93,11 +110,12 @@ class Tiered:
         self.spent += spent
         if laws.key in self.made:
             return self.made[laws.key]
-        if laws.called or self.spent < LEAST_THRESHOLD:
+        at_once = _at_once.get()
+        if laws.called or (self.spent < LEAST_THRESHOLD and not at_once):
             return None
         program = self.programs.setdefault(laws.key, Program(self.system, laws, Drift()))
         operations = cached_on_disk(self.system, (Tiered, laws.key), lambda: sum(program.rates.operations().values()))
-        if self.spent < LEAST_THRESHOLD + PER_OPERATION * operations:
+        if self.spent < LEAST_THRESHOLD + PER_OPERATION * operations and not at_once:
             return None
         return self.made.setdefault(laws.key, program.cached_kernels)
 

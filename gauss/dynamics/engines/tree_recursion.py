@@ -3,14 +3,13 @@
 import numpy as np
 
 from gauss.codegen import Kernel, write
-from gauss.codegen.kernels import CorrectedRecursion, Correction
-from gauss.dynamics.error_scale import acceleration_scale
+from gauss.codegen.kernels import CorrectedRecursion
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.load_forces import generalised_forces
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import off_unit
-from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
+from gauss.dynamics.tree_program import tree_correction
 from gauss.system import State, System
 
 
@@ -26,7 +25,7 @@ class TreeRecursionKernels:
     project = None  # a tree has no loop constraints
 
     def __init__(self, system: System):
-        self.system, correction = system, _correction(system)
+        self.system, correction = system, tree_correction(system)
         self.ground = correction.ground
         self._forward, self._correction = Kernel(correction.forward, batch=False), Kernel(correction, batch=False)
 
@@ -55,14 +54,4 @@ def corrected_recursion(system: System, loads) -> CorrectedRecursion:
         motion = Kinematics(system, State(t[0], q, v))
         return generalised_forces(motion, Applied(motion, loads)), [off_unit(system, q)]
 
-    return CorrectedRecursion(_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
-
-
-def _correction(system: System) -> Correction:
-    ground = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
-    return Correction(
-        forward_tree_recursion(system),
-        inverse_tree_recursion(system),
-        ground,
-        acceleration_scale(system) * float(system.scale.coordinates.min()),
-    )
+    return CorrectedRecursion(tree_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))

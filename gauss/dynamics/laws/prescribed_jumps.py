@@ -58,7 +58,7 @@ class Jumps:
         SimulationError
             If a prescribed position jumps.
         """
-        if not self.within(state.t, after):
+        if self.system is None or not self.within(state.t, after):
             return ()
         motion = kinematics(self.system, state)
         found = _Sides(motion, state.t, after, self.sizes)
@@ -74,14 +74,14 @@ class Jumps:
             If a prescribed position jumps, the velocity constraints are inconsistent, or a contact with friction bears an
             impulse.
         """
-        names = self.names(state, after)
-        if not names:
+        names, system = self.names(state, after), self.system
+        if system is None or not names:
             return None
-        later, parts = State(after, state.q, state.v), sides(self.system.scene)
-        touching = np.flatnonzero(gaps(kinematics(self.system, later)).width <= TOUCHING * gap_scales(self.system))
+        later, parts = State(after, state.q, state.v), sides(system.scene)
+        touching = np.flatnonzero(gaps(kinematics(system, later)).width <= TOUCHING * gap_scales(system))
         restitution = np.array([side.whole.restitution for side in parts])
-        found = impact(self.system, later, touching, restitution, since=state.t, driven=names)
-        rough = {slip.name for slip in self.system.slips.placed}
+        found = impact(system, later, touching, restitution, since=state.t, driven=names)
+        rough = {slip.name for slip in system.slips.placed}
         words = ", ".join(map(repr, names))
         frictional = [parts[gap].whole.name for gap in found.active if parts[gap].name in rough]
         if frictional:

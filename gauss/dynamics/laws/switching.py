@@ -69,7 +69,7 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     """
     begin, monotone = start.t, bool(system.scene.nonsmooth)  # release of contacts is checked at few times of a step
     times = _given_times(system, breaks, begin, end)
-    if laws.outputs:
+    if laws.motion is not None and laws.outputs:
         times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
     prescribed = prescribed_times(system.relations, begin, end, monotone)
     unilateral = [prescribed_times(found, begin, end, monotone) for found in (system.contacts, system.set_valued)]

@@ -115,7 +115,8 @@ class SwitchingFunctions:
         slopes = self._slopes(asked)
         sides, jumps = list(chain(*self.pairs)), list(chain(*self.jumps))
         ends = [self._at(asked, node) for node in nodes]
-        crossings, crossed, hidden = 0.0, 1.0, 1.0
+        crossings, crossed = 0.0, 1.0
+        hidden: Scalar = 1.0
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
         counts = len(asked), len(slopes), len(sides), len(jumps)
         enclosed = [_divided(enclose([*asked, *slopes, *sides, *jumps], part), *counts) for part in parts]
@@ -240,7 +241,7 @@ def _compared(nodes: list[Expression]) -> list:
     return list(dict.fromkeys(node.operands for node in nodes if node.op != "floor"))
 
 
-def _names(laws: Laws, nodes: set[int]) -> tuple[str, ...]:
+def _names(laws: TracedFunctions, nodes: set[int]) -> tuple[str, ...]:
     """Loads whose laws depend on some nodes."""
     has = lambda function: any(node.index in nodes for node in reachable(function.outputs))  # noqa: E731
     return tuple(dict.fromkeys(name for name, function in laws.functions if has(function)))
@@ -279,9 +280,9 @@ def _changes(value: Interval, before: Scalar, after: Scalar, noise: Scalar | Non
     Without ``noise``, the round-off of a sign, every whole number is one.
     """
     if noise is None:
-        level = np.floor(before)
-        return math.minimum(np.abs(np.floor(after) - level), 2.0), math.where(
-            np.floor(value.low) < np.floor(value.high), 1.0, 0.0
+        level = math.floor(before)
+        return math.minimum(math.abs(math.floor(after) - level), 2.0), math.where(
+            math.floor(value.low) < math.floor(value.high), 1.0, 0.0
         )
     changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
     return changes, math.where(value.low < -noise, math.where(value.high > noise, 1.0, 0.0), 0.0)

@@ -155,8 +155,10 @@ def _degrees(nodes, clock: Expression) -> dict[int, float]:
 
 def _condition(node: Expression) -> Expression:
     """Expression that is constant as long as a node does not switch."""
-    x, y = node.operands if len(node.operands) == 2 else (None, None)
-    return x < y if node.op == "min" else y < x if node.op == "max" else node  # as in the derivatives of min and max
+    if node.op not in ("min", "max"):
+        return node
+    x, y = node.operands
+    return x < y if node.op == "min" else y < x  # as in the derivatives of min and max
 
 
 def _changes(conditions, clock: Expression, begin: float, end: float, limitations: list[str]) -> np.ndarray:
@@ -193,14 +195,14 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, limitations: 
     Conditions are constant between two edges.
     """
     values = enclose(conditions, {clock.index: Interval.point(0.5 * (edges[:-1] + edges[1:]))})
-    values = [np.broadcast_to(value.low, edges[:-1].shape) for value in values]
+    fixed = [np.broadcast_to(value.low, edges[:-1].shape) for value in values]
     slopes, finest = _slopes(nodes, clock), FINEST * (edges[-1] - edges[0])
     margin = 4.0 * CLOSE * np.abs(edges).max()
     cells = np.array([edges[:-1] + margin, edges[1:] - margin])
 
     def examined(cells):
         piece = np.searchsorted(edges, cells.mean(axis=0)) - 1
-        given = {condition.index: Interval.point(value[piece]) for condition, value in zip(conditions, values, strict=True)}
+        given = {condition.index: Interval.point(value[piece]) for condition, value in zip(conditions, fixed, strict=True)}
         return _examined(nodes, slopes, clock, cells, given)
 
     seen = examined(cells)

@@ -37,9 +37,9 @@ class FixedStepBatch:
         if parameters is not None:
             self.points[loop.size - len(parameters) :] = self._filled(parameters)
         self.worst = np.zeros((len(WORST_RECORD), self.columns))
-        loop(
-            BatchSpan(columns=self.columns, rows=0, begin=0, end=self.columns), self.points, self.worst, np.zeros((0, 0, 0))
-        )
+        none = np.zeros((0, 0, 0))
+        span = BatchSpan(columns=self.columns, rows=0, begin=0, end=self.columns)
+        loop(span, self.points, self.worst, none, *([none] if loop.inputs else []))
 
     def _filled(self, columns: np.ndarray) -> np.ndarray:
         return np.pad(columns, ((0, 0), (0, -self.size % self.loop.width)), mode="edge")
@@ -69,8 +69,15 @@ class FixedStepBatch:
         """States (n_q + n_v, batch) so far."""
         return self.points[self.loop.written, : self.size]
 
-    def run(self, steps: int, h: float, keep: int, threads: int) -> np.ndarray:
-        """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps of length h [s]."""
+    def run(self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None) -> np.ndarray:
+        """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps of length h [s].
+
+        Rows of ``control`` (batch, rows, n_u) are held for equally many steps.
+        """
+        given, held = [], {}
+        if control is not None:
+            given, (motions, changes, _) = [control], control.shape
+            held = {"hold": steps // changes, "motions": motions, "changes": changes}
         rows = np.empty((self.columns, steps // keep + 1, self.loop.written.stop - self.loop.written.start))
         rows[:, 0] = self.points[self.loop.written].T
         strips = self.columns // self.loop.width
@@ -83,8 +90,8 @@ class FixedStepBatch:
                 if stopped.is_set():
                     return
                 part = {"begin": begin, "end": end, "first": first, "last": min(first + BUDGET, steps)}
-                span = BatchSpan(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **part)
-                self.loop(span, self.points, self.worst, rows)
+                span = BatchSpan(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **held, **part)
+                self.loop(span, self.points, self.worst, rows, *given)
 
         in_threads(work, range(0, self.columns, share), threads, stopped)
         return rows[: self.size]

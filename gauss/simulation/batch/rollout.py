@@ -18,7 +18,7 @@ from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
-from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep, Integrator
+from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep
 from gauss.shapes import Shaped
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
@@ -57,6 +57,8 @@ class Rollout:
         jump.
     steps, rejected : ndarray, shape (batch,)
         Accepted and rejected steps of each motion.
+    diverged : tuple of int
+        Motions under ``control`` that diverged: their samples are not finite from some time on.
     """
 
     system: System
@@ -66,6 +68,7 @@ class Rollout:
     repeated: tuple[int, ...]
     steps: Shaped[np.ndarray, " batch"]
     rejected: Shaped[np.ndarray, " batch"]
+    diverged: tuple[int, ...] = ()
 
 
 @named_arguments
@@ -82,6 +85,7 @@ def rollout(
     rtol: float = 1e-12,
     atol: float | tuple[float, float] | dict | None = None,
     threads: int | None = 1,
+    control=None,
 ) -> Rollout:
     """Simulate a batch of initial states.
 
@@ -110,6 +114,9 @@ def rollout(
         Local error of adaptive steps; see :func:`gauss.simulate`.
     threads : int or None
         Number of threads; None: one for each core. The results do not depend on it.
+    control : array_like, shape (batch, k, n_u), optional
+        Values of the inputs of the scene [N m, N] for each motion, with fixed steps: k rows, each held for ``steps`` / k
+        steps and cut off at the limits of the inputs. They are zero when not given.
 
     Returns
     -------
@@ -125,7 +132,8 @@ def rollout(
     Raises
     ------
     SimulationError
-        If the system cannot be compiled, with the reasons, or a motion diverges.
+        If the system cannot be compiled, with the reasons, or a motion without ``control`` diverges; with it, motions that
+        diverge are marked in the result, and the others are not affected.
     StateError
         If the initial states have wrong shapes, or violate the constraints.
     """
@@ -134,13 +142,15 @@ def rollout(
     _check_counts({"threads": threads})
     if integrator in ADAPTIVE:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
+        _refuse(integrator, "takes no control=: its steps are not those of the samples; use 'rk4'", control=control)
         with one_tier(_tier(q0, ADAPTIVE_STEPS)):
             return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores())
     if integrator not in FIXED:
         raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, FIXED | ADAPTIVE)}")
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
     with one_tier(_tier(q0, steps)):
-        return _fixed(system, q0, v0, FIXED[integrator], steps, step, 1 if every is None else every, threads or cores())
+        keep = 1 if every is None else every
+        return _fixed(system, q0, v0, FIXED[integrator], steps, step, keep, threads or cores(), control)
 
 
 def _tier(q0, steps) -> str:
@@ -150,7 +160,7 @@ def _tier(q0, steps) -> str:
 
 
 def _fixed(
-    system: System, q0, v0, method: FixedStep, steps: int | None, step: float | None, every: int, threads: int
+    system: System, q0, v0, method: FixedStep, steps: int | None, step: float | None, every: int, threads: int, control
 ) -> Rollout:
     """Batch with fixed steps."""
     if step is None or not np.isfinite(step) or step <= 0:
@@ -159,29 +169,55 @@ def _fixed(
         raise SimulationError("steps: expected a positive whole number, got None.")
     _check_counts({"steps": steps, "every": every})
     starts = columns(system, q0, v0)
+    control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
-    batch = FixedStepBatch(
-        _machine_code(system, method_key(method), lambda laws: fixed_batch(Program(system, laws), method)), starts
-    )
+    held = control is not None
+    make = lambda laws: fixed_batch(Program(system, laws, inputs=held), method)  # noqa: E731
+    batch = FixedStepBatch(_machine_code(system, (method_key(method), held), make), starts)
     refuse_inconsistent(system, starts, batch.residual)
-    times = _switching(system, starts, steps * step).times
+    times, t = _switching(system, starts, steps * step).times, step * every * np.arange(steps // every + 1)
+    run = {"integrator": method.name, "step": step, "times": t}
     if times.switches.size:  # steps of a batch cannot end there
-        return _singly(system, starts, step * every * np.arange(steps // every + 1), steps * step, method, step)
-    samples = batch.run(steps, step, every, threads)
-    if not np.isfinite(batch.reached).all():
-        broken = np.flatnonzero(~np.isfinite(batch.reached).all(axis=0))
+        return _singly(system, starts, steps * step, steps, run, control)
+    samples = batch.run(steps, step, every, threads, control)
+    finite = np.isfinite(batch.reached).all(axis=0)
+    if not held and not finite.all():
+        broken = np.flatnonzero(~finite)
         raise SimulationError(
             f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
         )
-    t = step * every * np.arange(samples.shape[1])
-    doubtful = np.flatnonzero(~((batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)))
+    is_right = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
+    doubtful = np.flatnonzero(finite & ~is_right)
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
-    share = shares(system, batch.energies, starts, samples, steps * step)
-    _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)
+    share = np.where(finite, shares(system, batch.energies, starts, samples, steps * step), 0.0)
+    _repeat(system, starts, samples, share, doubtful, steps * step, run, control)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
     q, v = np.split(samples, [system.n_q], axis=2)
-    return Rollout(system, t, q, v, tuple(map(int, doubtful)), *counts)
+    return Rollout(system, t, q, v, tuple(map(int, doubtful)), *counts, tuple(map(int, np.flatnonzero(~finite))))
+
+
+def _checked_control(system: System, control, batch: int, steps: int) -> np.ndarray:
+    """Inputs (batch, k, n_u) of all motions.
+
+    Raises
+    ------
+    SimulationError
+        If the scene has no inputs, the shape is wrong, or a value is not finite.
+    """
+    names = tuple(system.scene.inputs)
+    if not names:
+        raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
+    found = np.require(control, dtype=float, requirements=("C", "W"))
+    if found.ndim != 3 or found.shape[::2] != (batch, len(names)) or not found.shape[1] or steps % found.shape[1]:
+        raise SimulationError(
+            f"control: expected shape ({batch} motions, k rows, {len(names)} inputs) with k a divisor of {steps} steps, "
+            f"got {found.shape}."
+        )
+    if not np.isfinite(found).all():
+        motion, row, k = np.argwhere(~np.isfinite(found))[0]
+        raise SimulationError(f"control: input {names[k]!r} of motion {motion} is {found[motion, row, k]} in row {row}.")
+    return found
 
 
 def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, atol, threads: int) -> Rollout:
@@ -205,7 +241,7 @@ def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, a
     doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(switched.jumps))
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     share = shares(system, found.energies, starts, found.samples, t[-1])
-    _repeat(system, starts, found.samples, share, doubtful, t[-1], **run)
+    _repeat(system, starts, found.samples, share, doubtful, t[-1], run)
     q, v = np.split(found.samples, [system.n_q], axis=2)
     return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
 
@@ -223,12 +259,12 @@ def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
     return switched
 
 
-def _singly(system: System, starts: np.ndarray, t: np.ndarray, duration: float, method: Integrator, step: float) -> Rollout:
+def _singly(system: System, starts: np.ndarray, duration: float, steps: int, run: dict, control) -> Rollout:
     """Motions by :func:`gauss.simulate`, one after the other."""
-    batch = starts.shape[1]
+    batch, t = starts.shape[1], run["times"]
     samples, share = np.empty((batch, t.size, starts.shape[0])), np.zeros(batch)
-    _repeat(system, starts, samples, share, np.arange(batch), duration, integrator=method.name, step=step, times=t)
-    counts = np.full(batch, round(duration / step)), np.zeros(batch, int)
+    _repeat(system, starts, samples, share, np.arange(batch), duration, run, control)
+    counts = np.full(batch, steps), np.zeros(batch, int)
     q, v = np.split(samples, [system.n_q], axis=2)
     return Rollout(system, t, q, v, tuple(range(batch)), *counts)
 
@@ -240,8 +276,12 @@ def _constant(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> 
     return Rollout(system, t, empty, empty, (), np.full(batch, steps), np.zeros(batch, int))
 
 
-def _repeat(system: System, starts, samples: np.ndarray, share: np.ndarray, doubtful: np.ndarray, duration: float, **run):
-    """Repeat motions by :func:`gauss.simulate`, and warn of energy balances; samples and imbalances are changed.
+def _repeat(
+    system: System, starts, samples: np.ndarray, share: np.ndarray, doubtful, duration: float, run: dict, control=None
+):
+    """Repeat motions by :func:`gauss.simulate` with the settings ``run``, and warn of energy balances.
+
+    Samples and imbalances are changed.
 
     Warns
     -----
@@ -255,9 +295,10 @@ def _repeat(system: System, starts, samples: np.ndarray, share: np.ndarray, doub
     """
     for k in doubtful:
         start = State(0.0, *np.split(starts[:, k], [system.n_q]))
+        held = {} if control is None else {"control": control[k], "rate": control.shape[1] / duration}
         try:
             with imbalances() as found:
-                again = simulate(system, duration, state=start, progress=False, **run)
+                again = simulate(system, duration, state=start, progress=False, **run, **held)
         except SimulationError as error:
             raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
         samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share

@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, NativeFunction, Scalar, write
-from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
+from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, CheckedSwitch, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import PartitionedSystem
@@ -34,8 +34,7 @@ def adaptive(program: Program, method: Controlled, batch: bool = False, shares=N
     else:
         trial, dense, dense_evaluations = _written(program, method, begin, shares)
         sample, project = _sample(program, method, begin, len(dense.outputs)), program.projection()
-    check = write(program.watched_point, size, name="check")
-    return Adaptive(size, layout.row, trial, project, check, dense, sample, dense_evaluations, program.rates)
+    return Adaptive(size, layout.row, trial, project, program.point_check, dense, sample, dense_evaluations, program.rates)
 
 
 def _sample(program: Program, method: Controlled, begin: Callable, count: int) -> Function:
@@ -134,34 +133,38 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     def steps(equations_at):
         return lambda x, h: stepped(equations_at(layout.point(x)), x, h)
 
-    def unseen(x, reached: Point):
-        return program.watch.passes(layout.point(x), reached)
+    def begun(equations, x) -> Point:
+        point = layout.point(x)  # inputs may have changed since its rates were computed
+        return replace(point, rates=equations.evaluate(point.state)) if program.inputs else point
 
     def stepped(equations, x, h):
-        reached, cost = method.step(equations, layout.point(x), h[0])
+        begin = begun(equations, x)
+        reached, cost = method.step(equations, begin, h[0])
+        unseen = program.watch.passes(begin, reached)
+        reached = replace(reached, rates=begin.rates) if program.inputs else reached  # the next step computes its own
         if method.state_size:  # it satisfies the constraints itself, and a projection would spoil its compensated sums
             residual = equations.largest_violation(reached.state)
             return (
                 layout.pack(reached),
                 [residual],
-                [cost.evaluations, cost.factorisations, cost.unsolved, unseen(x, reached)],
+                [cost.evaluations, cost.factorisations, cost.unsolved, unseen],
             )
         reached, residual = _completed(program, equations, reached)
         packed, residuals = layout.pack(reached), [residual]
         packed, residuals = program.projected(packed) if program.projects else (packed, residuals)
         numbers = [cost.evaluations + int(program.projects), cost.factorisations, cost.unsolved]
-        return packed, residuals, [*numbers, unseen(x, reached)]
+        return packed, residuals, [*numbers, unseen]
 
     free = not method.mechanical and not program.drift.partitioned
+    step: Function | CheckedSwitch
     if program.may_lose_rank and free:
         step = with_projected_stages(program, steps)
     elif program.has_redundant_rows and free:  # off the constraints, redundant constraints contradict each other
         step = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="step")
     else:
         step = write(steps(_equations(program, method)), size, 1, name="step")
-    check = write(program.watched_point, size, name="check")
     project = None if method.state_size else program.projection()
-    return Fixed(size, layout.row, step, project, check, method.evaluations, program.rates)
+    return Fixed(size, layout.row, step, project, program.point_check, method.evaluations, program.rates)
 
 
 def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
@@ -174,4 +177,4 @@ def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
         return begun, [program.residual(point.state)], program.energies(x)
 
     states = slice(1, 1 + layout.n_q + layout.n_v)
-    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states)
+    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states, len(program.inputs))

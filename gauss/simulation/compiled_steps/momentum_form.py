@@ -5,10 +5,11 @@ traced graph (Hairer, Lubich, Wanner, Geometric Numerical Integration, VI.1).
 """
 
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
-from gauss.codegen import Function, Scalar, as_number, jacobian, reverse, write
+from gauss.codegen import Expression, Function, Scalar, as_number, jacobian, reverse, write
 from gauss.dynamics.energies import potential_energy
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.mechanism import Mechanism, condensed, dependent_coordinates, kinetic_energy, loop_residual
@@ -17,6 +18,7 @@ from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
 from gauss.system import (
     State,
+    System,
     along_rates,
     chart_lead,
     chart_velocity,
@@ -25,6 +27,11 @@ from gauss.system import (
     retract,
     velocity_lead,
 )
+
+
+def _energy(system: System, q, v) -> Expression:
+    """Kinetic energy of symbols."""
+    return cast(Expression, kinetic_energy(system, q, v))
 
 
 class MomentumForm:
@@ -78,7 +85,7 @@ class MomentumForm:
     @cached_property
     def _momentum(self) -> Function:
         def momentum(q, v):
-            return in_parent_axes(self.system, q, condensed(self.system, reverse(kinetic_energy(self.system, q, v), v)))
+            return in_parent_axes(self.system, q, condensed(self.system, reverse(_energy(self.system, q, v), v)))
 
         return write(momentum, self.system.n_q, self.system.n_v, name="momentum")
 
@@ -122,7 +129,7 @@ class MomentumForm:
 
         def impulses(t, q0, theta, rate):
             q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
-            energy = kinetic_energy(system, q, v)
+            energy = _energy(system, q, v)
             momentum, force = (condensed(system, reverse(energy, symbols)) for symbols in (rate, theta))
             applied, power = self._applied(t[0], q, v)
             return momentum, force + self._chart(chart_velocity, theta, rate).T @ applied, power
@@ -147,7 +154,7 @@ class MomentumForm:
         system = self.system
 
         def gradient(q, v):
-            energy = kinetic_energy(system, q, v)
+            energy = _energy(system, q, v)
             return along_rates(system, q, reverse(energy, q)), reverse(energy, v)
 
         return write(gradient, system.n_q, system.n_v, name="gradient")

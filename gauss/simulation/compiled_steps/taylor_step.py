@@ -73,7 +73,7 @@ def taylor_step(program: Program, shares=None) -> TaylorStep:
         write(defect, size, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs else None,
         system.n_q,
         project,
-        write(program.watched_point, size, name="check"),
+        program.point_check,
         write(sample, size, 1, n, name="sample"),
         program.rates,
     )
@@ -119,8 +119,8 @@ def _moved(program: Program, x, h, change):
     Compensated summation (Kahan 1965; Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5).
     """
     point, system = program.layout.point(x), program.system
-    state, (*compensation, late) = point.state, method_state_of(point)
-    before, change, h = np.concatenate([state.q, state.v, point.work]), change + np.array(compensation), h + late
+    state, (*lost, late) = point.state, method_state_of(point)
+    before, change, h = np.concatenate([state.q, state.v, point.work]), change + np.array(lost), h + late
     after, t = before + change, state.t + h
     compensation = np.concatenate([change - (after - before), [h - (t - state.t)]])
     q, v, work = after[: system.n_q].copy(), after[system.n_q : -3], after[-3:]

@@ -6,7 +6,6 @@ deep penetration: their treatment and messages are those of :mod:`gauss.dynamics
 
 from dataclasses import replace
 from functools import cached_property
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -18,10 +17,12 @@ from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.handover import finished
+from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps
-from gauss.simulation.moreau.moreau_jean import MoreauRun, in_words, time_step
+from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
+from gauss.system import System
 
 
 class CompiledMoreauRun(CompiledFixedRun):
@@ -58,7 +59,14 @@ class CompiledMoreauRun(CompiledFixedRun):
     @cached_property
     def python_steps(self) -> MoreauRun:
         """Steps in Python."""
-        return MoreauRun(self.whole.system, "auto", self.step, self.end, self.switching)
+        return MoreauRun(self._driven_system(), "auto", self.step, self.end, self.switching)
+
+    def _driven_system(self) -> System:
+        """System with drives by the present inputs."""
+        if self.held is None:
+            return self.whole.system
+        laws = {name: lambda t, k=k: self.inputs[k] for k, name in enumerate(self.held.names)}
+        return driven_as(self.whole.system, laws)
 
     def _initial_method_state(self) -> tuple[np.ndarray, int]:
         size = self.stepper.lossy.size + 1
@@ -70,20 +78,16 @@ class CompiledMoreauRun(CompiledFixedRun):
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         super()._advance(pairs, out)
         while self.control.status == LoopStatus.UNSOLVED:
-            self._python_step(*pairs[int(self.control.sample)], out)
+            t, due = pairs[int(self.control.sample)]
+            self._python_step(t, due, out)
 
     def _python_step(self, t: float, due: float, out: np.ndarray):
-        control, run, begin = self.control, self.python_steps, self.layout.point(self.point)
-        method_state = method_state_of(begin)
-        run.force, h = method_state[:-1], t - begin.state.t
+        control = self.control
         try:
-            rates, share = run.rates_over(begin.state, h)
-            found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
-            state = run.project(replace(found.state, t=t))
+            reached = self.repeated(self.point, t)
         except GaussError as error:
             self._gather(out)
             raise SimulationError(str(error), self.trajectory()) from error
-        reached = self.layout.pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
         if due != Due.STEP:
             out[int(control.rows)] = reached[: self.layout.row]
             control.rows += 1
@@ -92,14 +96,31 @@ class CompiledMoreauRun(CompiledFixedRun):
         control.sample, control.constraint_residual = control.sample + 1, np.inf  # unchecked
         control.status = LoopStatus.PAUSED
 
+    def repeated(self, packed: np.ndarray, t: float) -> np.ndarray:
+        """Point after a step from a point to a time [s], in Python.
+
+        Raises
+        ------
+        GaussError
+            If the motion cannot continue.
+        """
+        run, begin = self.python_steps, self.layout.point(packed)
+        method_state = method_state_of(begin)
+        run.force, h = method_state[:-1], t - begin.state.t
+        rates, share = run.rates_over(begin.state, h)
+        found, _ = time_step(KnownRates(run.system, rates, share), begin, h)
+        state = run.project(replace(found.state, t=t))
+        return self._pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
+
     def _is_confirmed(self) -> bool:
         point = self.layout.point(self.point)
-        self.point = self.layout.pack(replace(point, rates=self._evaluate(point.state)))
+        self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
         return super()._is_confirmed()
 
     def trajectory(self) -> Trajectory:
         """Motion so far."""
         found = super().trajectory()
         relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
-        method = in_words(self.step, float(self.point[-1]), relaxed, found.stats.method)
+        error = float(method_state_of(self.layout.point(self.point))[-1])
+        method = in_words(self.step, error, relaxed, found.stats.method)
         return replace(found, system=self.whole.system, stats=found.stats._replace(method=method), step=self.step)

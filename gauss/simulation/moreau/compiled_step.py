@@ -4,8 +4,6 @@ The method state is the contact forces of the last step, from which the solver o
 residual of the contact and friction laws so far.
 """
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from gauss import math
@@ -14,7 +12,7 @@ from gauss.codegen.kernels import FirstAccepted, Fixed
 from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
 from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
 from gauss.integrators import Point, method_state_of
-from gauss.simulation.moreau.moreau_jean import time_step
+from gauss.simulation.moreau.moreau_jean import KnownRates, time_step
 
 
 def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
@@ -44,7 +42,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
         jam, rates = stepper.forbids(state, added), stepper.over(touch, free, v, h, force, added)
-        found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: (rates, share)), point, h)
+        found, _ = time_step(KnownRates(system, rates, share), point, h)
         forces = [*(force * stepper.unit), math.maximum(method_state[n], error)]
         packed, violation = layout.pack(Point(found.state, found.work, rates, np.array(forces, dtype=object))), [0.0]
         packed, violation = program.projected(packed) if program.projects else (packed, violation)
@@ -62,6 +60,6 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         rates = program.evaluate(point.state)
         return program.watched_point(layout.pack(Point(point.state, point.work, rates, point.method_state)))
 
-    compiled, check = write(step, layout.size, *[1] * tried, name="moreau_step"), write(check, layout.size, name="check")
-    compiled = compiled if tried == 1 else FirstAccepted(compiled, stepper.shares)
+    one, check = write(step, layout.size, *[1] * tried, name="moreau_step"), write(check, layout.size, name="check")
+    compiled = one if tried == 1 else FirstAccepted(one, stepper.shares)
     return Fixed(layout.size, layout.row, compiled, program.projection(), check, 1, program.rates)

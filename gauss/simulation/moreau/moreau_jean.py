@@ -11,11 +11,13 @@ found, the step of the convex relaxation is taken, and counted.
 
 import warnings
 from dataclasses import replace
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from gauss.backends import solve
+from gauss.backends import Backend, solve
 from gauss.backends.solution import Solution
+from gauss.codegen import Entry, Scalar
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.moreau_step import MoreauStep, advance_positions, moreau_stepper
 from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
@@ -38,13 +40,13 @@ class MoreauRun(PythonRun):
     ----------
     system : System
         What moves.
-    backend : str
+    backend : str, Backend or class
         How free accelerations are solved.
     step, end : float
         Length of a step, and when to stop [s].
     """
 
-    def __init__(self, system: System, backend: str, step: float, end: float, switching: Switching = Switching()):  # noqa: B008
+    def __init__(self, system: System, backend: str | Backend | type, step: float, end: float, switching=Switching()):  # noqa: B008
         self.stepper = moreau_stepper(system, backend)
         super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
         self.h, self.relaxed, self.error = step, 0, 0.0
@@ -94,7 +96,7 @@ class MoreauRun(PythonRun):
     def _projected(self, point: Point, t: float | None) -> Point:
         """End of a step, projected onto the constraints, with the rates of the next step."""
         state = self.project(replace(point.state, t=t))
-        if t >= self.end:
+        if state.t >= self.end:
             return Point(state, point.work, point.rates)
         rates, share = self.rates_over(state, self.h)
         return Point(state, point.work, rates, np.array([share]))
@@ -111,7 +113,19 @@ def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str
     return f"time stepping of {step:g} s, laws of contact and friction met to {error:.0e} relative{by}; {accelerations}"
 
 
-def time_step(run: MoreauRun, point: Point, h: float) -> tuple[Point, Cost]:
+class KnownRates(NamedTuple):
+    """Mean rates over a step that are known already, numbers or expressions."""
+
+    system: System
+    rates: Rates
+    share: Entry
+
+    def over(self, point: Point, h: Scalar) -> tuple[Rates, Entry]:
+        """The rates, and the share s of the old rates."""
+        return self.rates, self.share
+
+
+def time_step(run: MoreauRun | KnownRates, point: Point, h: Entry) -> tuple[Point, Cost]:
     """One step: q₁ = q₀ ⊕ h (s v₀ + (1 − s) v₁)."""
     (rates, share), state = run.over(point, h), point.state
     v = state.v + h * rates.acceleration
@@ -131,9 +145,9 @@ TIME_STEPPING = FixedStep(
 NONSMOOTH = (TIME_STEPPING,)
 
 
-def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> MoreauStep:
+def step_at(trajectory: Trajectory, index: int, backend: str | Backend | type = "auto") -> MoreauStep:
     """Step from a sample of a motion by time stepping."""
-    return moreau_stepper(trajectory.system, backend).step(trajectory.state(index), trajectory.step)
+    return moreau_stepper(trajectory.system, backend).step(trajectory.state(index), cast(float, trajectory.step))
 
 
 def contact_parts(motion: Kinematics, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

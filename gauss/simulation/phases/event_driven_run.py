@@ -96,7 +96,8 @@ class EventDrivenRun(PythonRun):
         others = self.selector.names or self.selector.losses or self.selector.trains
         if self.backend != "auto" or others or not self.names:
             return None
-        return self.system.dynamics.on_demand((ActiveSetKernel, Laws(self.system).key), lambda: ActiveSetKernel(self.system))
+        key, make = (ActiveSetKernel, Laws(self.system).key), lambda: ActiveSetKernel(self.system)
+        return self.system.mechanics.on_demand(key, make)
 
     def _gaps(self, state: State) -> np.ndarray:
         """Gap functions and their rates (2, m)."""
@@ -331,7 +332,7 @@ class EventDrivenRun(PythonRun):
         places = self._places(state, case[0])
         key = case, tuple(places.items())
         if key not in self.phases:
-            self.phases[key] = Phase(self.selector, *case, places, self.backend)
+            self.phases[key] = Phase(self.selector, case[0], case[1], places, self.backend)
         self.started = self.phases[key]
         state = self.project(state)
         return Point(state, work, self.phase.solver.rates(self.phase.system, state)), jumps

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.backends import solve
+from gauss.backends import Backend, solve
 from gauss.codegen import Kernel
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.contact.mode_selection import ModeSelector, forces_of
@@ -60,7 +60,7 @@ def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places
         cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics()) if links.names else None
         return PhaseParts(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
-    return whole.dynamics.on_demand((PhaseParts, names, mode, tuple(places.items())), make)
+    return whole.mechanics.on_demand((PhaseParts, names, mode, tuple(places.items())), make)
 
 
 class Phase:
@@ -76,11 +76,18 @@ class Phase:
         Contact mode: state of all other unilateral and set-valued elements.
     places : mapping
         Features in contact by name of the gap, where a body has several.
-    backend : str
+    backend : str, Backend or class
         Solver of the accelerations.
     """
 
-    def __init__(self, selector: ModeSelector, held: tuple[int, ...], mode: ContactMode, places: Mapping, backend: str):
+    def __init__(
+        self,
+        selector: ModeSelector,
+        held: tuple[int, ...],
+        mode: ContactMode,
+        places: Mapping,
+        backend: str | Backend | type,
+    ):
         whole, self.selector = selector.system, selector
         names = [whole.contacts.placed[i].name for i in held]
         self.case, self.held, self.mode = (held, mode), np.array(held, dtype=int), mode
@@ -88,7 +95,7 @@ class Phase:
         self.signs = np.array([mode.set_valued[name] for name in selector.names], dtype=int)
         self.system, self.links, cut, self.margins = phase_parts(whole, tuple(names), mode, places)
         self.backend, may_compile = backend, MODES.plan(Question(self.system, self.laws, backend)).dynamics == "compiled"
-        if self.links.names:
+        if cut is not None:
             self.solvers: list = [LossyEngine(self.system, cut, self.links, backend, may_compile)]
         else:
             self.solvers = [CertifiedEngine(backend)]

@@ -16,7 +16,6 @@ from scipy.linalg import expm
 import gauss
 from gauss.bench.suite.classes.mechanisms import loaded
 from gauss.bench.suite.instance import SuiteInstance, programme
-from gauss.dynamics.equations import inverse_dynamics
 
 GRID = (
     2.0**40
@@ -171,7 +170,7 @@ def arm(name: str) -> Plant:
     """Robot arm about a pose, linearised by gauss: torques beside those that hold it."""
     system = gauss.compile_scene(loaded(f"robot:{name}"))
     state = system.state(0.3 * np.ones(system.n_v))
-    inverse_torque = inverse_dynamics(system)(state.q, state.v, np.zeros(system.n_v))
+    inverse_torque = system.inverse_dynamics(state.q, state.v, np.zeros(system.n_v))
     found = gauss.derivatives(system, state, inverse_torque)
     free = [i for i, c in enumerate(system.coordinates) if "finger" not in c]
     part = np.ix_(free, free)

@@ -1,0 +1,186 @@
+"""A function over rows of arrays: states (n, …) in, results (n, …) out, a SIMD vector of states at a time.
+
+Rows of any stride are transposed to structures of arrays in a buffer, the body runs once for as many states as the vector
+register holds, and its results are transposed back. The last vector repeats the last row, so no scalar code is needed.
+"""
+
+import ctypes
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import ir
+
+from gauss.codegen import machine
+from gauss.codegen.emit import Writer
+from gauss.codegen.function import Function
+from gauss.codegen.ir_blocks import counted_loop
+from gauss.codegen.lanes import DOUBLE, INTEGER, kind
+from gauss.codegen.native_function import NativeFunction
+from gauss.codegen.python_wrapper import Interface
+
+SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p)
+POINTER, LANE = DOUBLE.as_pointer(), ir.IntType(32)
+
+
+class BatchCode(NamedTuple):
+    """Machine code of a function over rows.
+
+    Attributes
+    ----------
+    code : MachineCode
+        The code.
+    """
+
+    code: machine.MachineCode
+
+    def entry(self) -> "BatchEntry":
+        """The function, to be called."""
+        return BatchEntry(self.code)
+
+
+class BatchEntry:
+    """Function over rows of arrays.
+
+    Parameters
+    ----------
+    code : MachineCode
+        Its code.
+    """
+
+    def __init__(self, code: machine.MachineCode):
+        self._run = code.entry("batch", SIGNATURE)
+
+    def __call__(self, count: int, inputs, outputs):
+        """Evaluate ``count`` rows.
+
+        Parameters
+        ----------
+        count : int
+            Number of rows.
+        inputs : sequence of ndarray
+            Vectors (count, k) of doubles with any strides, and numbers (count,).
+        outputs : sequence of ndarray
+            Results (count, k), entries of a row contiguous.
+        """
+        table = [x for given in inputs for x in (given.ctypes.data, *(stride // 8 for stride in given.strides))]
+        table += [x for result in outputs for x in (result.ctypes.data, result.strides[0] // 8)]
+        self._run.call(count, np.array(table, dtype=np.int64).ctypes.data)
+
+
+def batch_code(function: Function | NativeFunction, interface: Interface) -> BatchCode:
+    """Machine code of a function over rows.
+
+    Parameters
+    ----------
+    function : Function or NativeFunction
+        Its inputs are the vectors and the number, concatenated; its outputs are the results and the limited quantities.
+    interface : Interface
+        Arguments, results and limits.
+    """
+    writer = Writer()
+    try:
+        width, body = machine.width(), writer.body(function, machine.width())
+    except TypeError:  # it holds a function for one state at a time
+        writer = Writer()
+        width, body = 1, writer.body(function, 1)
+    _BatchWriter(writer, body, width).write(interface.sizes, interface.result_sizes(len(function.outputs)))
+    return BatchCode(machine.load(str(writer.module)))
+
+
+class _BatchWriter:
+    """Emitter of ``batch(i64 count, i64* table)``: the table holds address, row stride and entry stride of the arrays."""
+
+    def __init__(self, writer: Writer, body: ir.Function, width: int):
+        self.width, self.body = width, body
+        self.function = ir.Function(writer.module, ir.FunctionType(ir.VoidType(), [INTEGER, INTEGER.as_pointer()]), "batch")
+        self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
+        self.read = 0  # entries of the table that were read
+
+    def write(self, sizes, result_sizes):
+        """Write the function for the sizes of its vectors and of its results."""
+        b, width, (count, _) = self.b, self.width, self.function.args
+        sources = [self._entries(3) for _ in sizes] + [self._entries(2)]
+        targets = [self._entries(2) for _ in result_sizes]
+        given, found = (b.alloca(DOUBLE, n * width) for n in (sum(sizes) + 1, max(sum(result_sizes), 1)))
+        for room in (given, found):
+            room.align = 64
+        with counted_loop(b, INTEGER(0), count, width) as first:
+            last = b.sub(count, INTEGER(1))
+            steps = [b.add(first, INTEGER(lane)) for lane in range(width)]
+            rows = [b.select(b.icmp_signed("<", step, count), step, last) for step in steps]
+            place = 0
+            for (data, row, *entry), size in zip(sources, [*sizes, 1], strict=True):
+                self._gather(self._rows(data, row, rows), entry[0] if entry else INTEGER(0), size, given, place)
+                place += size
+            b.call(self.body, [given, INTEGER(width), found, INTEGER(width)])
+            place = 0
+            for (data, row), size in zip(targets, result_sizes, strict=True):
+                self._scatter(self._rows(data, row, rows), size, found, place)
+                place += size
+        b.ret_void()
+
+    def _entries(self, count: int) -> list:
+        """Load the next entries of the table; the first is an address."""
+        b, table = self.b, self.function.args[1]
+        found = [b.load(b.gep(table, [INTEGER(self.read + k)])) for k in range(count)]
+        self.read += count
+        return [b.inttoptr(found[0], POINTER), *found[1:]]
+
+    def _rows(self, data, stride, rows) -> list:
+        return [self.b.gep(data, [self.b.mul(row, stride)]) for row in rows]
+
+    def _gather(self, rows, stride, size: int, target, place: int):
+        """Entries of the rows, to vectors of lanes."""
+        b = self.b
+        with counted_loop(b, INTEGER(0), INTEGER(size)) as k:
+            offset = b.mul(k, stride)
+            values = [b.load(b.gep(row, [offset])) for row in rows]
+            self._store(self._vector(values), target, b.mul(b.add(k, INTEGER(place)), INTEGER(self.width)))
+
+    def _scatter(self, rows, size: int, source, place: int):
+        """Vectors of lanes, to entries of the rows: whole blocks are transposed in registers."""
+        b, width = self.b, self.width
+        whole = size - size % width
+        offset = lambda k: b.mul(b.add(k, INTEGER(place)), INTEGER(width))  # noqa: E731
+        if whole and width > 1:
+            with counted_loop(b, INTEGER(0), INTEGER(whole), width) as k:
+                block = [self._load(source, offset(b.add(k, INTEGER(i)))) for i in range(width)]
+                for row, vector in zip(rows, self._transposed(block), strict=True):
+                    self._store(vector, row, k)
+        with counted_loop(b, INTEGER(whole if width > 1 else 0), INTEGER(size)) as k:
+            vector = self._load(source, offset(k))
+            for lane, row in enumerate(rows):
+                b.store(vector if width == 1 else b.extract_element(vector, LANE(lane)), b.gep(row, [k]))
+
+    def _transposed(self, block: list) -> list:
+        """Transpose a square block: in step s entries whose places differ in bit s change sides."""
+        width, step = self.width, 1
+        while step < width:
+            pairs, found = [i for i in range(width) if not i & step], list(block)
+            low = [j if not j & step else width + j - step for j in range(width)]
+            high = [j + step if not j & step else width + j for j in range(width)]
+            for i in pairs:
+                one, other = block[i], block[i + step]
+                found[i], found[i + step] = (self.b.shuffle_vector(one, other, _places(order)) for order in (low, high))
+            block, step = found, 2 * step
+        return block
+
+    def _vector(self, values):
+        if self.width == 1:
+            return values[0]
+        vector = ir.Constant(kind(self.width), ir.Undefined)
+        for lane, value in enumerate(values):
+            vector = self.b.insert_element(vector, value, LANE(lane))
+        return vector
+
+    def _load(self, pointer, offset):
+        place = self.b.gep(pointer, [offset])
+        return self.b.load(self.b.bitcast(place, kind(self.width).as_pointer()), align=8)
+
+    def _store(self, vector, pointer, offset):
+        place = self.b.gep(pointer, [offset])
+        self.b.store(vector, self.b.bitcast(place, kind(self.width).as_pointer()), align=8)
+
+
+def _places(order) -> ir.Constant:
+    return ir.Constant(ir.VectorType(LANE, len(order)), list(order))

@@ -1,0 +1,278 @@
+"""Functions of a state as machine code: one table of terms, one compiled wrapper for one state and for batches (n, …).
+
+Several functions asked for at once are traced in one graph, where equal operations are computed once.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.codegen import Interface, PythonWrapper, batch_code, entry_code, fastcall, write
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
+from gauss.dynamics.constrained_terms import ConstrainedTerms
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import inverse_dynamics, loop_constraint_scales, loop_constraints, loop_residual
+from gauss.dynamics.mobility import mobility
+from gauss.dynamics.projection import fixed_columns
+from gauss.dynamics.state_terms import REFERENCES, StateTerms
+from gauss.dynamics.store import cached, cached_on_disk
+from gauss.dynamics.traced_system import FINITE, applied_loads, off_unit
+from gauss.errors import ArgumentError, SimulationError, StateError, did_you_mean
+from gauss.system import State, System, refuse_changed, whole
+
+DOC = """Terms of one state, or of a batch (n, …) of states, in machine code.
+
+Parameters
+----------
+q, v, acceleration : array_like, shape (…, n_q), (…, n_v), (…, n_v)
+    Coordinates (quaternions of unit length), rates, accelerations of all joints; those that the function takes.
+out : ndarray, optional
+    Array of doubles for the result, a tuple of arrays for several.
+t : float or array_like
+    Time [s].
+
+Raises
+------
+StateError
+    If an argument does not fit.
+"""
+LARGEST_RATIO = 1e8  # of a rate to an independent one, in units of the scene: beyond, that one does not determine it
+NULL_SPACE_RESIDUAL = 1e-6  # K N, relative to the scales of the rows: where rates are not determined it is of order one
+ARGUMENTS = "q", "v", "acceleration"  # in this order
+
+
+class Term(NamedTuple):
+    """A function of a state.
+
+    Attributes
+    ----------
+    arguments : str
+        Its arguments, of q, v, a (acceleration).
+    shapes : tuple of str
+        Shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints.
+    trace : callable
+        (terms, request, acceleration) → its results.
+    of_frame, has_reference, is_reduced : bool
+        Whether it is a function of a frame; in axes to be chosen; whether it exists for independent coordinates.
+    """
+
+    arguments: str
+    shapes: tuple[str, ...]
+    trace: Callable
+    of_frame: bool = False
+    has_reference: bool = False
+    is_reduced: bool = True
+
+
+class Request(NamedTuple):
+    """A term, with the name of its frame, and its axes."""
+
+    name: str
+    frame: str = ""
+    reference: str = ""
+
+
+def _inverse_dynamics(terms: StateTerms, _, acceleration):
+    system, state = terms.system, State(terms.t, terms.q, terms.v)
+    own, on_bodies, _ = applied_loads(system, _traced_loads(system).traced, state)
+    return inverse_dynamics(system, terms.q, terms.v, acceleration, own, on_bodies, terms.t)
+
+
+TERMS = {
+    "mass_matrix": Term("q", ("vv",), lambda terms, *_: terms.mass_matrix),
+    "bias_forces": Term("qv", ("v",), lambda terms, *_: terms.bias_forces),
+    "gravity_forces": Term("q", ("v",), lambda terms, *_: terms.gravity_forces),
+    "coriolis_matrix": Term("qv", ("vv",), lambda terms, *_: terms.coriolis_matrix),
+    "forward_kinematics": Term("q", ("33", "3"), lambda terms, one, _: terms.frame_pose(one.frame), of_frame=True),
+    "jacobian": Term("q", ("6v",), lambda terms, one, _: terms.jacobian(*one[1:]), of_frame=True, has_reference=True),
+    "jacobian_rate": Term(
+        "qv", ("6v",), lambda terms, one, _: terms.jacobian_rate(*one[1:]), of_frame=True, has_reference=True
+    ),
+    "center_of_mass": Term("q", ("3",), lambda terms, *_: terms.center_of_mass),
+    "momentum": Term("qv", ("6",), lambda terms, *_: terms.momentum),
+    "momentum_matrix": Term("q", ("6v",), lambda terms, *_: terms.momentum_matrix),
+    "kinetic_energy": Term("qv", ("",), lambda terms, *_: terms.kinetic_energy),
+    "potential_energy": Term("q", ("",), lambda terms, *_: terms.potential_energy),
+    "null_space": Term("q", ("Vv",), lambda terms, *_: terms.null_space),
+    "inverse_dynamics": Term("qva", ("V",), _inverse_dynamics, is_reduced=False),
+    "loop_constraints": Term(
+        "qv",
+        ("r", "rV", "r"),
+        lambda terms, *_: loop_constraints(terms.system, terms.q, terms.v, terms.t),
+        is_reduced=False,
+    ),
+}
+
+
+def state_function(system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None) -> Callable:
+    """Compiled function of a state, or of several at once; see :meth:`gauss.System.function`.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such function, or it is called with options that it does not have.
+    StateError
+        If there is no such frame or joint, or coordinates cannot be independent.
+    SimulationError
+        If the law of a load cannot be compiled.
+    """
+    if reference not in REFERENCES:
+        raise ArgumentError(f"reference: no axes {reference!r}. {did_you_mean(reference, REFERENCES)}")
+    requests = tuple(_request(system, name, reference) for name in names)
+    if not requests:
+        raise ArgumentError(f"function: expected names of functions. {did_you_mean('', TERMS)}")
+    columns = None if independent is None else _columns(system, requests, independent)
+    if columns is None and "null_space" in names:
+        raise ArgumentError("null_space: expected the names of independent joints, independent=(…).")
+    if columns is not None or "loop_constraints" in names:
+        refuse_changed(system)
+    laws = _traced_loads(system).key if "inverse_dynamics" in names else ""
+    key = state_function, requests, columns, laws
+    return cached(system, key, lambda: _compiled(system, requests, columns, key))
+
+
+def evaluate(system: System, names, given: dict, t, reference: str, independent) -> dict:
+    """Results of several functions of a state, by their names; see :meth:`gauss.System.evaluate`.
+
+    Raises
+    ------
+    StateError
+        If an argument is missing or does not fit.
+    """
+    names = (names,) if isinstance(names, str) else tuple(names)
+    function = state_function(system, names, reference, independent)
+    terms = [TERMS[name.partition(":")[0]] for name in names]
+    needed = _arguments(terms)
+    for name in needed:
+        if given[name] is None:
+            raise StateError(f"evaluate: {', '.join(names)}: expected {name} as well.")
+    found = function(*(given[name] for name in needed), None, t)
+    parts = iter(found if sum(len(term.shapes) for term in terms) > 1 else (found,))
+    results = [[next(parts) for _ in term.shapes] for term in terms]
+    return {name: own[0] if len(own) == 1 else tuple(own) for name, own in zip(names, results, strict=True)}
+
+
+def _arguments(terms) -> list[str]:
+    """Names of the vectors that terms take."""
+    letters = {letter for term in terms for letter in term.arguments}
+    return [name for name in ARGUMENTS if name[0] in letters]
+
+
+def _request(system: System, name: str, reference: str) -> Request:
+    """Request for a name such as "jacobian:hand"."""
+    own, _, frame = name.partition(":") if isinstance(name, str) else (name, "", "")
+    if own not in TERMS:
+        raise ArgumentError(f"no function {own!r} of a state. {did_you_mean(str(own), TERMS)}")
+    term = TERMS[own]
+    if term.of_frame != bool(frame):
+        words = f"expected the name of a frame, as in '{own}:name'" if term.of_frame else f"takes no frame, got {frame!r}"
+        raise ArgumentError(f"{own}: {words}.")
+    if frame:
+        system.frame(frame)  # raises
+    return Request(own, frame, reference if term.has_reference else "")
+
+
+def _columns(system: System, requests, independent) -> tuple[int, ...]:
+    """Places of independent coordinates in v."""
+    for one in requests:
+        if not TERMS[one.name].is_reduced:
+            raise ArgumentError(f"{one.name} does not exist for independent coordinates; call it without independent=.")
+    names = (independent,) if isinstance(independent, str) else tuple(independent)
+    columns = fixed_columns(system, names)
+    freedoms = cached(system, (mobility,), lambda: mobility(system)).nearby
+    if len(columns) != freedoms or len(set(columns)) != freedoms:
+        raise StateError(
+            f"independent: expected {freedoms} different coordinates, one for each degree of freedom, "
+            f"of {', '.join(system.coordinates)}; got {', '.join(map(repr, names)) or 'none'}."
+        )
+    return tuple(columns)
+
+
+def _traced_loads(system: System) -> Laws:
+    """Laws of the loads as they are now.
+
+    Raises
+    ------
+    SimulationError
+        If one of them cannot be compiled.
+    """
+    laws = Laws(system)
+    if laws.reasons:
+        words = "; ".join(f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items())
+        raise SimulationError(f"inverse dynamics of scene {system.scene.name!r} cannot be compiled: {words}.")
+    return laws
+
+
+def _compiled(system: System, requests, columns, key) -> Callable:
+    names = _arguments([TERMS[one.name] for one in requests])
+    sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
+    limits = (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))
+    interface = Interface(sizes, "t", limits, _shapes(system, requests, columns))
+    name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
+
+    def values(*given):
+        arguments = dict(zip(names, given[:-1], strict=True))
+        q, v, (t,) = arguments["q"], arguments.get("v", np.zeros(system.n_v)), given[-1]
+        terms = StateTerms(system, q, v, t) if columns is None else ConstrainedTerms(system, q, v, t, columns)
+        found = (TERMS[one.name].trace(terms, one, arguments.get("acceleration")) for one in requests)
+        results = [part for result in found for part in (result if isinstance(result, tuple) else (result,))]
+        return *results, _errors(terms, given)
+
+    trace = lambda: write(values, *interface.sizes, 1, name="state")  # noqa: E731
+    entry = cached_on_disk(system, (entry_code, *key), lambda: entry_code(trace(), interface))
+    batch = lambda: cached_on_disk(system, (batch_code, *key), lambda: batch_code(trace(), interface)).entry()  # noqa: E731
+
+    def normalised(given):
+        q, *others, t = interface.split(given)
+        state = system.state(q, others[0] if "v" in sizes else None, t)
+        if not all(np.isfinite(part).all() for part in (*others, t)):
+            raise StateError(f"{name}: expected finite numbers, got {others[-1] if others else ''} at t = {t}.")
+        if np.array_equal(state.q, q):
+            raise StateError(_refusal(system, state, name, columns))
+        found = run(state.q, *others, None, t)
+        return np.concatenate([np.ravel(part) for part in (found if isinstance(found, tuple) else (found,))])
+
+    outputs = entry.outputs - len(limits)
+    last = PythonWrapper(normalised, replace(interface, limits=()), outputs, None, name, DOC)
+    run = fastcall(entry, interface, last, name, DOC, batch)
+    return run
+
+
+def _shapes(system: System, requests, columns) -> tuple[tuple[int, ...], ...]:
+    """Shapes of the results of requests."""
+    sizes = {"V": system.n_v, "v": system.n_v if columns is None else len(columns), "r": whole(system).n_loop_constraints}
+    shapes = [shape for one in requests for shape in TERMS[one.name].shapes]
+    return tuple(tuple(sizes[one] if one in sizes else int(one) for one in shape) for shape in shapes)
+
+
+def _errors(terms: StateTerms, given) -> list:
+    """Residual of the state, a sum of all inputs that is finite only if each is, sizes of N and of K N.
+
+    A sum is NaN if one of its terms is. Without independent coordinates the state need not meet the constraints: its
+    residual is that of the quaternions.
+    """
+    system, unit = terms.system, terms.system.scale.coordinates
+    residual, total = off_unit(system, terms.q), sum(np.abs(part).sum() for part in given)
+    if not isinstance(terms, ConstrainedTerms):
+        return [residual, total]
+    rows = loop_residual(system, terms.q, terms.t)[0]
+    residual = residual + np.abs(rows / loop_constraint_scales(system)).sum()
+    N = terms.null_space * unit[terms.independent]
+    moved = [terms.mechanism.moving(column).velocity() / loop_constraint_scales(system) for column in N.T]
+    return [residual, total, np.abs(N / unit[:, None]).sum(), np.abs(moved).sum()]
+
+
+def _refusal(system: System, state: State, name: str, columns) -> str:
+    """Why a state with unit quaternions and finite numbers is refused."""
+    if columns is None:
+        return f"{name}: no finite result in this state."
+    rows = np.abs(loop_residual(system, state.q, state.t)[0] / loop_constraint_scales(system)).sum()
+    if rows > RESIDUAL_TOLERANCE:
+        return (
+            f"{name}: q does not meet the constraints, by {rows:.3g} of their scales; system.initial_state or "
+            "system.projected make a state that does."
+        )
+    names = ", ".join(system.coordinates[k] for k in columns)
+    return f"{name}: {names} do not determine the other rates in this state; take other independent coordinates."

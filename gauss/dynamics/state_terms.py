@@ -1,0 +1,217 @@
+"""Terms of the equations of motion in one state, over symbols: M(q), C(q, v), h(q, v), g(q), frames, Jacobians, momentum.
+
+M by composite inertias, I_λ^c += X_iᵀ I_i^c X_i and M_ij = S_jᵀ X … I_i^c S_i (Featherstone, Rigid Body Dynamics
+Algorithms, 2008, sec. 6.2); h by inverse dynamics at q̈ = 0; C from h, which is quadratic in v. With [v, w] the bracket of
+the rates, zero but for angular velocities about the axes of a moving body, C w = ½ (∂h/∂v) w + ½ M [v, w]: so Ṁ = C + Cᵀ
+(Christoffel symbols in a moving basis: Echeandia and Wensing, Numerical methods to compute the Coriolis matrix, 2021).
+Spatial vectors are (angular, linear). Where joints close loops, these are the terms of the spanning tree.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from gauss import rotations
+from gauss.codegen import Scalar, forward, jacobian
+from gauss.dynamics import energies
+from gauss.dynamics.aba import add, inertia_to_inner
+from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.rnea import KinematicTree, apply, force_to_inner
+from gauss.rotations import cross, skew
+from gauss.system import State, System, coordinate_rates, whole
+
+REFERENCES = ("local_world_aligned", "world", "local")
+
+
+class StateTerms:
+    """Terms of one system in one state; each is traced when it is first asked for.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    q, v : ndarray, shape (n_q,), (n_v,)
+        Coordinates, symbols; rates, symbols or zeros.
+    t : Expression or float
+        Time [s].
+    """
+
+    def __init__(self, system: System, q, v, t: Scalar = 0.0):
+        self.system, self.q, self.v, self.t = system, q, v, t
+
+    @cached_property
+    def tree(self) -> KinematicTree:
+        """Spanning tree."""
+        return KinematicTree(whole(self.system), self.q, self.v)
+
+    @cached_property
+    def still(self) -> KinematicTree:
+        """Spanning tree at rest."""
+        return KinematicTree(whole(self.system), self.q, np.zeros(self.system.n_v))
+
+    @cached_property
+    def composites(self) -> dict:
+        """Inertia of each link with all links that it carries, in its link frame."""
+        tree = self.still
+        found = {body: tree.links[body].inertia for body in tree.joint_kinematics}
+        for edge in reversed(tree.edges):
+            if edge.inner >= 0:
+                carried = inertia_to_inner(tree.links[edge.outer], tree.joint_kinematics[edge.outer], found[edge.outer])
+                found[edge.inner] = add(found[edge.inner], carried)
+        return found
+
+    @property
+    def mass_matrix(self) -> np.ndarray:
+        """M (n_v, n_v)."""
+        return self.tree_mass_matrix
+
+    @property
+    def coriolis_matrix(self) -> np.ndarray:
+        """C (n_v, n_v) with Ṁ = C + Cᵀ."""
+        return self.tree_coriolis_matrix
+
+    @property
+    def bias_forces(self) -> np.ndarray:
+        """C v + g (n_v,)."""
+        return self.tree_bias_forces
+
+    @property
+    def gravity_forces(self) -> np.ndarray:
+        """Bias forces at rest (n_v,)."""
+        return self.tree_gravity_forces
+
+    @property
+    def momentum_matrix(self) -> np.ndarray:
+        """Centroidal momentum matrix (6, n_v)."""
+        return self.tree_momentum_matrix
+
+    @cached_property
+    def tree_mass_matrix(self) -> np.ndarray:
+        """M (n_v, n_v); zero rows and columns for joints that close loops."""
+        tree, n = self.still, self.system.n_v
+        M, to = np.zeros((n, n), dtype=object), {edge.outer: edge for edge in tree.edges}
+        for edge in tree.edges:
+            place = tree.subsystem.joints[edge.constraint].v
+            S = tree.joint_kinematics[edge.outer].S
+            for column, along in zip(range(place.start, place.stop), S.T, strict=True):
+                force, here = apply(self.composites[edge.outer], along), edge
+                while True:
+                    rows = tree.subsystem.joints[here.constraint].v
+                    M[rows, column] = M[column, rows] = tree.joint_kinematics[here.outer].S.T @ force
+                    if here.inner < 0:
+                        break
+                    force = force_to_inner(tree.links[here.outer], tree.joint_kinematics[here.outer], force)
+                    here = to[here.inner]
+        return np.tril(M) + np.tril(M, -1).T
+
+    @cached_property
+    def tree_bias_forces(self) -> np.ndarray:
+        """C v + g (n_v,)."""
+        return self.tree.inverse_dynamics(np.zeros(self.system.n_v))
+
+    @cached_property
+    def tree_gravity_forces(self) -> np.ndarray:
+        """Bias forces at rest (n_v,)."""
+        return self.still.inverse_dynamics(np.zeros(self.system.n_v))
+
+    @cached_property
+    def tree_coriolis_matrix(self) -> np.ndarray:
+        """C (n_v, n_v) with Ṁ = C + Cᵀ."""
+        turning = np.zeros((self.system.n_v, self.system.n_v), dtype=object)
+        for joint in self.system.joints:
+            if joint.pair.quaternion is not None:
+                place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
+                turning[place, place] = skew(self.v[place])
+        found = jacobian(self.tree_bias_forces, self.v)
+        return 0.5 * (found if self.system.is_flat else found + self.tree_mass_matrix @ turning)
+
+    def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation (3, 3) to world and origin (3,) of a body frame or named frame."""
+        placed = self.system.frame(frame)
+        R, p, link = *self.still.poses[placed.body], self.still.links[placed.body]
+        turn = rotations.clean(link.R_central.T @ placed.R)
+        return R @ turn, p + R @ (link.R_central.T @ (placed.p - link.p_central))
+
+    def jacobian(self, frame: str, reference: str) -> np.ndarray:
+        """Jacobian J (6, n_v): angular and linear velocity of a frame, J v; see ``REFERENCES``."""
+        R, point = self.frame_pose(frame)
+        return self._jacobian(self.system.frame(frame).body, R, np.zeros(3) if reference == "world" else point, reference)
+
+    def _jacobian(self, body: int, R, point, reference: str) -> np.ndarray:
+        tree, J = self.still, np.zeros((6, self.system.n_v), dtype=object)
+        to = {edge.outer: edge for edge in tree.edges}
+        turn = R.T if reference == "local" else np.eye(3)
+        while body >= 0:
+            place, (R_link, origin) = tree.subsystem.joints[to[body].constraint].v, tree.poses[body]
+            S = tree.joint_kinematics[body].S
+            for column, along in zip(range(place.start, place.stop), S.T, strict=True):
+                angular = R_link @ along[:3]
+                linear = R_link @ along[3:] + cross(angular, point - origin)
+                J[:, column] = np.concatenate([turn @ angular, turn @ linear])
+            body = to[body].inner
+        return J
+
+    def jacobian_rate(self, frame: str, reference: str) -> np.ndarray:
+        """Time derivative of the Jacobian (6, n_v) at rates v."""
+        return self.rate(self.jacobian(frame, reference))
+
+    def rate(self, terms) -> np.ndarray:
+        """Time derivative of functions of the coordinates at rates v."""
+        return forward(terms, self.q, coordinate_rates(self.system, self.q, self.v))
+
+    @cached_property
+    def centers(self) -> dict[int, np.ndarray]:
+        """Centre of mass (3,) of each body in world."""
+        tree = self.still
+        local = {body: -link.R_central.T @ link.p_central for body, link in tree.links.items()}
+        return {body: p + R @ local[body] for body, (R, p) in tree.poses.items() if body >= 0}
+
+    @cached_property
+    def center_of_mass(self) -> np.ndarray:
+        """Centre of mass of all bodies (3,) in world."""
+        masses = self.system.Phi[3::6] / self.system.Phi[3::6].sum()
+        return sum((mass * self.centers[body] for body, mass in enumerate(masses) if mass), np.zeros(3))
+
+    @cached_property
+    def tree_momentum_matrix(self) -> np.ndarray:
+        """Centroidal momentum matrix (6, n_v): moment of momentum about the centre of mass, and momentum, world axes."""
+        tree, A = self.still, np.zeros((6, self.system.n_v), dtype=object)
+        for edge in tree.edges:
+            place, (R, p) = tree.subsystem.joints[edge.constraint].v, tree.poses[edge.outer]
+            S = tree.joint_kinematics[edge.outer].S
+            for column, along in zip(range(place.start, place.stop), S.T, strict=True):
+                moment, force = np.split(apply(self.composites[edge.outer], along), 2)
+                force = R @ force
+                A[:, column] = np.concatenate([R @ moment + cross(p - self.center_of_mass, force), force])
+        return A
+
+    @cached_property
+    def momentum(self) -> np.ndarray:
+        """Moment of momentum about the centre of mass, and momentum (6,), world axes."""
+        tree, carried, total = self.still, self.still.carried(self.v), np.zeros(6)
+        own = {body: apply(tree.links[body].inertia, carried[body]) for body in tree.joint_kinematics}
+        gathered = tree.gathered(own)
+        for edge in (edge for edge in tree.edges if edge.inner < 0):
+            R, p = tree.poses[edge.outer]
+            force = R @ gathered[edge.outer][3:]
+            moment = R @ gathered[edge.outer][:3] + cross(p - self.center_of_mass, force)
+            total = total + np.concatenate([moment, force])
+        return total
+
+    @cached_property
+    def kinetic_energy(self) -> Scalar:
+        """½ vᵀ M v."""
+        return self.tree.kinetic_energy(self.v)
+
+    @cached_property
+    def potential_energy(self) -> Scalar:
+        """Potential energy of gravity and springs."""
+        tree, bodies, state = (
+            self.still,
+            range(self.system.structure.n_bodies),
+            State(self.t, self.q, np.zeros(self.system.n_v)),
+        )
+        R = [tree.poses[body][0] @ tree.links[body].R_central.T for body in bodies]
+        none = [np.zeros(3)] * len(bodies)
+        x = [self.centers[body] for body in bodies]
+        return energies.potential_energy(Kinematics.of_bodies(self.system, state, R, x, none, none))

@@ -1,0 +1,156 @@
+"""Inputs held between samples of a control law (zero-order hold): u(t) = law(t_k, q_k, v_k) for t_k ≤ t < t_k+1."""
+
+import inspect
+from collections.abc import Callable
+
+import numpy as np
+
+from gauss.codegen import Scalar
+from gauss.dynamics.compile_scene import compile_scene
+from gauss.dynamics.inputs import driven_scene
+from gauss.errors import SimulationError
+from gauss.system import System
+
+EQUAL_SAMPLES = 1e-9  # relative to the time from one sample to the next: closer times are one
+
+
+class HeldInputs:
+    """Inputs of one motion.
+
+    Parameters
+    ----------
+    system : System
+        System whose scene has inputs.
+    control : callable or array_like, shape (k, n_u)
+        Law (t, q, v) → values (n_u,) of the inputs in the order of the scene, called once for each sample; or a table of
+        them, one row for each sample.
+    rate : float
+        Samples in a second [Hz]; the first is at the start.
+    start, end : float
+        Interval of the motion [s].
+
+    Attributes
+    ----------
+    times : ndarray, shape (k,)
+        Samples [s].
+    values : list of ndarray
+        Values of the inputs at the samples so far, (n_u,) each.
+
+    Raises
+    ------
+    SimulationError
+        If the scene has no inputs, or an argument is invalid.
+    """
+
+    def __init__(self, system: System, control, rate: float | None, start: float, end: float):
+        self.system, self.names = system, tuple(system.scene.inputs)
+        if not self.names:
+            raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
+        if not isinstance(rate, int | float) or not np.isfinite(rate) or rate <= 0:
+            raise SimulationError(f"rate: expected a positive number of samples in a second [Hz], got {rate!r}.")
+        count = max(1, int(np.ceil((end - start) * rate - EQUAL_SAMPLES)))
+        self.rate, self.times, self.end = float(rate), start + np.arange(count) / rate, end
+        self.values: list[np.ndarray] = []
+        self.law = _called(control) if callable(control) else self._tabulated(control)
+
+    def _tabulated(self, control) -> Callable:
+        """Law of a table."""
+        table = _numbers(control)
+        if table is not None and table.ndim == 1 and len(self.names) == 1:
+            table = table[:, None]
+        count, n = len(self.times), len(self.names)
+        if table is None or table.ndim != 2 or table.shape[1] != n or len(table) < count:
+            raise SimulationError(
+                f"control: expected a function of (t, q, v), or a table of {count} samples × {n} inputs "
+                f"({', '.join(self.names)}), got {'shape ' + str(table.shape) if table is not None else repr(control)}."
+            )
+        return lambda t, q, v: table[len(self.values)]
+
+    def at(self, k: int, t: Scalar, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Values (n_u,) of sample k; the law is called on the first request.
+
+        Raises
+        ------
+        SimulationError
+            If the law does not return a finite number for each input.
+        """
+        if k == len(self.values):
+            self.values.append(checked_inputs(self.law(t, q, v), self.names, t))
+        return self.values[k]
+
+    def hold_end(self, k: int) -> float:
+        """Time at which sample k ends [s]."""
+        return float(self.times[k + 1]) if k + 1 < len(self.times) else self.end
+
+    def recorded(self) -> System:
+        """System with drives by the values so far: that of the trajectory."""
+        values, times = np.array(self.values).reshape(-1, len(self.names)), self.times[: len(self.values)]
+        return driven_as(self.system, {name: RecordedInput(times, values[:, k]) for k, name in enumerate(self.names)})
+
+
+class RecordedInput:
+    """Piecewise constant law of time.
+
+    Parameters
+    ----------
+    times, values : ndarray, shape (k,)
+        Times [s] from which each value holds; the first holds before, too.
+    """
+
+    def __init__(self, times: np.ndarray, values: np.ndarray):
+        self.times, self.values = times, values
+
+    def __call__(self, t) -> float:
+        """Value at a time [s]."""
+        k = int(np.searchsorted(self.times, float(t), side="right")) - 1
+        return float(self.values[max(k, 0)]) if self.values.size else 0.0
+
+
+def driven_as(system: System, laws: dict[str, Callable]) -> System:
+    """System of the scene with drives for its inputs, whose laws are given by name."""
+    return compile_scene(driven_scene(system.scene, laws))
+
+
+def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
+    """Values (n_u,) of inputs as a law returned them.
+
+    Raises
+    ------
+    SimulationError
+        If they are not a finite number for each input.
+    """
+    found = _numbers(value)
+    if found is None or found.size != len(names):
+        expected = f"{len(names)} numbers ({', '.join(names)})" if len(names) > 1 else f"a number ({names[0]})"
+        raise SimulationError(f"t = {t:.6g} s: the control law returned {value!r}; expected {expected}.")
+    found = found.reshape(-1)
+    if not np.isfinite(found).all():
+        k = int(np.flatnonzero(~np.isfinite(found))[0])
+        raise SimulationError(f"t = {t:.6g} s: input {names[k]!r} is {found[k]}; expected a finite number.")
+    return found
+
+
+def _numbers(value) -> np.ndarray | None:
+    """Array of numbers; None of anything else."""
+    try:
+        found = np.asarray(value)
+    except ValueError:  # ragged
+        return None
+    return found.astype(float) if found.dtype.kind in "biuf" else None
+
+
+def _called(law: Callable) -> Callable:
+    """Law (t, q, v).
+
+    Raises
+    ------
+    SimulationError
+        If it cannot be called with three arguments.
+    """
+    try:
+        inspect.signature(law).bind(0.0, (), ())
+    except TypeError:
+        raise SimulationError(f"control: a law is called as law(t, q, v); {law!r} takes other arguments.") from None
+    except ValueError:  # a builtin that hides its signature
+        pass
+    return law

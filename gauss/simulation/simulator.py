@@ -1,0 +1,334 @@
+"""Simulator: a motion that Python advances step by step, in machine code, with the inputs of its choice.
+
+The step loops are those of :func:`gauss.simulate`: a step of this module is, bit for bit, a step of such a motion.
+"""
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import replace
+from math import isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.arguments import named_arguments
+from gauss.codegen import Kernel, one_tier, write
+from gauss.codegen.kernels import Due, LoopStatus, address
+from gauss.dynamics.conditions import smooth_question
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.switching import Switching
+from gauss.dynamics.outputs import INERTIAL, measured, shape_of
+from gauss.dynamics.plan import plan_of
+from gauss.dynamics.store import cached_on_disk
+from gauss.errors import SimulationError, require
+from gauss.integrators import FixedStep, Point
+from gauss.scene import Scene
+from gauss.simulation.arguments import checked_problem
+from gauss.simulation.compiled_fixed_run import CompiledFixedRun
+from gauss.simulation.held_inputs import HeldInputs, checked_inputs
+from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
+from gauss.simulation.problem import Problem
+from gauss.simulation.step_limits import steps_per_check
+from gauss.system import State, System, retract
+
+FAILURES = {
+    LoopStatus.UNCONFIRMED: "the check does not confirm the accelerations",
+    LoopStatus.OFF_CONSTRAINTS: "the projection onto the constraints failed",
+    LoopStatus.UNSOLVED: "the equations of the step were not solved",
+}
+
+
+class SimulatorState(NamedTuple):
+    """State of a simulator, opaque.
+
+    Attributes
+    ----------
+    point, control : bytes
+        Point of the motion and record of its loop.
+    begun : float
+        Time of the state that the motion began from [s].
+    steps : int
+        Steps since then.
+    """
+
+    point: bytes
+    control: bytes
+    begun: float
+    steps: int
+
+
+class Simulator:
+    """Motion of a scene in fixed steps, one call after the other.
+
+    Steps do not end where laws of time switch; prescribed velocities must not jump.
+
+    Parameters
+    ----------
+    scene : Scene or System
+        Scene, or a compiled one. Its inputs are set by :meth:`step`.
+    step : float
+        Step [s].
+    integrator : str, optional
+        Fixed-step method of :func:`gauss.simulate`; "time_stepping" for scenes with contacts, friction or limited forces,
+        "rk4" for all others when not given.
+    stabilisation : str
+        Constraint stabilisation, see :func:`gauss.simulate`.
+
+    Attributes
+    ----------
+    system : System
+        The system.
+    step_size : float
+        Step [s].
+    inputs, output_names : tuple of str
+        Names of the inputs and of the outputs of the scene.
+
+    Raises
+    ------
+    SimulationError
+        If the method has no fixed step, or the steps are not compiled, with the reasons.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> scene = gauss.load("cart_pole")
+    >>> scene.input("push", "rail", limits=10.0).name
+    'push'
+    >>> sim = gauss.Simulator(scene, step=1e-3)
+    >>> sim.step([2.0], n=100)
+    >>> round(sim.t, 9)
+    0.1
+    """
+
+    @named_arguments
+    def __init__(self, scene: Scene | System, step: float, integrator: str | None = None, stabilisation: str = "projection"):
+        require(scene, (Scene, System), "Simulator")
+        whole = scene if isinstance(scene, Scene) else scene.scene
+        integrator = integrator or ("time_stepping" if whole.nonsmooth else "rk4")
+        with one_tier():
+            problem = checked_problem(
+                scene, step, integrator, step, 1e-12, None, "auto", stabilisation, None, None, (), False
+            )
+            self.system, self.step_size, method = problem.system, float(step), problem.method
+            self.inputs, self.output_names = tuple(whole.inputs), tuple(whole.outputs)
+            if not isinstance(method, FixedStep):
+                raise SimulationError(f"integrator {integrator!r} chooses its steps; a Simulator has fixed ones: use 'rk4'.")
+            if self.inputs:
+                problem = problem._replace(held=HeldInputs(self.system, _zero(len(self.inputs)), 1.0, 0.0, 1.0))
+            plan = plan_of(problem.question)
+            if plan.dynamics != "compiled" or plan.driver not in ("compiled loop", "time stepping"):
+                raise SimulationError(f"steps of {whole.name!r} are not compiled: {'; '.join(map(str, plan.rejected))}.")
+            if problem.switching.jumps:
+                raise SimulationError(f"prescribed velocities of {whole.name!r} jump; use gauss.simulate.")
+            problem = problem._replace(switching=Switching())
+            self._run = run = _run_of(problem)
+            self._loop = run.prepared().entry
+        self._start, self._layout = problem.start, run.layout
+        self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
+        n_u = len(self.inputs)
+        self._u = self._point[run.layout.size - n_u :]
+        self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
+        run.control.every = steps_per_check(method.evaluations)
+        self._begun, self._steps = 0.0, 0
+        self._measure: Kernel | None = None
+        self._bind()
+        self.reset()
+
+    def _bind(self):
+        """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
+        arrays = [ctypes.c_void_p(address(array)) for array in (self._point, self._confirmed, self._grid, self._out)]
+        self._given = ctypes.byref(self._run.control), *arrays
+        self._times = self._grid[:, 0]
+
+    def reset(self, state: State | None = None, *, seed: int | None = None, spread: float = 0.05) -> State:
+        """Begin anew; inputs are zero until the next step.
+
+        Parameters
+        ----------
+        state : State, optional
+            Initial state, projected onto the constraints; that of the scene when not given.
+        seed : int, optional
+            Seed of a random change of that state: displacements and rates are uniform up to ``spread``.
+        spread : float
+            Largest random change of coordinates [rad, m] and of rates [rad/s, m/s].
+
+        Returns
+        -------
+        State
+            The initial state.
+
+        Raises
+        ------
+        AssemblyError
+            If the constraints cannot be met from there.
+        StateError
+            If the state does not fit the system.
+        """
+        start, run = self._start, self._run
+        if state is not None:
+            require(state, (State,), "reset: state")
+            start = self.system.projected(state)
+        if seed is not None:
+            change = np.random.default_rng(seed).uniform(-spread, spread, (2, self.system.n_v))
+            start = self.system.projected(State(start.t, retract(self.system, start.q, change[0]), start.v + change[1]))
+        self._u[:] = 0.0
+        run.inputs = self._u
+        rates = run.evaluated(start)
+        self._point[:] = run.layout.pack(
+            Point(start, np.zeros(3), rates, run.method_state), self._u if self.inputs else None
+        )
+        self._confirmed[:] = self._point
+        self._begun, self._steps = float(start.t), 0
+        run.control.steps = run.control.status = 0.0
+        return self.state
+
+    def step(self, u=None, n: int = 1):
+        """Make steps under values of the inputs.
+
+        Parameters
+        ----------
+        u : array_like, shape (n_u,), optional
+            Values of the inputs [N m, N], cut off at their limits, in the order of ``inputs``; the last ones when not
+            given.
+        n : int
+            Number of steps.
+
+        Raises
+        ------
+        SimulationError
+            If a value is not finite, or a step fails; the message says why. After a failed step the state is that before
+            it.
+        """
+        if u is not None:
+            self._set(u)
+        if n == 1:
+            self._steps += 1
+            self._times[0] = self._begun + self._steps * self.step_size
+        else:
+            self._plan_steps(n)
+        self._loop.call(*self._given, n)
+        if self._run.control.status:
+            self._recover(n)
+
+    def _set(self, u):
+        try:
+            self._u[:] = u
+        except (TypeError, ValueError):
+            self._u[:] = checked_inputs(u, self.inputs, self.t)
+        if not isfinite(self._u @ self._u):
+            checked_inputs(self._u.copy(), self.inputs, self.t)
+        if self._run.method.starts_from_accelerations:  # its method state holds those under the inputs before
+            point = self._layout.point(self._point)
+            rates = self._run.evaluated(point.state)
+            self._point[:] = self._layout.pack(replace(point, rates=rates, method_state=rates.acceleration), self._u.copy())
+
+    def _plan_steps(self, n: int):
+        """Write the ends of steps to the grid."""
+        if n < 1:
+            raise SimulationError(f"n: expected a positive number of steps, got {n!r}.")
+        if n > len(self._grid):
+            self._grid = _unchecked(n)
+            self._bind()
+        self._times[:n] = self._begun + self.step_size * np.arange(self._steps + 1, self._steps + n + 1)
+        self._steps += n
+
+    def _recover(self, n: int):
+        """Repeat steps of contacts in Python; raise a SimulationError where a step has failed."""
+        control, ends, before = self._run.control, self._times[:n].copy(), self._steps - n
+        while control.status:
+            status, control.status = LoopStatus(int(control.status)), 0.0
+            reached = int(np.searchsorted(ends, self._point[0], side="right"))
+            self._steps = before + reached
+            if status != LoopStatus.UNSOLVED or not isinstance(self._run, CompiledMoreauRun):
+                raise SimulationError(f"t = {self.t:.6g} s: {FAILURES.get(status, status.name)}; shorten the step.")
+            self._point[:] = self._run.repeated(self._point, float(ends[reached]))
+            rest = ends[reached + 1 :]
+            self._steps, self._times[: rest.size] = before + n, rest
+            if rest.size:
+                self._loop.call(*self._given, rest.size)
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return float(self._point[0])
+
+    @property
+    def state(self) -> State:
+        """State, a copy."""
+        n_q = self.system.n_q
+        q, v = self._point[1 : 1 + n_q].copy(), self._point[1 + n_q : 1 + n_q + self.system.n_v].copy()
+        return State(float(self._point[0]), q, v)
+
+    @property
+    def work(self) -> np.ndarray:
+        """Work (3,) of drives and of forces on bodies, energy lost in dampers, since the start [J]."""
+        return self._point[self._layout.row - 3 : self._layout.row].copy()
+
+    @property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """Values of the outputs of the scene; accelerations of contacts are means over the last step."""
+        values, found = self.output_vector(), {}
+        for name, output in self.system.scene.outputs.items():
+            shape = shape_of(output, self.system)
+            size = int(np.prod(shape))
+            found[name], values = values[:size].reshape(shape), values[size:]
+        return found
+
+    def output_vector(self) -> np.ndarray:
+        """Values (m,) of all outputs in a row."""
+        if self._measure is None:
+            self._measure = _output_kernel(self._run, self.system)
+        return self._measure(self._point)
+
+    def snapshot(self) -> SimulatorState:
+        """Present state of the simulator, to the last bit; of the same scene and step, any simulator can restore it."""
+        return SimulatorState(self._point.tobytes(), bytes(self._run.control), self._begun, self._steps)
+
+    def restore(self, snapshot: SimulatorState):
+        """Continue from a snapshot.
+
+        Raises
+        ------
+        SimulationError
+            If it is of another system.
+        """
+        point = np.frombuffer(snapshot.point)
+        if point.shape != self._point.shape:
+            raise SimulationError("restore: the snapshot is of another system.")
+        self._point[:] = point
+        ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
+        self._begun, self._steps = snapshot.begun, snapshot.steps
+
+
+def _run_of(problem: Problem) -> CompiledFixedRun:
+    """Machine code of the steps of a problem, and the functions beside it."""
+    assert isinstance(problem.method, FixedStep)
+    if problem.method.nonsmooth:
+        return CompiledMoreauRun(problem, smooth_question(problem.question).laws)
+    return CompiledFixedRun(problem)
+
+
+def _unchecked(n: int) -> np.ndarray:
+    """Grid (n, 2) of steps that are checked every few steps, not where a call ends."""
+    return np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
+
+
+def _zero(count: int) -> Callable:
+    """Control law of zero inputs."""
+    return lambda t, q, v: np.zeros(count)
+
+
+def _output_kernel(run: CompiledFixedRun, system: System) -> Kernel:
+    """Machine code of a point → values of all outputs."""
+    program, outputs = run.program, tuple(system.scene.outputs.values())
+    of_step = run.method.nonsmooth  # mean accelerations over the step, those of impacts included
+
+    def values(x):
+        point = program.layout.point(x)
+        asked = any(output.kind in INERTIAL for output in outputs) and not of_step
+        rates = program.evaluate(point.state) if asked else point.rates
+        motion = kinematics(program.system, point.state)
+        return tuple(measured(output, motion, rates.acceleration) for output in outputs)
+
+    make = lambda: Kernel(write(values, program.layout.size, name="outputs"), batch=False)  # noqa: E731
+    return cached_on_disk(program.system, (_output_kernel, run.kind, run.key), make, system)

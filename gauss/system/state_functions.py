@@ -1,0 +1,214 @@
+"""Functions of a state, on a system: mass matrix, forces, frames, Jacobians, momentum, energies; one state or a batch.
+
+Each is called with arrays of coordinates q (…, n_q) and rates v (…, n_v): numpy's, of any strides, or those of other
+libraries on the CPU, whose memory is shared (DLPack). Results are new arrays, or ``out``. Machine code is made by the first
+call. A function that is kept, ``f = system.mass_matrix``, is called by Python without an intermediate.
+
+| | gauss | Pinocchio | MuJoCo |
+|---|---|---|---|
+| order of spatial vectors | angular, linear | linear, angular | angular, linear |
+| ``"local_world_aligned"`` (default) | world axes, at the origin of the frame | ``LOCAL_WORLD_ALIGNED`` | ``mj_jac`` |
+| ``"world"`` | world axes, at the origin of the world | ``WORLD`` | – |
+| ``"local"`` | axes and origin of the frame | ``LOCAL`` | – |
+| quaternions | (w, x, y, z) | (x, y, z, w) | (w, x, y, z) |
+| rates of a free joint | linear: axes of the parent; angular: of the child | both: of the child | as gauss |
+| mass matrix | ``mass_matrix(q)`` | ``crba`` | ``mj_fullM`` |
+| bias forces, C v + g | ``bias_forces(q, v)`` | ``nonLinearEffects`` | ``qfrc_bias`` |
+| gravity | ``gravity_forces(q)`` | ``computeGeneralizedGravity`` | ``qfrc_bias`` at rest |
+| Coriolis matrix, Ṁ = C + Cᵀ | ``coriolis_matrix(q, v)`` | ``computeCoriolisMatrix`` | – |
+| frame | ``forward_kinematics(q, frame)`` | ``framesForwardKinematics`` | ``xmat``, ``xpos`` |
+| its Jacobian | ``jacobian(q, frame)`` | ``computeFrameJacobian`` | ``mj_jac`` |
+| and the rate of this | ``jacobian_rate(q, v, frame)`` | ``getFrameJacobianTimeVariation`` | ``mj_jacDot`` |
+| momentum about the centre of mass | ``momentum(q, v)`` | ``computeCentroidalMomentum`` | ``subtree_angmom`` |
+| accelerations | ``forward_dynamics(q, v, load)`` | ``aba`` | ``mj_forward`` |
+| efforts | ``inverse_dynamics(q, v, acceleration)`` | ``rnea`` | ``mj_inverse`` |
+
+Where joints close loops, coordinates and rates of all joints are arguments, terms are those of the spanning tree, and
+columns of joints outside the tree are zero. ``independent=`` names as many joints, or rates such as "U.angle1", as there are
+degrees of freedom: v = N ẏ for their rates ẏ, and terms are projected on the constraints: Nᵀ M N, J N.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from gauss.errors import ArgumentError
+
+LOCAL_WORLD_ALIGNED = "local_world_aligned"
+
+
+class CompiledFunction:
+    """Attribute of a system: a compiled function, made when it is first asked for and kept with the system.
+
+    Parameters
+    ----------
+    doc : str
+        Its description.
+    of_frame : bool
+        Whether it is a function of a frame.
+    """
+
+    def __init__(self, doc: str, of_frame: bool = False):
+        self.__doc__, self.of_frame = doc, of_frame
+
+    def __set_name__(self, owner: type, name: str):
+        """Keep the name of the attribute."""
+        self.name = name
+
+    def __get__(self, system, owner: type | None = None) -> Any:
+        """The function of a system."""
+        if system is None:
+            return self
+        if self.of_frame:
+            made: Callable = FrameFunction(system, self.name)
+        elif system.has_closures:
+            made = ConstrainedFunction(system, self.name)
+        else:
+            made = system.function(self.name)
+        system.__dict__[self.name] = made
+        return made
+
+
+class ConstrainedFunction:
+    """Function of a state of a system with loops: ``f(*vectors, independent=None, out=None, t=0.0)``.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    name : str
+        Name of the function.
+    """
+
+    def __init__(self, system, name: str):
+        self.system, self.name = system, name
+        self.of_trees = None if name == "null_space" else system.function(name)
+
+    def __call__(self, *vectors, independent=None, **options):
+        """Its results, for independent coordinates if these are given."""
+        if independent is None and self.of_trees is not None:
+            return self.of_trees(*vectors, **options)
+        return self.system.function(self.name, independent=independent)(*vectors, **options)
+
+
+class FrameFunction:
+    """Function of a state and a frame: ``f(*vectors, frame, reference=…, independent=None, out=None, t=0.0)``.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    name : str
+        Name of the function.
+    """
+
+    def __init__(self, system, name: str):
+        self.system, self.name = system, name
+        self.found: dict[tuple, Callable] = {}  # by frame and axes
+
+    def __call__(self, *arguments, frame=None, reference=LOCAL_WORLD_ALIGNED, independent=None, **options):
+        """Its results; the frame is the last of the arguments, or given by name."""
+        if frame is None:
+            if not arguments or not isinstance(arguments[-1], str):
+                names = ", ".join(map(repr, self.system.frames))
+                raise ArgumentError(f"{self.name}: expected the name of a frame after the vectors, one of {names}.")
+            arguments, frame = arguments[:-1], arguments[-1]
+        if independent is not None:
+            return self.system.function(f"{self.name}:{frame}", reference=reference, independent=independent)(
+                *arguments, **options
+            )
+        found = self.found.get((frame, reference))
+        if found is None:
+            found = self.found[frame, reference] = self.system.function(f"{self.name}:{frame}", reference=reference)
+        return found(*arguments, **options)
+
+
+class StateFunctions:
+    """Functions of a state of a system; see the table of :mod:`gauss.system.state_functions`."""
+
+    mass_matrix = CompiledFunction(
+        "``f(q, independent=None, out=None, t=0.0)``: joint-space inertia M (…, n_v, n_v) [kg m², kg m, kg]."
+    )
+    bias_forces = CompiledFunction(
+        "``f(q, v, independent=None, out=None, t=0.0)``: Coriolis, centrifugal and gravity forces C v + g (…, n_v) [N m, N]."
+    )
+    gravity_forces = CompiledFunction(
+        "``f(q, independent=None, out=None, t=0.0)``: generalised forces g (…, n_v) that hold the bodies at rest [N m, N]."
+    )
+    coriolis_matrix = CompiledFunction(
+        "``f(q, v, independent=None, out=None, t=0.0)``: C (…, n_v, n_v) with C v the velocity forces and Ṁ = C + Cᵀ."
+    )
+    forward_kinematics = CompiledFunction(
+        "``f(q, frame, out=None, t=0.0)``: rotation (…, 3, 3) from a body frame or named frame to world, and its origin "
+        "(…, 3) [m].",
+        of_frame=True,
+    )
+    jacobian = CompiledFunction(
+        '``f(q, frame, reference="local_world_aligned", independent=None, out=None, t=0.0)``: J (…, 6, n_v); J v is the '
+        "angular velocity [rad/s] and the velocity [m/s] of a frame, in the axes and at the point of the reference.",
+        of_frame=True,
+    )
+    jacobian_rate = CompiledFunction(
+        '``f(q, v, frame, reference="local_world_aligned", independent=None, out=None, t=0.0)``: time derivative '
+        "(…, 6, n_v) of the Jacobian.",
+        of_frame=True,
+    )
+    center_of_mass = CompiledFunction("``f(q, out=None, t=0.0)``: centre of mass of all bodies (…, 3) in world [m].")
+    momentum = CompiledFunction(
+        "``f(q, v, out=None, t=0.0)``: moment of momentum about the centre of mass [N m s] and momentum [N s] (…, 6), in "
+        "world axes."
+    )
+    momentum_matrix = CompiledFunction(
+        "``f(q, independent=None, out=None, t=0.0)``: centroidal momentum matrix A (…, 6, n_v), A v is the momentum."
+    )
+    kinetic_energy = CompiledFunction("``f(q, v, out=None, t=0.0)``: kinetic energy (…) [J].")
+    potential_energy = CompiledFunction("``f(q, out=None, t=0.0)``: potential energy (…) of gravity and springs [J].")
+    null_space = CompiledFunction(
+        "``f(q, independent=…, out=None, t=0.0)``: N (…, n_v, k), v = N ẏ for the rates ẏ of k independent coordinates."
+    )
+
+    def function(self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None) -> Callable:
+        """Compiled function of a state; several names give one function of all, which computes common operations once.
+
+        Parameters
+        ----------
+        *names : str
+            Names of functions of this table, "inverse_dynamics", "loop_constraints"; those of frames with the frame, as in
+            "jacobian:hand".
+        reference : str
+            Axes and point of Jacobians: "local_world_aligned", "world" or "local".
+        independent : sequence of str, optional
+            Joints, or rates such as "U.angle1", as many as degrees of freedom: terms projected on the constraints.
+
+        Returns
+        -------
+        callable
+            ``f(q, out=None, t=0.0)``, with v and acceleration after q where a name needs them; vectors, or batches (n, …) of
+            them. It returns the results, in the order of the names.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such function or reference.
+        StateError
+            If there is no such frame or joint, or the coordinates cannot be independent.
+        """
+        return self.mechanics.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
+
+    def evaluate(
+        self, names, q, v=None, acceleration=None, *, t=0.0, reference=LOCAL_WORLD_ALIGNED, independent=None
+    ) -> dict:
+        """Results of several functions of one state, or of a batch, by their names; see :meth:`function`.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Names of functions.
+        q, v, acceleration : array_like, shape (…, n_q), (…, n_v), (…, n_v)
+            Coordinates, rates, accelerations; those that the functions need.
+        t : float or array_like
+            Time [s].
+        reference, independent
+            As of :meth:`function`.
+        """
+        given = {"q": q, "v": v, "acceleration": acceleration}
+        return self.mechanics.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]

@@ -1,0 +1,295 @@
+"""Functions of a state agree with Pinocchio and MuJoCo, with each other, with derivatives; batches with single states."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.dynamics.kinematics import kinematics
+from gauss.errors import ArgumentError, StateError
+from gauss.system import State, random_state, retract
+from tests.support import mechanisms
+
+AGREEMENT = 1e-12  # relative to the largest entry, of sums in another order
+OF_STEPS = 1e-7  # of central differences, relative
+STEP = 1e-5
+OF_Q = "mass_matrix", "gravity_forces", "center_of_mass", "momentum_matrix", "potential_energy"
+OF_Q_V = "bias_forces", "coriolis_matrix", "momentum", "kinetic_energy"
+REFERENCES = "world", "local", "local_world_aligned"
+TREES = {
+    "tree of all kinds": lambda: gauss.load("random_tree", n=6, seed=0),
+    "balls": lambda: mechanisms.two_bodies("ball"),
+    "reversed": mechanisms.three_bodies,
+}
+QUICK_ROBOTS = ("panda",)
+ROBOTS = ("ur5", "talos", "kinova", "anymal", "hyq", "tiago", "double_pendulum", "allegro_left_hand", "solo12", "baxter")
+LOOPS = {"four-bar": ("four_bar", "A"), "bricard": ("bricard", "J1"), "slider-crank": ("slider_crank", "A")}
+
+
+def relative(found, expected) -> float:
+    """Largest difference relative to the largest entry."""
+    return np.abs(np.asarray(found) - expected).max() / max(np.abs(expected).max(), 1e-300)
+
+
+def names(system) -> list[str]:
+    """All functions of a system, for its last frame."""
+    frame = list(system.frames)[-1]
+    return [*OF_Q, *OF_Q_V, *(f"{name}:{frame}" for name in ("forward_kinematics", "jacobian", "jacobian_rate"))]
+
+
+def by_pinocchio(system, state, frame, reference):
+    """The same functions by Pinocchio, in the rates and the order of gauss."""
+    import pinocchio as pin
+
+    from gauss.analysis.crosscheck.pinocchio_ import twin
+
+    pair = twin(system)
+    at, model, placed = pair.configuration(state), pair.model, system.frame(frame)
+    side = pair._side(placed.body, placed.R, placed.p)
+    probe = model.addFrame(pin.Frame("probe", side.joint, 0, side.central, pin.FrameType.OP_FRAME))
+    data, axes = model.createData(), getattr(pin, reference.upper())
+    T, turn = at.T, lambda A: np.concatenate([A[3:], A[:3]])  # noqa: E731
+    slow = pair.configuration(State(0.0, retract(system, state.q, -STEP * state.v), state.v)).T
+    fast = pair.configuration(State(0.0, retract(system, state.q, STEP * state.v), state.v)).T
+    T_rate = (fast - slow) / (2 * STEP)
+    pin.crba(model, data, at.q)
+    M = np.triu(data.M) + np.triu(data.M, 1).T
+    pin.computeJointJacobiansTimeVariation(model, data, at.q, at.v)
+    pin.framesForwardKinematics(model, data, at.q)
+    J, J_rate = (f(model, data, probe, axes).copy() for f in (pin.getFrameJacobian, pin.getFrameJacobianTimeVariation))
+    C = pin.computeCoriolisMatrix(model, data, at.q, at.v).copy()
+    found = {
+        "mass_matrix": T.T @ M @ T,
+        "gravity_forces": T.T @ pin.computeGeneralizedGravity(model, data, at.q),
+        "coriolis_matrix": T.T @ (C @ T + M @ T_rate),
+        "bias_forces": T.T @ pin.rnea(model, data, at.q, at.v, at.bias),
+        "center_of_mass": pin.centerOfMass(model, data, at.q).copy(),
+        "kinetic_energy": pin.computeKineticEnergy(model, data, at.q, at.v),
+        "momentum_matrix": turn(pin.computeCentroidalMap(model, data, at.q) @ T),
+        "momentum": turn(pin.computeCentroidalMomentum(model, data, at.q, at.v).vector),
+        "forward_kinematics": (data.oMf[probe].rotation.copy(), data.oMf[probe].translation.copy()),
+        "jacobian": turn(J @ T),
+        "jacobian_rate": turn(J_rate @ T + J @ T_rate),
+    }
+    if any(joint.map.model.shortname() == "JointModelComposite" for joint in pair.tree_joints):
+        del found["coriolis_matrix"], found["jacobian_rate"]  # Pinocchio's own C v + g is not its own rnea(q, v, 0) then
+    return found, AGREEMENT if np.abs(T_rate).max() == 0.0 else OF_STEPS
+
+
+def check_against_pinocchio(scene, references):
+    pytest.importorskip("pinocchio")
+    system = gauss.compile_scene(scene)
+    state = random_state(system, np.random.default_rng(0))
+    frame = list(system.frames)[-1]
+    for reference in references:
+        found = system.evaluate(names(system), state.q, state.v, reference=reference)
+        expected, of_rates = by_pinocchio(system, state, frame, reference)
+        for full, value in found.items():
+            name = full.partition(":")[0]
+            if name in expected:
+                pairs = (
+                    zip(value, expected[name], strict=True) if name == "forward_kinematics" else [(value, expected[name])]
+                )
+                tolerance = of_rates if name in ("coriolis_matrix", "jacobian_rate") else AGREEMENT
+                assert max(relative(*pair) for pair in pairs) <= tolerance, (name, reference)
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_trees_agree_with_pinocchio(name):
+    check_against_pinocchio(TREES[name](), REFERENCES)
+
+
+@pytest.mark.parametrize("name", [*QUICK_ROBOTS, *(pytest.param(name, marks=pytest.mark.slow) for name in ROBOTS)])
+def test_robots_agree_with_pinocchio(name):
+    check_against_pinocchio(gauss.load(f"robot:{name}", mimic=False), ["local"])
+
+
+@pytest.mark.parametrize("name", ["panda", pytest.param("ur5", marks=pytest.mark.slow)])
+def test_robots_agree_with_mujoco(name):
+    mujoco = pytest.importorskip("mujoco")
+    from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
+    from gauss.io.mjcf.write import to_mjcf
+
+    scene = gauss.load(f"robot:{name}", mimic=False)
+    system = gauss.compile_scene(scene)
+    state, body = random_state(system, np.random.default_rng(0)), list(scene.bodies)[-1]
+    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
+    data = mujoco.MjData(model)
+    limbs = [limb(system, *edge) for edge in spanning_tree(scene)[0]]
+    at = lambda v: mujoco_state(system, limbs, kinematics(system, State(0.0, state.q, v)))  # noqa: E731
+    data.qpos, data.qvel = at(state.v)
+    T = np.array([at(unit)[1] for unit in np.eye(system.n_v)]).T
+    mujoco.mj_forward(model, data)
+    M, J = np.zeros((model.nv, model.nv)), np.zeros((6, model.nv))
+    mujoco.mj_fullM(model, M, data.qM) if hasattr(data, "qM") else mujoco.mj_fullM(model, data, M)
+    M = M - np.diag(model.dof_armature)
+    mujoco.mj_jac(model, data, J[3:], J[:3], data.body(body).xpos, data.body(body).id)
+    found = system.evaluate(
+        ("mass_matrix", "bias_forces", f"forward_kinematics:{body}", f"jacobian:{body}"), state.q, state.v
+    )
+    rotation, position = found[f"forward_kinematics:{body}"]
+    assert relative(found["mass_matrix"], T.T @ M @ T) <= AGREEMENT
+    assert relative(found["bias_forces"], T.T @ data.qfrc_bias) <= AGREEMENT
+    assert relative(found[f"jacobian:{body}"], J @ T) <= AGREEMENT
+    assert relative(rotation, data.body(body).xmat.reshape(3, 3)) <= AGREEMENT
+    assert relative(position, data.body(body).xpos) <= AGREEMENT
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_the_terms_agree_with_each_other(name):
+    system = gauss.compile_scene(TREES[name]())
+    state = random_state(system, np.random.default_rng(1))
+    q, v, frame = state.q, state.v, list(system.frames)[-1]
+    M, C = system.mass_matrix(q), system.coriolis_matrix(q, v)
+    h, g = system.bias_forces(q, v), system.gravity_forces(q)
+    J, A = system.jacobian(q, frame), system.momentum_matrix(q)
+    motion = kinematics(system, state)
+    assert relative(C @ v + g, h) <= AGREEMENT
+    assert relative(v @ M @ v / 2, system.kinetic_energy(q, v)) <= AGREEMENT
+    assert relative(A @ v, system.momentum(q, v)) <= AGREEMENT
+    assert relative(J @ v, [*motion.angular_velocity(frame), *motion.velocity(frame)]) <= AGREEMENT
+    slow, fast = (retract(system, q, sign * STEP * v) for sign in (-1, 1))
+    rate = lambda f: (f(fast) - f(slow)) / (2 * STEP)  # noqa: E731
+    assert relative(C + C.T, rate(system.mass_matrix)) <= OF_STEPS
+    assert relative(system.jacobian_rate(q, v, frame), rate(lambda q: system.jacobian(q, frame))) <= OF_STEPS
+    assert relative(system.momentum(q, v)[3:], system.Phi[3::6].sum() * rate(system.center_of_mass)) <= OF_STEPS
+    assert rate(system.potential_energy) == pytest.approx(g @ v, rel=OF_STEPS)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(name):
+    scene, joint = LOOPS[name]
+    system = gauss.compile_scene(gauss.load(scene))
+    start = system.initial_state()
+    moved = start.q.copy()
+    moved[system.joint(joint).q] += 0.2
+    q = system.initial_state(moved, keep=[joint]).q
+    frame, column, which = list(system.frames)[-1], system.column(joint), {"independent": (joint,)}
+    N = system.null_space(q, **which)
+    v = 1.5 * N[:, 0]
+    _, K, _ = system.loop_constraints(q, v)
+    M, C, h, g, J, J_rate = system.function(
+        *("mass_matrix", "coriolis_matrix", "bias_forces", "gravity_forces", f"jacobian:{frame}", f"jacobian_rate:{frame}"),
+        **which,
+    )(q, v)
+    acceleration = system.accelerations(State(0.0, q, v))
+    projected = N.T @ (system.mass_matrix(q) @ acceleration + system.bias_forces(q, v))
+    assert N[column, 0] == 1.0 and np.abs(K @ N).max() <= 1e-12
+    assert relative(M, N.T @ system.mass_matrix(q) @ N) <= AGREEMENT
+    assert relative(J, system.jacobian(q, frame) @ N) <= AGREEMENT
+    assert np.abs(M[0] * acceleration[column] + h - projected).max() <= AGREEMENT * np.abs(h).max()
+    assert relative(C[0] * 1.5 + g, h) <= 1e-11
+    slow, fast = (system.projected(State(0.0, q + sign * STEP * v, v)).q for sign in (-1, 1))
+    rate = lambda f: (f(fast) - f(slow)) / (2 * STEP)  # noqa: E731
+    assert relative(2.0 * C, rate(lambda q: system.mass_matrix(q, **which))) <= 1e-6
+    assert relative(J_rate, rate(lambda q: system.jacobian(q, frame, **which))) <= 1e-6
+
+
+class Foreign:
+    """Array of another library on the CPU: its memory is shared by DLPack alone."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return gauss.compile_scene(TREES["tree of all kinds"]())
+
+
+def states(system, count):
+    rng = np.random.default_rng(2)
+    found = [random_state(system, rng) for _ in range(count)]
+    return np.array([state.q for state in found]), np.array([state.v for state in found])
+
+
+def test_a_batch_is_made_of_single_states_bit_for_bit(arm):
+    Q, V = states(arm, 13)
+    functions = [arm.bias_forces, arm.mass_matrix, arm.function(*names(arm)), arm.function("kinetic_energy")]
+    for f in functions:
+        given = (Q,) if f is arm.mass_matrix else (Q, V)
+        found, alone = f(*given), [f(*(x[k] for x in given)) for k in range(13)]
+        if isinstance(found, tuple):
+            for k, part in enumerate(found):
+                assert np.array_equal(part, [one[k] for one in alone])
+        else:
+            assert np.array_equal(found, alone)
+    assert arm.mass_matrix(Q[:0]).shape == (0, arm.n_v, arm.n_v)
+    assert np.array_equal(arm.mass_matrix(Q[:12].reshape(3, 4, -1)).reshape(12, arm.n_v, arm.n_v), arm.mass_matrix(Q[:12]))
+
+
+def test_arrays_of_any_strides_types_and_libraries_give_the_same(arm):
+    Q, V = states(arm, 9)
+    expected, wide = arm.bias_forces(Q, V), np.zeros((9, 2 * arm.n_q))
+    wide[:, ::2] = Q
+    unaligned = np.frombuffer(b"x" + Q.tobytes(), dtype=np.uint8)[1:].view(float).reshape(Q.shape)
+    for q in (wide[:, ::2], np.asfortranarray(Q), Q[::-1].copy()[::-1], unaligned, Q.tolist(), Foreign(Q), Q.astype(">f8")):
+        assert np.array_equal(arm.bias_forces(q, V), expected)
+    assert np.array_equal(arm.bias_forces(Q, V[0]), [arm.bias_forces(q, V[0]) for q in Q])
+    out, room = np.zeros_like(V), np.zeros((9, 2, arm.n_v))
+    assert arm.bias_forces(Q, V, out=out) is out and np.array_equal(out, expected)
+    arm.bias_forces(Q, V, out=room[:, 1])
+    assert np.array_equal(room[:, 1], expected) and not room[:, 0].any()
+    other = Foreign(np.zeros_like(V))
+    assert arm.bias_forces(Q, V, out=other) is other and np.array_equal(other.array, expected)
+    rates = V.copy()
+    assert np.array_equal(arm.bias_forces(Q, rates, out=rates), expected)  # over one of the arguments
+    parts = np.zeros((9, 3, 3)), np.zeros((9, 3))
+    frame = list(arm.frames)[-1]
+    assert arm.forward_kinematics(Q, frame, out=parts) is parts
+    assert all(np.array_equal(*pair) for pair in zip(parts, arm.forward_kinematics(Q, frame), strict=True))
+
+
+def test_quaternions_are_normalised_or_refused(arm):
+    Q, V = states(arm, 5)
+    place = next(iter(arm.quaternions.values()))
+    typed = Q.copy()
+    typed[3, place] *= 1 + 1e-7
+    assert relative(arm.bias_forces(typed, V), arm.bias_forces(Q, V)) <= AGREEMENT
+    typed[3, place] *= 2
+    with pytest.raises(StateError, match="has length 2, not 1") as refusal:
+        arm.bias_forces(typed, V)
+    assert refusal.value.__notes__ == ["in row 3 of the batch"]
+
+
+MISTAKES = {
+    "size": (lambda s, q, v: s.mass_matrix(q[1:]), StateError, r"q: expected \d+ numbers, or rows of them"),
+    "batches": (lambda s, q, v: s.bias_forces([q] * 2, [v] * 3), StateError, "batches of different lengths: q .2, "),
+    "rates": (lambda s, q, v: s.bias_forces(q, np.full_like(v, np.inf)), StateError, "v: expected .* finite numbers"),
+    "frame": (lambda s, q, v: s.jacobian(q, "hand"), StateError, "no body or frame 'hand'. Known: "),
+    "no frame": (lambda s, q, v: s.jacobian(q), ArgumentError, "jacobian: expected the name of a frame .* one of 'ground'"),
+    "axes": (lambda s, q, v: s.jacobian(q, "ground", reference="globe"), ArgumentError, "no axes 'globe'. Known: local, "),
+    "name": (lambda s, q, v: s.function("mass_matrx"), ArgumentError, "Did you mean 'mass_matrix'"),
+    "frame of none": (lambda s, q, v: s.function("mass_matrix:hand"), ArgumentError, "takes no frame, got 'hand'"),
+    "no coordinates": (lambda s, q, v: s.null_space(q), ArgumentError, "expected the names of independent joints"),
+    "few": (lambda s, q, v: s.function("mass_matrix", independent=()), StateError, r"expected \d+ different .* got none"),
+    "not reduced": (
+        lambda s, q, v: s.function("inverse_dynamics", independent="J"),
+        ArgumentError,
+        "does not exist for independent coordinates",
+    ),
+    "argument": (lambda s, q, v: s.evaluate("bias_forces", q), StateError, "bias_forces: expected v as well"),
+    "out": (lambda s, q, v: s.mass_matrix(q, out=np.zeros(3)), StateError, r"out: expected a writeable array of shape"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_mistakes_are_named(arm, case):
+    call, kind, words = MISTAKES[case]
+    (q,), (v,) = states(arm, 1)
+    with pytest.raises(kind, match=words):
+        call(arm, q, v)
+
+
+def test_coordinates_that_determine_nothing_are_refused():
+    system = gauss.compile_scene(gauss.load("slider_crank"))
+    start = system.initial_state()
+    with pytest.raises(StateError, match="guide do not determine the other rates in this state"):  # at the dead centre
+        system.null_space(start.q, independent="guide")
+    with pytest.raises(StateError, match="q does not meet the constraints, by "):
+        system.null_space(start.q + 0.1, independent="A")

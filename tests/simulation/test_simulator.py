@@ -1,0 +1,93 @@
+"""The simulator: its steps are those of simulate, bit for bit; snapshots, outputs, refusals."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.errors import SimulationError
+
+STEP = 1e-3
+ROUNDING = 1e-9  # of accelerations by two routes
+VALUES = np.sin(np.arange(5.0))
+MOTIONS = [
+    ("cart_pole", "rail", None),
+    ("cart_pole", "rail", "generalised_alpha"),
+    ("four_bar", "A", None),
+    ("friction_oscillator", "rail", None),
+]
+
+
+def simulator(model: str, joint: str, integrator: str | None) -> gauss.Simulator:
+    scene = gauss.load(model)
+    scene.input("u", joint, limits=0.7)
+    scene.output("felt", "accelerometer", list(scene.bodies)[-1])
+    scene.output("rate", "rate", joint)
+    return gauss.Simulator(scene, STEP, integrator)
+
+
+@pytest.mark.parametrize("model, joint, integrator", MOTIONS)
+def test_steps_are_those_of_simulate(model, joint, integrator):
+    sim = simulator(model, joint, integrator)
+    for u in VALUES:
+        sim.step([u], n=10)
+    integrator = integrator or ("time_stepping" if sim.system.scene.nonsmooth else "rk4")
+    motion = gauss.simulate(sim.system, 0.05, control=VALUES, rate=100.0, integrator=integrator, step=STEP)
+    assert sim.t == motion.t[-1]
+    for one, other in ((sim.state.q, motion.q[-1]), (sim.state.v, motion.v[-1]), (sim.work, motion.work[-1])):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("model, joint, integrator", MOTIONS)
+def test_a_restored_simulator_continues_bit_for_bit(model, joint, integrator):
+    sim = simulator(model, joint, integrator)
+    sim.reset(seed=5)
+    sim.step([0.3], n=7)
+    kept = sim.snapshot()
+    ends = []
+    for _ in range(2):
+        for u in VALUES:
+            sim.step([u])
+        ends.append((sim.t, *sim.state.q, *sim.state.v, *sim.output_vector()))
+        sim.restore(kept)
+    assert ends[0] == ends[1]
+
+
+def test_many_steps_in_one_call_are_single_steps():
+    one, many = (simulator("cart_pole", "rail", None) for _ in range(2))
+    one.step([0.5])
+    for _ in range(19):
+        one.step()
+    many.step([0.5], n=20)
+    np.testing.assert_array_equal(one.state.q, many.state.q)
+
+
+def test_outputs_are_those_of_the_accelerations():
+    sim = simulator("cart_pole", "rail", None)
+    sim.step([0.5], n=20)
+    felt, state = sim.outputs["felt"], sim.state
+    motion = gauss.simulate(sim.system, STEP, state=state, control=lambda t, q, v: 0.5, rate=1.0)
+    np.testing.assert_allclose(felt, motion.output("felt")[0], rtol=0.0, atol=ROUNDING)
+    assert sim.outputs["rate"] == state.v[0]
+
+
+def test_the_seed_decides_the_start():
+    sim = simulator("four_bar", "A", None)
+    starts = [sim.reset(seed=seed).q for seed in (1, 2, 1)]
+    assert np.array_equal(starts[0], starts[2]) and not np.array_equal(starts[0], starts[1])
+    phi, *_ = sim.system.loop_constraints(starts[0], np.zeros(sim.system.n_v))
+    assert np.abs(phi).max() <= ROUNDING
+
+
+@pytest.mark.parametrize("u, message", [([np.nan], "input 'u' is nan"), ([1.0, 2.0], "expected a number"), ("x", "number")])
+def test_invalid_inputs_are_refused(u, message):
+    with pytest.raises(SimulationError, match=message):
+        simulator("cart_pole", "rail", None).step(u)
+
+
+def test_scenes_without_a_compiled_step_are_refused():
+    scene = gauss.load("cart_pole")
+    scene.drive("rail", force=lambda t: float(t > 0.1))
+    with pytest.raises(SimulationError, match="cannot be traced"):
+        gauss.Simulator(scene, STEP)
+    with pytest.raises(SimulationError, match="fixed ones"):
+        gauss.Simulator(gauss.load("cart_pole"), STEP, "dop853")
