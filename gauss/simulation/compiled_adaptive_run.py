@@ -103,11 +103,10 @@ class CompiledAdaptiveRun(CompiledRun):
 
     def _started(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Packed point of a state, its check, and its first step, by machine code."""
-        tolerance, rates, inputs = self.problem.tolerance, 1 + q.size, 1 + q.size + v.size
-        given = np.empty(inputs + 3 + self.inputs.size)
-        given[0], given[1:rates], given[rates:inputs] = t, q, v
-        given[inputs : inputs + 3] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
-        given[inputs + 3 :] = self.inputs
+        tolerance, given = self.problem.tolerance, np.empty(4 + q.size + v.size + len(self.inputs))
+        end = 1 + q.size + v.size
+        given[0], given[1 : 1 + q.size], given[1 + q.size : end], given[end + 3 :] = t, q, v, self.inputs
+        given[end], given[end + 1], given[end + 2] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         return self.loop.evaluate("start", given)
 
     def _renew(self):

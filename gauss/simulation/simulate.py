@@ -1,7 +1,6 @@
 """Simulation of a motion: check the arguments, select the plan, and let its driver compute the trajectory."""
 
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -195,5 +194,4 @@ def _again(problem: Problem, plan: Plan, step, tolerance, samples, mesh=()) -> T
 
 def _recorded(problem: Problem, found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
     """Trajectory with its settings and its plan, and with the system of its inputs."""
-    found = found.with_settings(settings, plan)
-    return found if problem.held is None else replace(found, system=problem.held.recorded())
+    return found.recorded(found.system if problem.held is None else problem.held.recorded(), settings, plan)

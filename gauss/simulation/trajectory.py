@@ -236,10 +236,11 @@ class Trajectory:
         span = f"{self.t[0]:.6g} … {self.t[-1]:.6g} s" if len(self) else "empty"
         return f"Trajectory({self.system.scene.name!r}, {len(self)} samples, {span})"
 
-    def with_settings(self, settings: dict, plan: Plan) -> "Trajectory":
-        """Trajectory with the arguments of the simulation, and with its plan."""
+    def recorded(self, system: System, settings: dict, plan: Plan) -> "Trajectory":
+        """Trajectory with the arguments of the simulation and its plan, of a system."""
         made = object.__new__(Trajectory)  # a fifth of the time of dataclasses.replace
-        made.__dict__.update(vars(self), settings=settings, stats=self.stats._replace(plan=plan))
+        fields = {name: value for name, value in vars(self).items() if name in Trajectory.__dataclass_fields__}
+        made.__dict__.update(fields, system=system, settings=settings, stats=self.stats._replace(plan=plan))
         return made
 
     def state(self, index: int) -> State:
