@@ -1,6 +1,7 @@
 """Simulation of a motion: check the arguments, select the plan, and let its driver compute the trajectory."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
