@@ -56,12 +56,29 @@ ELEMENTS: dict[str, Callable[[gauss.Scene, str, str], object]] = {
     "force, opaque": lambda scene, joint, body: scene.force("push", body, force=lambda t: (_opaque(t), 0.0, 0.0)),
     "spring": lambda scene, joint, body: scene.spring("spring", body, "ground", other_at=(3.0, 4.0, 5.0), stiffness=1.0),
 }
+
+
+def _shafts(count: int) -> gauss.Scene:
+    """Trains of five geared shafts."""
+    scene = gauss.Scene(f"{count} shafts")
+    for k in range(count):
+        scene.body(f"B{k}", 1.0, (0.1, 0.1, 0.15))
+        scene.revolute(f"J{k}", "ground", f"B{k}", at=(k, 0.0, 0.0))
+        if k % 5:
+            scene.couple(f"C{k}", f"J{k}", f"J{k - 1}", ratio=-1.1)
+        else:
+            scene.drive(f"J{k}", torque=0.1)
+    return scene
+
+
 LARGE = ALONE, "drive, traced", "drive, opaque", "drive of poses, traced", "force, traced", "force, opaque", "spring"
 SCENES: dict[str, tuple[Callable[[], gauss.Scene], tuple[str, ...]]] = {
     "chain of 7": (lambda: gauss.load("spatial_chain", n=7), tuple(ELEMENTS)),
     "chain of 40": (lambda: gauss.load("spatial_chain", n=40), tuple(ELEMENTS)),
     "chain of 41": (lambda: gauss.load("spatial_chain", n=41), tuple(ELEMENTS)),
     "chain of 100": (lambda: gauss.load("spatial_chain", n=100), LARGE),
+    "128 geared shafts": (lambda: _shafts(128), (ALONE,)),
+    "130 geared shafts": (lambda: _shafts(130), (ALONE,)),
     "four-bar": (lambda: gauss.load("four_bar"), tuple(ELEMENTS)),
     "hung chain of 140": (lambda: gauss.load("hung_chain", n=140), LARGE),
 }

@@ -11,10 +11,13 @@ contacts as stiff as its step bears, RK4, elliptic friction cones, Newton solver
 whatever the scene says. Its balls of the cradle rebound from springs without damping of 1e9 1/s², as it knows no
 restitution; with softer ones the shocks overlap. Both are called once for a whole motion; times are CPU times of one
 core, medians of interleaved rounds. Errors are those of the end: against closed forms of the block and the box, of the
-energy for the cradle. The last rows are single evaluations while the box rests on its points: machine code that checks
+energy for the cradle. Next come single evaluations while the box rests on its points: machine code that checks
 itself, the certified quadratic programme in Python, and ``mj_forward`` after 0.2 s of relaxation. Smooth phases and
 active-set kernels are compiled after some motions (tiered compilation); those that are timed come later. "first ms" is the
 first motion of all, with the machine code that it makes, or finds on the disk.
+
+The last scenes have many contacts: a stack, dominoes, balls that fall into a bin. Their error is the deepest penetration at
+the end [m], of boxes into the floor and of balls into each other and the walls.
 
 Writes benchmarks/results/contacts.md and .csv.
 """
@@ -29,6 +32,7 @@ import mujoco
 import numpy as np
 
 import gauss
+from benchmarks import free_bodies
 from benchmarks.command import command, load_at_the_end
 from gauss.bench.contest import Competitor, Contest, measure, repeated
 from gauss.bench.machine import header
@@ -161,6 +165,23 @@ def cradle() -> list[Way]:
     return [ours(name, scene, end, error), *peers]
 
 
+def many(name: str, scene, end: float, deepest: Callable) -> list[Way]:
+    """Free bodies with contacts; the error is the deepest penetration at the end [m]."""
+    way, step = ours(name, scene, end, lambda q, v: deepest(q.reshape(-1, 7)), 1e-3), 1e-3
+    return [way, theirs(name, scene, end, lambda q, v: deepest(q.reshape(-1, 7)), step)]
+
+
+def crowded() -> list[list[Way]]:
+    """A stack, dominoes that topple, balls that fall into a bin."""
+    wide = 0.28
+    return [
+        many("stack of 10 boxes", free_bodies.stack(10), 0.3, lambda q: free_bodies.box_depth(q, (free_bodies.EDGE,) * 3)),
+        many("10 dominoes", free_bodies.dominoes(10), 0.6, lambda q: free_bodies.box_depth(q, free_bodies.TILE)),
+        many("30 balls in a bin", free_bodies.bin_of_balls(30), 1.0, lambda q: free_bodies.ball_depth(q, free_bodies.WALL)),
+        many("100 balls in a bin", free_bodies.bin_of_balls(100, wall=wide), 0.6, lambda q: free_bodies.ball_depth(q, wide)),
+    ]
+
+
 def evaluations(corners: int) -> list[Way]:
     """Accelerations while the box rests on its points and is pulled with 10 N: 5 m/s²."""
     name, scene = f"accelerations of a box on {corners} points", gauss.load(f"box_on_plane_{corners}")
@@ -202,7 +223,7 @@ def evaluations(corners: int) -> list[Way]:
 def rows(rounds: int) -> list[dict]:
     """Rows of the table."""
     found = []
-    for power_flow in (block(), box(4), box(8), cradle(), evaluations(4), evaluations(8)):
+    for power_flow in (block(), box(4), box(8), cradle(), evaluations(4), evaluations(8), *crowded()):
         errors, first = {}, {}
         for way in power_flow:
             began = time.process_time()

@@ -11,6 +11,7 @@ from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.contact.free_body_step import free_body_stepper
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.gap_functions import gaps, with_gaps
 from gauss.dynamics.kinematics import kinematics
@@ -19,6 +20,7 @@ from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, 
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import contact_parts, step_at
+from gauss.system import sides
 
 UNDETERMINED_SHARE = 1e-9  # of the largest entry of the null space: a force with more of it is not unique
 
@@ -152,11 +154,18 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
     contacts = system.scene.contacts
     if name not in contacts:
         raise StateError(f"no unilateral constraint {name!r}. {did_you_mean(name, contacts)}")
-    places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
+    places = {side.name: i for i, side in enumerate(sides(system.scene))}
     return [places[side] for side in contacts[name].sides(system.scene)]
 
 
 def _parts(trajectory: Trajectory):
+    plan = trajectory.stats.plan
+    if plan is not None and plan.dynamics == "free bodies" and trajectory.step is not None:
+        stepper = free_body_stepper(trajectory.system)
+        stepper.forget()
+        for index in range(len(trajectory)):
+            yield stepper.forces_of(stepper.step(trajectory.state(index), trajectory.step))
+        return
     for index, motion in enumerate(trajectory.motions):
         yield contact_parts(motion, step_at(trajectory, index).force)
 

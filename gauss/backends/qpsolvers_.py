@@ -9,6 +9,8 @@ import qpsolvers
 from gauss.backends.programme import Outcome, Programme
 from gauss.errors import BackendError, did_you_mean
 
+# Solvers that qpsolvers lets factorise H in its place, unless that is stored by rows: the next call would have the factor.
+FACTORISING = ("pyqpmad",)
 ON_JAX = ("jaxopt_osqp", "qpax")
 
 
@@ -48,6 +50,8 @@ def converted(programme: Programme, solver: str) -> qpsolvers.Problem:
     dense = solver not in qpsolvers.sparse_solvers
     programme = programme if dense else programme.without_zeros()
     H, C, K = (m.toarray() if dense else m for m in (programme.H, programme.C, programme.K))
+    if solver in FACTORISING:
+        H = np.ascontiguousarray(H)
     return qpsolvers.Problem(
         H,
         programme.c,

@@ -18,9 +18,9 @@ HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative
 acceleration of a body or joint, is at most {RIGHT:g}, that of multipliers at most {WRONG:g}; of a problem without a
 solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for. **Claimed,
 beyond**: success was claimed, and a residual or the gap is above the tolerance and above rounding. **False verdict**:
-a problem is called infeasible or unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and
-quadprog. Error of multipliers: of the solver's own, row by row or constraint by constraint, without the directions
-that redundant rows leave open; a solver that gives none is off by 1. Errors are medians over all problems.
+a problem is called infeasible or unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS, KVXOPT,
+qpmad and quadprog. Error of multipliers: of the solver's own, row by row or constraint by constraint, without the
+directions that redundant rows leave open; a solver that gives none is off by 1. Errors are medians over all problems.
 
 Times are CPU times of calls from Python on a ready problem, set-up included: shifted geometric means over all
 problems, a problem that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least. Library:

@@ -49,7 +49,8 @@ def _name(content: tuple, first: bytes | None = None) -> str | None:
     if object_cache.folder() is None:
         return None
     parts = first or content_digest(content[0]), content_digest(*content[1:]), package_digest()
-    return None if None in parts else "made-" + hashlib.sha256(b"".join(parts)).hexdigest()
+    known = [part for part in parts if part is not None]
+    return "made-" + hashlib.sha256(b"".join(known)).hexdigest() if len(known) == len(parts) else None
 
 
 def _read(name: str, content: tuple):

@@ -27,6 +27,7 @@ class NativeFunction:
     """
 
     name: str
+    parameters: tuple[str, ...] = ()  # as of :class:`gauss.codegen.Function`
 
     @property
     def arity(self) -> tuple[int, int]:

@@ -9,8 +9,9 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
 from gauss.integrators import ExplicitPair, FixedStep
+from gauss.scene import Points
 from gauss.system import System, build, phase_scene, sides
-from gauss.system.build import slips
+from gauss.system.contact_gaps import of_shapes, slips
 from gauss.system.elimination_cost import MOST_WORK
 
 LARGE_TREE_BODIES = (
@@ -18,7 +19,7 @@ LARGE_TREE_BODIES = (
 )
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
 MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops are slower
-WIDEST = 128  # rates up to which the whole step is compiled; beyond, Python forms the step from compiled accelerations
+WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
 
@@ -95,9 +96,9 @@ def written_out(ask: Question) -> list[str]:
 
 
 def narrow(ask: Question) -> list[str]:
-    """The system is small enough for a compiled step."""
-    n_v = ask.system.n_v
-    return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST else []
+    """The step is explicit, or the system is small enough for a compiled one."""
+    n_v, is_explicit = ask.system.n_v, not (explicit(ask) or ask.drift.partitioned)
+    return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST and not is_explicit else []
 
 
 def explicit(ask: Question) -> list[str]:
@@ -139,6 +140,27 @@ def small_contact_problem(ask: Question) -> list[str]:
     return found + ([f"{n_v} rates beside contacts are more than {WIDEST_CONTACT}"] if n_v > WIDEST_CONTACT else [])
 
 
+def free_bodies_in_contact(ask: Question) -> bool:
+    """Whether contacts of shapes are all that acts on bodies that hang on free joints from the ground or are fixed to it."""
+    return _are_free(ask.system) and _touch_alone(ask.system.scene)
+
+
+def _are_free(system: System) -> bool:
+    """Whether all bodies that move are free, and have mass and inertia."""
+    kinds = ("free", "fixed")
+    free = all(joint.parent < 0 and joint.pair.kind in kinds for joint in system.joints)
+    moving = [joint.child for joint in system.joints if joint.pair.n_v]
+    return free and bool(moving) and bool(system.Phi.reshape(-1, 6)[moving].all())
+
+
+def _touch_alone(scene) -> bool:
+    """Whether contacts are the only loads and constraints, of shapes that are boxes or have a radius."""
+    if scene.loads or scene.relations or scene.couplings or scene.set_valued or not scene.contacts:
+        return False
+    sharp = any(isinstance(shape, Points) and not shape.radius for shape in scene.shapes.values())
+    return of_shapes(scene) and not sharp
+
+
 def smooth_system(system: System) -> System:
     """The system without unilateral and set-valued elements, built once."""
     make = lambda: build(phase_scene(system.scene), system.mechanics.anew())  # noqa: E731
@@ -158,4 +180,4 @@ def smooth_question(ask: Question) -> Question:
 
 def has_contacts(ask: Question) -> bool:
     """Whether there are unilateral constraints."""
-    return bool(ask.system.contacts.placed) and ask.system.dynamics is not None
+    return bool(ask.system.scene.contacts) and ask.system.dynamics is not None

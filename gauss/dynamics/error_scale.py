@@ -1,7 +1,9 @@
 """Scale of errors of accelerations: max(‖q̈‖, gravity / 1000, round-off of positions in stiff springs, ε ω²)."""
 
+from collections.abc import Iterator
 from contextlib import suppress
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -79,13 +81,20 @@ def spring_roundoff(system: System) -> float:
     return min((size for size in found if np.isfinite(size)), default=0.0)
 
 
-def consistent_states(system: System):
-    """States that meet the constraints: the start of the scene, and random ones around it."""
+def states_around(system: System) -> Iterator[State]:
+    """The start of the scene, and random states around it; they need not meet the constraints."""
     rng, start = np.random.default_rng(0), system.start()
     for size in (0.0, *np.full(STATES, AROUND)):
-        q = retract(system, start.q, size * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v))
+        yield replace(
+            start, q=retract(system, start.q, size * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v))
+        )
+
+
+def consistent_states(system: System) -> Iterator[State]:
+    """States that meet the constraints: the start of the scene, and random ones around it."""
+    for state in states_around(system):
         with suppress(GaussError):
-            yield system.initial_state(q, start.v)
+            yield system.initial_state(state.q, state.v)
 
 
 def _sensitivity(system: System, springs, state: State) -> float:

@@ -6,24 +6,54 @@ Rᵀ (a − g).
 
 import numpy as np
 
+from gauss.codegen import Function, write
 from gauss.dynamics.inverse_dynamics_residual import outward_accelerations
-from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.traced_system import Program
 from gauss.rotations import cross
-from gauss.scene import Output
+from gauss.scene import Output, Scene
 from gauss.system import System
 
 INERTIAL = ("acceleration", "accelerometer")  # kinds that depend on the accelerations
-SHAPES = {"rotation": (3, 3), "coordinate": None, "rate": None}  # of values; None: those of the joint, (3,) of all others
 
 
 def shape_of(output: Output, system: System) -> tuple[int, ...]:
     """Shape of the values of an output; () for a number."""
-    shape = SHAPES.get(output.kind, (3,))
-    if shape is not None:
-        return shape
-    pair = system.joint(output.of).pair
-    size = pair.n_q if output.kind == "coordinate" else pair.n_v
-    return () if size == 1 else (size,)
+    size = output.size(system.scene.joints)
+    return (3, 3) if output.kind == "rotation" else () if size == 1 else (size,)
+
+
+def split(vector: np.ndarray, scene: Scene) -> dict[str, np.ndarray]:
+    """Outputs (…, m) by name in a vector (…, n) of the values of all outputs."""
+    found, place = {}, 0
+    for name, output in scene.outputs.items():
+        size = output.size(scene.joints)
+        found[name], place = vector[..., place : place + size], place + size
+    return found
+
+
+def output_function(program: Program, scene: Scene, of_step: bool = False) -> Function:
+    """Function of a point → values of all outputs.
+
+    Parameters
+    ----------
+    program : Program
+        The system, with inputs where the scene has some.
+    scene : Scene
+        Scene with the outputs.
+    of_step : bool
+        Whether the accelerations are those that the point holds, of a step of contacts, instead of those of its state.
+    """
+    outputs = tuple(scene.outputs.values())
+    asked = not of_step and any(output.kind in INERTIAL for output in outputs)
+
+    def values(x):
+        point = program.layout.point(x)
+        rates = program.evaluate(point.state) if asked else point.rates
+        motion = kinematics(program.system, point.state)
+        return tuple(measured(output, motion, rates.acceleration) for output in outputs)
+
+    return write(values, program.layout.size, name="outputs")
 
 
 def measured(output: Output, motion: Kinematics, acceleration=None) -> np.ndarray:

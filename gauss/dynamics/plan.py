@@ -7,6 +7,7 @@ driver              dynamics        applies to
 ==================  ==============  =====================================================================================
 constant            none            scenes without degrees of freedom
 time stepping       compiled        ``integrator="time_stepping"``
+time stepping       free bodies     the same of bodies without joints between them, many contacts of shapes
 time stepping       certified       the same, where the dynamics cannot be compiled
 events              compiled        unilateral constraints, joint friction, limited forces, losses
 events              certified       the same, with an explicit backend
@@ -33,6 +34,7 @@ from gauss.dynamics.conditions import (
     contacts_alone,
     explicit,
     few_bodies,
+    free_bodies_in_contact,
     has_contacts,
     large_loops,
     large_tree,
@@ -116,6 +118,7 @@ MOTIONS = RuleTable(
     (
         Rule("constant", "none", when=lambda ask: not ask.system.n_v),
         Rule("time stepping", "compiled", "certified", is_time_stepping, _STEP),
+        Rule("time stepping", "free bodies", "", _both(is_time_stepping, free_bodies_in_contact), (own_backend,)),
         Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs,)),
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs,)),

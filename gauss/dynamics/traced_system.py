@@ -18,8 +18,8 @@ from gauss.dynamics.error_scale import (
     NEAR_SINGULAR_ROUNDOFF,
     acceleration_scale,
     centrifugal_scale,
-    consistent_states,
 )
+from gauss.dynamics.generic_rank import has_full_generic_rank
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 POSITION_STEPS = 2  # Newton steps in position after an integration step, on one factorisation
 FINITE_SUM = 1e300  # largest sum that counts as finite
 FINITE = float(np.finfo(float).max)  # limit of a sum of absolute values that no NaN and no infinity meets
-INDEPENDENT_PIVOT = 1e-4  # pivot of S, 1 for a row as on free bodies, above which the row is independent of the others
 
 
 class Kernels(NamedTuple):
@@ -116,10 +115,7 @@ class Program:
     @cached_property
     def has_full_rank(self) -> bool:
         """Whether the loop constraints have full rank at generic configurations: then small pivots mean a singular one."""
-        if not self.system.closes:
-            return False
-        mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in consistent_states(self.pattern))
-        return any(min(mechanism.pivots, default=0.0) > INDEPENDENT_PIVOT for mechanism in mechanisms)
+        return self.system.closes and has_full_generic_rank(self.pattern)
 
     @cached_property
     def has_redundant_rows(self) -> bool:

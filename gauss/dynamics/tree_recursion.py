@@ -64,8 +64,6 @@ def _recursion(system: System, name: str, steps: Callable, vectors, per_link: in
     names = sorted(set(kinds), key=kinds.index)
     parameters, built, record = _built(steps, joints, kinds, names, [link_numbers(links[edge.outer]) for edge in edges])
     place = {edge.outer: i for i, edge in enumerate(edges)} | {-1: -1}
-    starts = {vector: _starts(joints, vector) for vector in vectors}
-    starts["result"] = per_link * np.arange(len(joints)) if per_link else _starts(joints, "result")
     return TreeRecursion(
         name,
         {vector: system.n_q if vector == "q" else system.n_v for vector in vectors} | {"base": 6},
@@ -73,7 +71,7 @@ def _recursion(system: System, name: str, steps: Callable, vectors, per_link: in
         _passes(built),
         np.array([names.index(kind) for kind in kinds]),
         np.array([place[edge.inner] for edge in edges]),
-        starts,
+        _starts(joints, vectors, per_link),
         parameters,
         record,
         [(ACCELERATION + k, "base", k) for k in range(6)],
@@ -86,9 +84,11 @@ def _passes(built: dict) -> list[tuple[dict, bool]]:
     return [({kind: step for kind, (step, _) in enumerate(found)}, found[0][1]) for found in passes]
 
 
-def _starts(joints, vector: str) -> np.ndarray:
-    """First entry of every joint in a vector."""
-    return np.array([joint.q.start if vector == "q" else joint.v.start for joint in joints])
+def _starts(joints, vectors, per_link: int) -> dict[str, np.ndarray]:
+    """First entry of every joint in each vector and in the result."""
+    rates = np.array([joint.v.start for joint in joints])
+    found = {vector: np.array([joint.q.start for joint in joints]) if vector == "q" else rates for vector in vectors}
+    return found | {"result": per_link * np.arange(len(joints)) if per_link else rates}
 
 
 def _built(steps: Callable, joints, kinds: list[LinkKind], names: list[LinkKind], constants) -> tuple[list, dict, int]:

@@ -60,7 +60,7 @@ class CornerOnBox(FeaturePair):
 
     def fixed(self, at) -> "CornerOnBox | None":
         """Pair of the present face; None of a ball, whose distance is smooth."""
-        if self.shape.radius:
+        if self.shape.is_round:
             return None
         x = self._seen_from_box(at)
         axis = int(np.argmax(self._merits(at, x, np.abs(x) - _half(self.box))))
@@ -75,11 +75,11 @@ class CornerOnBox(FeaturePair):
 
     def _rim(self, at) -> float:
         """Width of a face beyond its rim: a ball turns round an edge, a corner without radius has to pass it."""
-        return 0.0 if self.shape.radius else reach(at)
+        return 0.0 if self.shape.is_round else reach(at)
 
     def _merits(self, at, x, out) -> np.ndarray:
         """Scores of the three faces, highest of the nearest; at corners, of that farthest from the whole shape."""
-        if self.shape.radius:
+        if self.shape.is_round:
             return out
         others = np.array([self._seen_from_box(at, k) for k in range(len(self.shape.corners))])
         separations = reduce(math.minimum, others * _sides(x)) - _half(self.box)

@@ -15,9 +15,21 @@ class SceneBuilder:
     """The two operations of a scene on which builder methods stand."""
 
     joints: dict[str, Joint]
+    bodies: "dict[str, elements.Body]"
+    frames: "dict[str, elements.Frame]"
+    shapes: "dict[str, elements.Collider]"
+    contacts: "dict[str, elements.Unilateral]"
 
     def add(self, element: Element) -> Element:
         """Add an element and return it."""
+        raise NotImplementedError
+
+    def _require_new(self, name: str, kind: str, taken):
+        """Refuse a name that is taken."""
+        raise NotImplementedError
+
+    def _taken(self) -> set[str]:
+        """Names of joints, constraints and loads, of which none may name another."""
         raise NotImplementedError
 
     def _fresh(self, name: str) -> str:

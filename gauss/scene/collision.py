@@ -46,6 +46,11 @@ class Collider:
         return 0.0
 
     @property
+    def is_round(self) -> bool:
+        """Whether the shape exceeds the hull of its corners."""
+        return bool(self.radius)
+
+    @property
     def corners(self) -> np.ndarray:
         """Points (k, 3) in the frame of the body [m]: the shape is their hull, thickened by its radius."""
         return np.array([self.at])
@@ -77,6 +82,11 @@ class Sphere(Collider):
         super().__post_init__()
         self._keep_length("radius", positive=True)
 
+    @property
+    def is_round(self) -> bool:
+        """Always."""
+        return True
+
 
 @dataclass(frozen=True)
 class Capsule(Collider):
@@ -104,6 +114,11 @@ class Capsule(Collider):
         self._keep_length("radius", positive=True)
         self._keep_length("length", positive=True)
         values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
+
+    @property
+    def is_round(self) -> bool:
+        """Always."""
+        return True
 
     @property
     def corners(self) -> np.ndarray:

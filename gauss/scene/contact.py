@@ -123,13 +123,13 @@ class Slip(Relation):
         """Velocity of the first body relative to the second at the contact point, along two tangential directions."""
         touch, shapes = self.whole.touch(at, self.index), at.system.scene.shapes
         first, second = (at.velocity_at(shapes[name].body, touch.place) for name in (self.whole.shape, self.whole.other))
-        across = _across(touch.normal)
-        return [along @ (first - second) for along in (across, cross(touch.normal, across))]
+        return [along @ (first - second) for along in tangents(touch.normal)]
 
 
-def _across(normal) -> np.ndarray:
-    """A unit tangent: perpendicular to the normal and the x-axis, or the y-axis where the normal is near x."""
+def tangents(normal) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit tangents: perpendicular to the normal and the x-axis, or the y-axis where the normal is near x; and both."""
     x, y, z = normal
     steep = x * x > STEEP_NORMAL
     across = [math.where(steep, along, other) for along, other in ((-z, 0.0), (0.0, z), (x, -y))]
-    return np.array(across) / np.sqrt(math.where(steep, x * x, y * y) + z * z)
+    first = np.array(across) / np.sqrt(math.where(steep, x * x, y * y) + z * z)
+    return first, cross(normal, first)

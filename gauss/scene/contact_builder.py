@@ -1,7 +1,11 @@
 """Builder methods of a scene for collision shapes, unilateral constraints and set-valued elements."""
 
+from itertools import combinations, product
+
 from gauss import scene as elements
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene.builder import SceneBuilder, name_of
+from gauss.scene.contact_pairs import have_rule
 
 
 class ContactBuilder(SceneBuilder):
@@ -30,6 +34,52 @@ class ContactBuilder(SceneBuilder):
     def contact(self, name: str, shape, other, restitution: float = 0.0, friction: float = 0.0) -> "elements.Contact":
         """Add a contact of two shapes; see :class:`gauss.scene.Contact`."""
         return self.add(elements.Contact(name, name_of(shape), name_of(other), restitution, friction))
+
+    def contacts_all(self, exclude=(), friction: float = 0.0, restitution: float = 0.0) -> "list[elements.Contact]":
+        """Let all shapes touch each other that may, and return the contacts.
+
+        Pairs on one body, on two bodies that a joint joins, and of which nothing moves are left out, and pairs that have a
+        contact already. A body on a joint from the ground touches the ground.
+
+        Parameters
+        ----------
+        exclude : sequence of (str, str)
+            Further pairs that are left out, by names of shapes or of bodies.
+        friction, restitution : float
+            Of all these contacts; see :class:`gauss.scene.Contact`.
+
+        Raises
+        ------
+        SceneError
+            If a name of ``exclude`` is none of a shape or body.
+        """
+        excluded = {frozenset(map(name_of, pair)) for pair in exclude}
+        known = self.shapes.keys() | self.bodies.keys() | {elements.GROUND}
+        for name in sorted(set().union(*excluded) - known):
+            raise SceneError(f"contacts_all: exclude: no shape or body {name!r}. {did_you_mean(name, known)}")
+        excluded |= {frozenset((contact.shape, contact.other)) for contact in self._contacts_of_shapes()}
+        joints = [joint for joint in self.joints.values() if joint.parent != elements.GROUND]
+        excluded |= {frozenset((joint.parent, joint.child)) for joint in joints}
+        taken = self._taken()
+        found = []
+        for one, other in combinations(self.shapes.values(), 2):
+            if self._may_touch(one, other, excluded):
+                name = f"{other.name} on {one.name}"
+                self._require_new(name, "contact", taken)
+                found.append(elements.Contact(name, other.name, one.name, restitution, friction))
+        self.contacts.update({contact.name: contact for contact in found})
+        return found
+
+    def _contacts_of_shapes(self) -> "list[elements.Contact]":
+        return [contact for contact in self.contacts.values() if isinstance(contact, elements.Contact)]
+
+    def _may_touch(self, one: "elements.Collider", other: "elements.Collider", excluded: set[frozenset[str]]) -> bool:
+        """Whether two shapes move relative to each other, have a rule of contact, and are not excluded."""
+        bodies = [self.frames[shape.body].body if shape.body in self.frames else shape.body for shape in (one, other)]
+        if bodies[0] == bodies[1] or not have_rule(one, other):
+            return False
+        names = product((one.name, bodies[0]), (other.name, bodies[1]))
+        return excluded.isdisjoint(map(frozenset, names))
 
     def stop(self, joint, lowest=None, highest=None, restitution: float = 0.0, name: str | None = None) -> "elements.Stop":
         """Let a joint run against stops; those of its ``limits`` when none is given. See :class:`gauss.scene.Stop`."""

@@ -27,6 +27,14 @@ def places(first: Collider, second: Collider) -> list[FeaturePair]:
     raise SceneError(f"{first.what} and {second.what}: two half-spaces meet almost everywhere, so they make no contact.")
 
 
+def have_rule(first: Collider, second: Collider) -> bool:
+    """Whether two shapes may touch: two half-spaces, or two sets of points without radius, do not."""
+    kinds = type(first), type(second)
+    if not (first.is_round or second.is_round) and set(kinds) == {Points}:
+        return False
+    return kinds in RULES or kinds[::-1] in RULES
+
+
 def have_edges(first: Collider, second: Collider) -> bool:
     """Whether shapes may overlap with all gap functions positive: boxes deep in each other, a box about a capsule's axis."""
     return {type(first), type(second)} in ({Box}, {Box, Capsule})
@@ -37,7 +45,7 @@ def _on_half_space(first, second: HalfSpace) -> list[FeaturePair]:
 
 
 def _balls(first, second) -> list[FeaturePair]:
-    if not first.radius + second.radius:
+    if not (first.is_round or second.is_round):
         raise SceneError(f"{first.what} and {second.what}: two points never touch; give one of them a radius [m].")
     return [Balls(first, i, second, k) for i, k in product(range(len(first.corners)), range(len(second.corners)))]
 

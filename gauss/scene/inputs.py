@@ -4,12 +4,14 @@ An input is a generalised force along one joint rate, held between the samples o
 Wittenmark, Computer-Controlled Systems, 3rd ed., 2.3).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.builder import SceneBuilder, name_of
+from gauss.scene.joint import Joint
 from gauss.scene.loads import Drive
 
 # What an output measures → the kind of element that it is measured of, and the number of its values; 0: that of the joint.
@@ -94,6 +96,14 @@ class Output:
             raise SceneError(f"{what}: no kind {self.kind!r}. {did_you_mean(str(self.kind), SENSORS)}")
         values.text(self.of, f"{what}: of")
         values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
+
+    def size(self, joints: Mapping[str, Joint]) -> int:
+        """Number of its values, given the joints of the scene."""
+        fixed = SENSORS[self.kind][1]
+        if fixed:
+            return fixed
+        pair = joints[self.of].pair
+        return pair.n_q if self.kind == "coordinate" else pair.n_v
 
 
 class InputBuilder(SceneBuilder):

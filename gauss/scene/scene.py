@@ -406,6 +406,9 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
         if name in taken:
             raise SceneError(f"{kind} {name!r}: the name is taken; choose another.")
 
+    def _taken(self) -> set[str]:
+        return {*self.joints, *self.couplings, *self._constraints, *self.loads}
+
     def _fresh(self, name: str) -> str:
         taken = [*self.loads, *self._constraints]
         count = sum(1 for load in taken if load == name or load.startswith(f"{name} "))

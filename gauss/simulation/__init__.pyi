@@ -1,5 +1,6 @@
 from gauss.simulation.batch.rollout import Rollout, rollout
 from gauss.simulation.integrators import INTEGRATORS
+from gauss.simulation.prepared_motion import PreparedMotion, prepare
 from gauss.simulation.simulate import simulate
 from gauss.simulation.simulator import Simulator
 from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
@@ -8,11 +9,13 @@ from gauss.simulation.zero_crossings import crossings
 __all__ = [
     "INTEGRATORS",
     "BodyMotion",
+    "PreparedMotion",
     "Rollout",
     "Simulator",
     "Stats",
     "Trajectory",
     "crossings",
+    "prepare",
     "rollout",
     "simulate",
 ]

@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from gauss.codegen.kernels import LoopStatus
+from gauss.codegen.kernels import Loop, LoopStatus
 from gauss.dynamics.laws.switching import endless
 from gauss.dynamics.laws.switching_times import APART, NO_TIMES, Timetable
 from gauss.dynamics.plan import method_key
@@ -29,6 +29,17 @@ SLIDING_STEPS = 64  # over which crossings of switching surfaces are counted
 class CompiledAdaptiveRun(CompiledRun):
     """One motion by an adaptive method in machine code."""
 
+    def prepared(self) -> Loop:
+        """Machine code of the steps; the control record has the settings of the method."""
+        control, tolerance = self.control, self.problem.tolerance
+        method = cast("Controlled | Taylor", self.problem.method)
+        loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, tolerance.shares))
+        control.every = steps_per_check(method.evaluations)
+        control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
+        control.largest = control.largest if self.problem.step is None else self.problem.step
+        control.order = method.order_for(tolerance) if isinstance(method, Taylor) else method.order
+        return loop
+
     def run(self):
         """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`.
 
@@ -37,14 +48,7 @@ class CompiledAdaptiveRun(CompiledRun):
         SimulationError
             If a law chatters; its ``trajectory`` holds the motion so far.
         """
-        control, tolerance = self.control, self.problem.tolerance
-        method = cast("Controlled | Taylor", self.problem.method)
-        loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, tolerance.shares))
-        control.every = steps_per_check(method.evaluations)
-        control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
-        control.largest = control.largest if self.problem.step is None else self.problem.step
-        control.order = method.order_for(tolerance) if isinstance(method, Taylor) else method.order
-        size = self.layout.size
+        control, loop, size = self.control, self.prepared(), self.layout.size
         if self.held is not None:
             self.inputs = self.held.at(0, self.start.t, self.start.q.copy(), self.start.v.copy())
         begun = self._started(self.start.t, self.start.q, self.start.v)

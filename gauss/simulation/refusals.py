@@ -38,8 +38,8 @@ def _refuse_links(problem: Problem):
 
 def _refuse_friction(problem: Problem):
     system, method = problem.system, problem.method
-    if system.slips.placed:
-        rough = [name for name, contact in system.scene.contacts.items() if getattr(contact, "friction", 0.0)]
+    rough = [name for name, contact in system.scene.contacts.items() if getattr(contact, "friction", 0.0)]
+    if rough:
         raise SimulationError(
             f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
             f"{', '.join(rough)}."

@@ -12,12 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.arguments import named_arguments
-from gauss.codegen import Kernel, one_tier, write
+from gauss.codegen import Kernel, one_tier
 from gauss.codegen.kernels import Due, LoopStatus, address
 from gauss.dynamics.conditions import smooth_question
-from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.switching import Switching
-from gauss.dynamics.outputs import INERTIAL, measured, shape_of
+from gauss.dynamics.outputs import output_function, shape_of, split
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError, require
@@ -178,7 +177,7 @@ class Simulator:
             Point(start, np.zeros(3), rates, run.method_state), self._u if self.inputs else None
         )
         self._confirmed[:] = self._point
-        self._begun, self._steps = float(start.t), 0
+        self._begun, self._steps = float(self._point[0]), 0
         run.control.steps = run.control.status = 0.0
         return self.state
 
@@ -267,12 +266,8 @@ class Simulator:
     @property
     def outputs(self) -> dict[str, np.ndarray]:
         """Values of the outputs of the scene; accelerations of contacts are means over the last step."""
-        values, found = self.output_vector(), {}
-        for name, output in self.system.scene.outputs.items():
-            shape = shape_of(output, self.system)
-            size = int(np.prod(shape))
-            found[name], values = values[:size].reshape(shape), values[size:]
-        return found
+        outputs, found = self.system.scene.outputs, split(self.output_vector(), self.system.scene)
+        return {name: values.reshape(shape_of(outputs[name], self.system)) for name, values in found.items()}
 
     def output_vector(self) -> np.ndarray:
         """Values (m,) of all outputs in a row."""
@@ -320,15 +315,6 @@ def _zero(count: int) -> Callable:
 
 def _output_kernel(run: CompiledFixedRun, system: System) -> Kernel:
     """Machine code of a point → values of all outputs."""
-    program, outputs = run.program, tuple(system.scene.outputs.values())
-    of_step = run.method.nonsmooth  # mean accelerations over the step, those of impacts included
-
-    def values(x):
-        point = program.layout.point(x)
-        asked = any(output.kind in INERTIAL for output in outputs) and not of_step
-        rates = program.evaluate(point.state) if asked else point.rates
-        motion = kinematics(program.system, point.state)
-        return tuple(measured(output, motion, rates.acceleration) for output in outputs)
-
-    make = lambda: Kernel(write(values, program.layout.size, name="outputs"), batch=False)  # noqa: E731
+    program, of_step = run.program, run.method.nonsmooth  # mean accelerations over the step, those of impacts included
+    make = lambda: Kernel(output_function(program, system.scene, of_step), batch=False)  # noqa: E731
     return cached_on_disk(program.system, (_output_kernel, run.kind, run.key), make, system)

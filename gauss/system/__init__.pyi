@@ -1,4 +1,5 @@
-from gauss.system.build import build, guards, sides
+from gauss.system.build import build
+from gauss.system.contact_gaps import guards, sides
 from gauss.system.contact_mode import FREE, ContactMode, phase_scene
 from gauss.system.coordinate_names import coordinate_units, rate_units
 from gauss.system.frozen_functions import refuse_changed

@@ -6,9 +6,10 @@ import numpy as np
 
 from gauss.backends.structure import ConstraintRows, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, ClosedGap, Contact, Drive, Force, Guard, Scene, Slip, Slipping
+from gauss.scene import GROUND, Drive, Force, Scene, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
+from gauss.system.contact_gaps import of_shapes
 from gauss.system.frozen_functions import written_laws
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.relations import place_relations
@@ -47,28 +48,9 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     _check_inertia(system)
     if scene.set_valued:
         system = replace(system, set_valued=place_relations(system, scene.set_valued.values()))
-    if scene.contacts:
-        contacts, sliding = place_relations(system, sides(scene)), place_relations(system, slips(scene))
-        system = replace(system, contacts=contacts, slips=sliding)
+    if not of_shapes(scene):
+        _ = system.contacts  # functions of the user are judged now; gap functions of shapes are traced when asked for
     return replace(system, written=written) if (written := written_laws(system)) else system
-
-
-def sides(scene: Scene) -> list[ClosedGap]:
-    """Every gap function of the unilateral constraints of a scene."""
-    contacts = scene.contacts.values()
-    return [ClosedGap(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
-
-
-def slips(scene: Scene) -> list[Slip]:
-    """Tangential velocity at every contact distance with friction."""
-    rough = [contact for contact in scene.contacts.values() if isinstance(contact, Contact) and contact.friction]
-    return [Slip(name, contact, k) for contact in rough for k, name in enumerate(contact.sides(scene))]
-
-
-def guards(scene: Scene) -> list[Guard]:
-    """Separations of whole shapes that might overlap with all gap functions positive."""
-    contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
-    return [guard for contact in contacts for guard in contact.guards(scene)]
 
 
 def _with_relations(system: System) -> System:

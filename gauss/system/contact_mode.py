@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from gauss.scene import FeaturePair, IdealCounterpart, JointAtRest, Relation, Scene, Slipping
-from gauss.system.build import sides
+from gauss.system.contact_gaps import sides
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,14 @@ from gauss.codegen import IS_CONTENT, Scalar
 from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
+from gauss.system.contact_gaps import sides, slips
 from gauss.system.dynamics_protocol import Dynamics
 from gauss.system.explain import explain
 from gauss.system.frozen_functions import refuse_changed
 from gauss.system.pickling import rebuilding
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
-from gauss.system.relations import NO_RELATIONS, Relations
+from gauss.system.relations import NO_RELATIONS, Relations, place_relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
 from gauss.system.state_functions import StateFunctions
@@ -51,10 +52,6 @@ class System(StateFunctions):
         Loads of the scene.
     relations : Relations
         Constraints beyond joints and couplings.
-    contacts : Relations
-        Gap functions of unilateral constraints, one row each.
-    slips : Relations
-        Tangential velocities at contacts with friction, two rows each.
     set_valued : Relations
         Set-valued elements, one row each.
     written : dict of str to str
@@ -70,8 +67,6 @@ class System(StateFunctions):
     frames: dict[str, PlacedFrame]
     loads: tuple[BoundLoad, ...]
     relations: Relations = field(repr=False, default=NO_RELATIONS)
-    contacts: Relations = field(repr=False, default=NO_RELATIONS)
-    slips: Relations = field(repr=False, default=NO_RELATIONS)
     set_valued: Relations = field(repr=False, default=NO_RELATIONS)
     written: dict[str, str] = field(repr=False, default_factory=dict)
     dynamics: Dynamics | None = field(repr=False, default=None, metadata={IS_CONTENT: False})
@@ -132,6 +127,16 @@ class System(StateFunctions):
         """Slices of unit quaternions (w, x, y, z) among the coordinates, by joint."""
         turning = [joint for joint in self.joints if joint.pair.quaternion is not None]
         return {joint.name: slice(joint.q.start + joint.pair.quaternion, joint.q.stop) for joint in turning}
+
+    @cached_property
+    def contacts(self) -> Relations:
+        """Gap functions of unilateral constraints, one row each, traced on first access."""
+        return place_relations(self, sides(self.scene)) if self.scene.contacts else NO_RELATIONS
+
+    @cached_property
+    def slips(self) -> Relations:
+        """Tangential velocities at contacts with friction, two rows each, traced on first access."""
+        return place_relations(self, slips(self.scene)) if self.scene.contacts else NO_RELATIONS
 
     @cached_property
     def scale(self) -> Scale:

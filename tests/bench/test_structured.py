@@ -6,7 +6,8 @@ import pytest
 from gauss.backends.programme import Outcome
 from gauss.bench import casadi_, mujoco_
 from gauss.bench.classes import compare_class
-from gauss.bench.contestants import contestants, everyone, suits
+from gauss.bench.clocks import COMPILING
+from gauss.bench.contestants import contestants, everyone, ready, suits
 from gauss.bench.coulomb import projected
 from gauss.bench.folders import of_folder
 from gauss.bench.instances import FILE, of_selection
@@ -25,6 +26,7 @@ SMALL = {
 MUJOCO_ERROR = 1e-6  # relative: softness of contacts as MuJoCo has it would leave more than 1e-4
 STAGES_ERROR = 1e-6  # relative
 FINE = 1e-5  # relative error of x where residuals of 1e-9 are kept: contact forces of soft stacks amplify them
+FIRST = [(CONES, "cones balls 1"), (COULOMB, "coulomb balls 1")]
 CASES = [
     (kind, name, solver)
     for kind, names in SMALL.items()
@@ -159,3 +161,14 @@ def test_solvers_of_stages_find_the_reference(solver):
     (instance,) = of_suite("mpc", ["mpc cart and pole 10"])
     row = judged(instance, solver)
     assert row["claimed"] and row["error"] <= STAGES_ERROR and row["dual_error"] <= 10.0 * STAGES_ERROR
+
+
+@pytest.mark.parametrize("kind, name", [(ROWS, "contacts stops 4 F2"), (STAGES, "mpc cart and pole 10"), *FIRST])
+def test_calls_repeat_themselves(kind, name):
+    """What a call does to its problem, as to factorise a matrix in its place, the next one would answer for."""
+    (instance,) = of_suite(name.split()[0], [name])
+    for solver in set(contestants(kind)) - set(COMPILING):
+        prepared = ready(solver, instance.programme(FILE), "high")
+        with prepared.around:
+            first, second = (prepared.read(prepared.call()).x for _ in range(2))
+        assert first is None or np.array_equal(first, second), solver

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 import gauss
+from benchmarks import free_bodies
 from gauss import Plan
-from gauss.dynamics.conditions import LARGE_TREE_BODIES
+from gauss.dynamics.conditions import LARGE_TREE_BODIES, WIDEST
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS, MOTIONS, motion_plan
 from gauss.dynamics.rules import Question
 from gauss.errors import ArgumentError, SimulationError
+from gauss.integrators import METHODS
 from gauss.scene import Scene
 from tests.support import mechanisms
 
@@ -41,6 +43,31 @@ def _long() -> Scene:
     return gauss.load("n_pendulum", n=LARGE_TREE_BODIES + 1)
 
 
+def _controlled() -> Scene:
+    scene = gauss.load("friction_oscillator")
+    scene.input("u", "rail", limits=(-1.0, 1.0))
+    return scene
+
+
+def _driven() -> Scene:
+    scene = _long()
+    scene.drive("J1", torque=lambda t: float(t))
+    return scene
+
+
+def _shafts(count: int) -> Scene:
+    """Trains of five shafts geared one to the other, each driven."""
+    scene = gauss.Scene("shafts")
+    for k in range(count):
+        scene.body(f"B{k}", 1.0, (0.1, 0.1, 0.15))
+        scene.revolute(f"J{k}", "ground", f"B{k}", at=(k, 0.0, 0.0))
+        if k % 5:
+            scene.couple(f"C{k}", f"J{k}", f"J{k - 1}", ratio=-1.1)
+        else:
+            scene.drive(f"J{k}", torque=0.1 * k)
+    return scene
+
+
 def _mesh() -> Scene:
     return gauss.load("n_four_bar", n=50)
 
@@ -58,7 +85,14 @@ CASES = {
     ),
     "an opaque law": (_opaque, {}, ("Python loop", "compiled"), ["compiled loop"]),
     "a law that asks": (_asking, {}, ("Python loop", "compiled"), ["compiled loop"]),
-    "a large tree": (_long, {}, ("Python loop", "tree recursion"), ["compiled loop"]),
+    "a large tree": (_long, {}, ("compiled loop", "tree recursion"), ["compiled loop"]),
+    "a large tree, an opaque law": (_driven, {}, ("Python loop", "tree recursion"), ["compiled loop"] * 2),
+    "held inputs, friction": (
+        _controlled,
+        {"control": lambda t, q, v: 0.5, "rate": 1000.0},
+        ("samples", "compiled"),
+        ["events", "events"],
+    ),
     "many loops": (_mesh, {}, ("Python loop", "call graph"), ["compiled loop"]),
     "a library": (lambda: mechanisms.rods(2), {"integrator": "scipy_dop853"}, ("library", "compiled"), []),
     "a library, a law": (_opaque, {"integrator": "scipy_dop853"}, ("library", "certified"), ["library"]),
@@ -81,6 +115,12 @@ CASES = {
         ("time stepping", "certified"),
         ["time stepping"],
     ),
+    "steps of many contacts": (
+        lambda: free_bodies.stack(2),
+        {"integrator": "time_stepping", "step": 1e-3},
+        ("time stepping", "free bodies"),
+        ["time stepping"],
+    ),
     "Baumgarte": (mechanisms.four_bar, {"stabilisation": "baumgarte"}, ("compiled loop", "compiled"), []),
 }
 
@@ -101,7 +141,7 @@ def test_a_motion_tells_its_plan(name, plans):
     plan = plans[name]
     assert (plan.driver, plan.dynamics) == (driver, dynamics)
     assert [found.driver for found in plan.rejected] == rejected and all(found.why for found in plan.rejected)
-    assert bool(plan.fallback) == (dynamics not in ("none", "certified") and driver != "library")
+    assert bool(plan.fallback) == (dynamics not in ("none", "certified", "free bodies") and driver != "library")
 
 
 @pytest.mark.slow
@@ -162,6 +202,19 @@ def test_something_else_than_a_plan_is_refused():
 def test_explain_prints_the_plan_of_a_motion(name, plans):
     system = gauss.compile_scene(CASES[name][0]())
     assert motion_plan(system) == plans[name] and str(plans[name]).splitlines()[0] in system.explain()
+
+
+@pytest.mark.slow
+def test_explicit_steps_of_many_rates_are_compiled_and_implicit_ones_are_not():
+    system = gauss.compile_scene(_shafts(WIDEST + 2))
+    compiled, stepped = (gauss.simulate(system, 5e-3, plan=plan, **RUN) for plan in (None, Plan("Python loop", "compiled")))
+    assert compiled.stats.plan.driver == "compiled loop"
+    assert np.abs(compiled.q[-1] - stepped.q[-1]).max() <= SAME * np.abs(stepped.q[-1]).max()
+    assert np.abs(compiled.v[-1] - stepped.v[-1]).max() <= SAME * np.abs(stepped.v[-1]).max()
+    ask = Question(system, Laws(system), method=METHODS["radau5"])
+    assert MOTIONS.plan(ask).driver == "Python loop"
+    with pytest.raises(SimulationError, match=f"{WIDEST + 2} rates are more than {WIDEST}"):
+        MOTIONS.plan(ask, Plan("compiled loop", "compiled"))
 
 
 def test_states_and_batches_ask_the_same_rules():

@@ -1,5 +1,8 @@
 """Batches with inputs of each motion: against single motions under the same tables; motions that diverge are marked."""
 
+from pathlib import Path
+from runpy import run_path
+
 import numpy as np
 import pytest
 
@@ -7,6 +10,7 @@ import gauss
 from gauss.errors import SimulationError
 
 ROUNDING = 1e-13  # SIMD code and scalar code over 100 steps
+UPRIGHT = 0.9  # cosine of the angle of the pole; hanging it is -1
 BATCH, STEPS, STEP = 11, 100, 1e-3
 SCENES = {"cart_pole": "rail", "four_bar": "A"}
 
@@ -49,6 +53,15 @@ def test_a_motion_that_diverges_is_marked_and_the_others_are_not_affected():
     found = gauss.rollout(system, q0, v0, **run)
     assert found.diverged == (3,)
     np.testing.assert_array_equal(np.delete(found.q, 3, axis=0), np.delete(right.q, 3, axis=0))
+
+
+def test_sampled_control_swings_a_pole_up():
+    place = Path(gauss.__file__).parents[1] / "examples" / "mppi.py"
+    example = run_path(str(place))
+    scene, cost, duration = example["cart_pole"]()
+    law = example["Mppi"](scene, cost, samples=200)
+    motion = gauss.simulate(law.system, duration, control=law, rate=50.0, integrator="rk4", step=5e-3)
+    assert np.cos(motion.q[-1, 1]) > UPRIGHT
 
 
 @pytest.mark.parametrize(

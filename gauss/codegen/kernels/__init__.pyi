@@ -1,5 +1,6 @@
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
 from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, AdaptiveBatchLoop, MotionQueue
+from gauss.codegen.kernels.block_contacts import BlockContactLaws, BlockContactSolver, ContactGraph, Round
 from gauss.codegen.kernels.block_ldlt import BlockLDLT
 from gauss.codegen.kernels.call_recorder import CallRecorder, Operand, RecordedCalls, Slot, Vector
 from gauss.codegen.kernels.call_table import CallTable
@@ -53,6 +54,10 @@ __all__ = [
     "MotionQueue",
     "MOTION_RECORD",
     "FixedPoint",
+    "BlockContactLaws",
+    "BlockContactSolver",
+    "ContactGraph",
+    "Round",
     "ContactSolver",
     "CompiledContactSolver",
     "BatchSpan",

@@ -61,6 +61,10 @@ class Loop:
         """Machine code of the loop: (control, point, confirmed, grid, out, budget), all but the last by address."""
         return self._run
 
+    def function(self, name: str) -> EntryPoint:
+        """Machine code of one of the functions: (inputs, outputs), by address."""
+        return self._single[name][0]
+
     def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n_out,) of one of the functions for inputs (n_in,).
 

@@ -147,7 +147,6 @@ class RowFunction(NativeFunction):
     n_in: int
     n_out: int
     emit: Callable[[RowCode], None]
-    parameters = ()  # see :class:`gauss.codegen.Function`
 
     @property
     def arity(self) -> tuple[int, int]:

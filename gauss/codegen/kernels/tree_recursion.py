@@ -69,7 +69,7 @@ class TreeRecursion(NativeFunction):
         Kind of each link, and its inner neighbour, −1 for the ground; inner links come first.
     starts : dict
         First entry of each link in each vector, {name: (n,)}; "result" among them.
-    parameters : list of ndarray
+    link_parameters : list of ndarray
         Parameters of each link.
     record : int
         Length of a record.
@@ -84,7 +84,7 @@ class TreeRecursion(NativeFunction):
     kinds: np.ndarray
     inner: np.ndarray
     starts: dict
-    parameters: list
+    link_parameters: list
     record: int
     ground: list
 
@@ -110,12 +110,12 @@ class TreeRecursion(NativeFunction):
 class _TreeRecursionWriter:
     def __init__(self, recursion: TreeRecursion, writer: Writer, width: int):
         self.recursion, self.writer, self.module, self.width = recursion, writer, writer.module, width
-        lengths = np.array([len(part) for part in recursion.parameters])
+        lengths = np.array([len(part) for part in recursion.link_parameters])
         self.tables = {
             "kind": self._table("kind", recursion.kinds),
             "inner": self._table("inner", recursion.inner + 1),
             "parameter": self._table("at", np.concatenate([[0], np.cumsum(lengths)[:-1]])),
-            "values": self._table("values", np.concatenate([*recursion.parameters, [0.0]])),
+            "values": self._table("values", np.concatenate([*recursion.link_parameters, [0.0]])),
         } | {name: self._table(f"start_{name}", start) for name, start in recursion.starts.items()}
 
     def _table(self, name: str, values: np.ndarray) -> ir.GlobalVariable:

@@ -38,7 +38,7 @@ from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.scene import Box, Contact, JointDryFriction, Scene
 from gauss.system import State, System, guards, retract, sides
-from gauss.system.build import slips
+from gauss.system.contact_gaps import slips
 
 START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
 UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
@@ -201,7 +201,7 @@ class MoreauStepper:
         """
         speeds = REST_STEPS * h * np.abs(touch.J @ acceleration + touch.bias) + rest
         gaps = zip(touch.width, touch.rate, speeds, strict=False)
-        return [_both(width + (1.0 - share) * h * rate <= 0.0, rate < -speed) for width, rate, speed in gaps]
+        return [is_impact(width, rate, speed, h, share) for width, rate, speed in gaps]
 
     def without_forces(self, touch: ContactTerms, acceleration, h, rest, share) -> np.ndarray:
         """Rates (n,) after a step without contact forces, less the least that gaps may have; numbers or expressions.
@@ -222,7 +222,7 @@ class MoreauStepper:
             Share of the step before.
         """
         gaps = zip(touch.width, touch.rate, self.restitution, strict=False)
-        least = [_least_rate(width, rate, e, h, rest, share) for width, rate, e in gaps]
+        least = [least_rate(width, rate, e, h, rest, share) for width, rate, e in gaps]
         least += [0.0] * (touch.rate.size - len(least))
         return touch.rate + h * (touch.J @ acceleration + (1.0 - share) * touch.bias) - np.array(least)
 
@@ -346,11 +346,16 @@ def advance_rates(state: State, acceleration, h, share) -> State:
     return State(state.t, state.q, state.v + (share * h) * acceleration)
 
 
+def is_impact(width, rate, speed, h, share):
+    """Whether gaps close within the rest of a step faster than at rest; numbers, arrays or expressions."""
+    return _both(width + (1.0 - share) * h * rate <= 0.0, rate < -speed)
+
+
 def _both(one, other):
     return math.where(one, math.where(other, 1.0, 0.0), 0.0)
 
 
-def _least_rate(width, rate, restitution: float, h, rest, share):
+def least_rate(width, rate, restitution: float, h, rest, share):
     """Least rate of a gap after a step; penetration is removed over a whole step at least, without oscillation."""
     shut = math.where(width > 0.0, -width / ((1.0 - share) * h), -width / h)
     if not restitution:

@@ -58,7 +58,7 @@ class Rollout:
     steps, rejected : ndarray, shape (batch,)
         Accepted and rejected steps of each motion.
     diverged : tuple of int
-        Motions under ``control`` that diverged: their samples are not finite from some time on.
+        Motions under ``control`` that diverged or cannot continue: some of their samples are not finite.
     """
 
     system: System
@@ -191,7 +191,8 @@ def _fixed(
     doubtful = np.flatnonzero(finite & ~is_right)
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
     share = np.where(finite, shares(system, batch.energies, starts, samples, steps * step), 0.0)
-    _repeat(system, starts, samples, share, doubtful, steps * step, run, control)
+    failed = _repeat(system, starts, samples, share, doubtful, steps * step, run, control)
+    finite[failed] = False
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
     q, v = np.split(samples, [system.n_q], axis=2)
     return Rollout(system, t, q, v, tuple(map(int, doubtful)), *counts, tuple(map(int, np.flatnonzero(~finite))))
@@ -263,10 +264,10 @@ def _singly(system: System, starts: np.ndarray, duration: float, steps: int, run
     """Motions by :func:`gauss.simulate`, one after the other."""
     batch, t = starts.shape[1], run["times"]
     samples, share = np.empty((batch, t.size, starts.shape[0])), np.zeros(batch)
-    _repeat(system, starts, samples, share, np.arange(batch), duration, run, control)
+    failed = _repeat(system, starts, samples, share, np.arange(batch), duration, run, control)
     counts = np.full(batch, steps), np.zeros(batch, int)
     q, v = np.split(samples, [system.n_q], axis=2)
-    return Rollout(system, t, q, v, tuple(range(batch)), *counts)
+    return Rollout(system, t, q, v, tuple(range(batch)), *counts, tuple(failed))
 
 
 def _constant(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rollout:
@@ -278,10 +279,10 @@ def _constant(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> 
 
 def _repeat(
     system: System, starts, samples: np.ndarray, share: np.ndarray, doubtful, duration: float, run: dict, control=None
-):
+) -> list[int]:
     """Repeat motions by :func:`gauss.simulate` with the settings ``run``, and warn of energy balances.
 
-    Samples and imbalances are changed.
+    Samples and imbalances are changed. Returned are the motions with inputs that cannot continue: their samples are NaN.
 
     Warns
     -----
@@ -291,8 +292,9 @@ def _repeat(
     Raises
     ------
     SimulationError
-        If a motion cannot continue.
+        If a motion without inputs cannot continue.
     """
+    failed: list[int] = []
     for k in doubtful:
         start = State(0.0, *np.split(starts[:, k], [system.n_q]))
         held = {} if control is None else {"control": control[k], "rate": control.shape[1] / duration}
@@ -300,9 +302,14 @@ def _repeat(
             with imbalances() as found:
                 again = simulate(system, duration, state=start, progress=False, **run, **held)
         except SimulationError as error:
-            raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
+            if control is None:
+                raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
+            failed.append(int(k))
+            samples[k], share[k] = np.nan, 0.0
+            continue
         samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share
     warn_of_many(system, share, lambda k: f"number {k}", run)
+    return failed
 
 
 def _refuse(integrator: str, why: str, **given):

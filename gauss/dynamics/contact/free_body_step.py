@@ -1,0 +1,333 @@
+"""Step of Moreau–Jean time stepping for free bodies: cost proportional to the number of near contacts.
+
+The equations of the step are those of :mod:`gauss.dynamics.contact.moreau_step`, the laws those of
+:mod:`gauss.dynamics.contact.contact_step`. The scene has no machine code of its own: bodies, pairs of shapes and the contact
+problem are kernels that all scenes share. Contacts enter the problem if they may close within the step: twice the largest
+speed before and after the step bounds how fast a gap closes; a step that exceeds the bound is repeated with a larger one.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.codegen import from_disk
+from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, Round
+from gauss.dynamics.contact.contact_step import (
+    LAW_TOLERANCE,
+    ContactLaws,
+    ContactProblem,
+    contact_solver,
+)
+from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
+from gauss.dynamics.contact.impact import resting
+from gauss.dynamics.contact.moreau_step import (
+    MIDPOINT,
+    REST_STEPS,
+    START_OVERLAP,
+    UNSEEN_OVERLAP,
+    is_impact,
+    least_rate,
+)
+from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts
+from gauss.dynamics.contact.shape_table import ShapeTable
+from gauss.dynamics.store import cached
+from gauss.errors import SimulationError, StateError
+from gauss.system import State, System
+
+# Newton steps with hardly any regularisation nearly always converge; where they cycle, much of it leads near the solution.
+ROUNDS = (
+    Round(0, 1e-7, 12),
+    Round(0, 1e-2, 30),
+    Round(0, 1e-4, 10),
+    Round(0, 1e-7, 10),
+    Round(30, 1e-3, 30),
+    Round(0, 1e-7, 10),
+    Round(100, 1e-2, 30),
+    Round(0, 1e-5, 10),
+)
+UNSOLVED = 1e-3  # error of the laws, relative: beyond it the convex relaxation is solved
+REACH_MARGIN = 1.5  # of the distance that bodies approach within a step by their speeds before contact
+ATTEMPTS = 8  # steps with ever larger bounds of the speeds
+TWIST = 8  # doubles of a row of velocities
+
+
+class FreeBodyStep(NamedTuple):
+    """Result of one step.
+
+    Attributes
+    ----------
+    q, v : ndarray, shape (n_q,), (n_v,)
+        Coordinates and rates at its end.
+    contacts : NearContacts
+        Near contacts.
+    force : ndarray, shape (m, 3)
+        Mean forces with impulses along normals and tangents [N].
+    dissipated : float
+        Mean power lost in contacts [W].
+    error : float or None
+        Error of the laws, relative; None for the convex relaxation.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    contacts: NearContacts
+    force: np.ndarray
+    dissipated: float
+    error: float | None
+
+
+class _Begun(NamedTuple):
+    """Bodies after the share of a step: columns for bodies, and their velocities before and after it without contacts.
+
+    Coordinates, poses of all bodies with the ground last, velocities, masses, rates of the joints.
+    """
+
+    q: np.ndarray
+    bodies: np.ndarray
+    both: np.ndarray
+    mass: np.ndarray
+    v: np.ndarray
+
+
+class FreeBodyStepper:
+    """Steps of one system of free bodies.
+
+    Parameters
+    ----------
+    system : System
+        Bodies on free joints from the ground, or fixed to it, without loads; contacts of shapes.
+    """
+
+    def __init__(self, system: System):
+        self.system, self.kernels = system, free_body_kernels()
+        self.table = ShapeTable(system)
+        self.detection = ContactDetection(self.table, system.scale.length)
+        self.moving = [joint for joint in system.joints if joint.pair.n_v]
+        Phi = system.Phi.reshape(-1, 6)
+        self.child = np.array([joint.child for joint in self.moving])
+        self.given = np.array([constants(joint, Phi[joint.child]) for joint in self.moving]).T.copy()
+        self.q_places = np.array([np.arange(joint.q.start, joint.q.stop) for joint in self.moving]).T
+        self.v_places = np.array([np.arange(joint.v.start, joint.v.stop) for joint in self.moving]).T
+        self.n = len(self.moving)
+        self.gravity = np.repeat(np.array(system.scene.gravity, dtype=float)[:, None], self.n, axis=1)
+        self._index_bodies()
+        self.reach = self._reaches()
+        self.share = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
+        self.coefficients = np.unique(self.table.restitution)
+        self.graph: ContactGraph | None = None
+        self.known: tuple[np.ndarray, np.ndarray]
+        self.forget()
+
+    def _index_bodies(self):
+        """Columns of the bodies: moving ones in the order of their joints, then fixed ones, the ground last."""
+        column = np.full(self.system.structure.n_bodies + 1, -1, dtype=np.int64)
+        column[self.child] = np.arange(self.n)
+        fixed = [joint for joint in self.system.joints if not joint.pair.n_v]
+        self.fixed = np.zeros((21, len(fixed) + 1))
+        for k, joint in enumerate(fixed):
+            R = joint.R_parent @ joint.R_child.T
+            self.fixed[:12, k] = np.concatenate([R.ravel(), joint.p_parent - R @ joint.p_child])
+        self.fixed[:9, -1] = np.eye(3).ravel()
+        places = {joint.child: self.n + k for k, joint in enumerate(fixed)}
+        body = [places.get(b, column[b]) if b >= 0 else self.n + len(fixed) for b in self.table.body]
+        self.table.body = np.array(body, dtype=np.int64)
+
+    def _reaches(self) -> np.ndarray:
+        """Farthest point (n,) of the shapes of each moving body from its centre of mass [m]."""
+        found = np.zeros(self.fixed.shape[1] + self.n)
+        np.maximum.at(found, self.table.body, self.table.length)
+        return found[: self.n]
+
+    def forget(self):
+        """Forget the forces of the last step: a new motion begins."""
+        self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+
+    def step(self, state: State, h: float) -> FreeBodyStep:
+        """Step of length h; the forces of the last step are the initial guess.
+
+        Raises
+        ------
+        SimulationError
+            If shapes overlap unseen by their gap functions, or no forces are found.
+        """
+        for share in self.share:
+            begun = self._begin(state, h, share)
+            speed = max(self._speed(begun.both[..., k]) for k in range(2))
+            near = self._near(state, begun, speed, h, share)
+            known = rates(near, begun.both)
+            if share == self.share[-1] or not self._impacts(near, begun, known, h, share).any():
+                break
+        for _ in range(ATTEMPTS):
+            force, added, error = self._solve(near, begun, known, h, share)
+            after = begun.both[..., 1].copy()
+            after[: self.n, :6] += added
+            reached = self._speed(after)
+            if reached <= REACH_MARGIN * speed:
+                break
+            speed = reached
+            near = self._near(state, begun, speed, h, share)
+            known = rates(near, begun.both)
+        self._keep(near, force)
+        found = np.empty(state.q.size), np.empty(state.v.size)
+        change = (after - begun.both[..., 0])[: self.n, :6].T
+        step = np.repeat([[h], [share]], self.n, axis=1)
+        end = self.kernels.end(np.concatenate([begun.q, begun.v[self.v_places], self.given, change, step]))
+        found[0][self.q_places], found[1][self.v_places] = end[:7], end[7:]
+        lost = -0.5 * (force * (known[..., 0] + rates(near, after[..., None])[..., 0])).sum()
+        return FreeBodyStep(*found, near, force, lost, error)
+
+    def _begin(self, state: State, h: float, share: float) -> _Begun:
+        q, v = state.q[self.q_places], state.v[self.v_places]
+        step = np.repeat([[h], [share]], self.n, axis=1)
+        found = self.kernels.begin(np.concatenate([q, v, self.given, self.gravity, step]))
+        at, bodies, free, inertia = found[:7], found[7:28], found[28:34], found[34:]
+        both = np.zeros((self.n + self.fixed.shape[1], TWIST, 2))
+        both[: self.n, :6, 0] = bodies[12:18].T
+        both[: self.n, :6, 1] = (bodies[12:18] + h * free).T
+        mass = np.empty((self.n, 20))
+        mass[:, :18], mass[:, 18], mass[:, 19] = inertia.T, self.given[27], 1.0 / self.given[27]
+        return _Begun(at, np.concatenate([bodies, self.fixed], axis=1), both, mass, state.v)
+
+    def _speed(self, twists: np.ndarray) -> float:
+        """Largest speed of a point of a shape [m/s]."""
+        turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in (twists[: self.n, :3], twists[: self.n, 3:6]))
+        return float((moving + turning * self.reach).max())
+
+    def _near(self, state: State, begun: _Begun, speed: float, h: float, share: float) -> NearContacts:
+        """Contacts that may close within the rest of the step."""
+        reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
+        poses = self.table.poses(begun.bodies)
+        near, overlaps = self.detection.find(poses, begun.bodies[9:12], reach, UNSEEN_OVERLAP)
+        if overlaps:
+            law, depth = overlaps[0]
+            raise SimulationError(
+                f"t = {state.t:.6g} s: shapes are {depth:.3g} m in each other, and no gap of "
+                f"{self.table.contacts[law].name!r} leads out; move them apart with scene.start, or shorten the step."
+            )
+        if not np.isfinite(near.J).all():
+            row = int(np.flatnonzero(~np.isfinite(near.J).all(axis=(1, 2, 3)))[0])
+            name = self.table.contacts[near.law[row]].name
+            raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
+        return near
+
+    def _impacts(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:
+        before, after = known[:, 0].T
+        speeds = REST_STEPS * np.abs(after - before + h * near.bias[:, 0]) + self._rest(begun)
+        return is_impact(near.gap, before, speeds, h, share)
+
+    def _rest(self, begun: _Begun) -> float:
+        """Rate below which a gap neither opens nor closes [m/s]."""
+        return self.system.scale.length * resting(self.system, begun.v)
+
+    def _solve(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float):
+        """Forces (m, 3), the velocities (n, 6) that they add, and the error of the laws."""
+        m = near.gap.size
+        if not m:
+            return np.zeros((0, 3)), np.zeros((self.n, 6)), 0.0
+        b = self.without_forces(near, begun, known, h, share)
+        bodies = np.where(near.bodies < self.n, near.bodies, -1)
+        if self.graph is None or not np.array_equal(self.graph.bodies, bodies):
+            self.graph = block_contact_solver().graph(self.n, bodies)
+        unit = self.system.scale.length / self.system.scale.time
+        scale = unit + np.abs(b).max()
+        start, friction = h * self._start(near), self.table.friction[near.law]
+        f, added, (left, *_) = self.graph.solve(near.J, begun.mass, b, friction, start, LAW_TOLERANCE * scale)
+        if left <= UNSOLVED * scale:
+            return f / h, added, left / scale
+        f, added = self._dense(near, begun, bodies, b / unit, f / unit, friction)
+        return f * unit / h, added * unit, None
+
+    def without_forces(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:
+        """Relative velocities (m, 3) after a step without contact forces, less the least that gaps may have.
+
+        Parameters
+        ----------
+        near : NearContacts
+            The contacts.
+        begun : _Begun
+            The bodies.
+        known : ndarray, shape (m, 3, 2)
+            Relative velocities before the step, and after it without contact forces [m/s].
+        h, share : float
+            Step [s], and the share of it that the bodies have moved.
+        """
+        b, before, rest = known[..., 1] + (h * (1.0 - share)) * near.bias, known[:, 0, 0], self._rest(begun)
+        restitution = self.table.restitution[near.law]
+        for e in self.coefficients:
+            mine = slice(None) if len(self.coefficients) == 1 else restitution == e
+            b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), h, rest, share)
+        return b
+
+    def _dense(self, near: NearContacts, begun: _Begun, bodies, b, f, friction):
+        """Impulses of the problem in one matrix, by the convex relaxation where Coulomb's law has no solution."""
+        m = near.gap.size
+        rows, M = np.zeros((3 * m, 6 * self.n)), np.zeros((6 * self.n, 6 * self.n))
+        for c, k in zip(*np.nonzero(bodies >= 0), strict=True):
+            i = bodies[c, k]
+            rows[[c, m + 2 * c, m + 2 * c + 1], 6 * i : 6 * i + 6] = near.J[c, k, :, :6]
+        for i, own in enumerate(begun.mass):
+            M[6 * i : 6 * i + 3, 6 * i : 6 * i + 3] = own[9:18].reshape(3, 3)
+            M[6 * i + 3 : 6 * i + 6, 6 * i + 3 : 6 * i + 6] = own[19] * np.eye(3)
+        across = np.arange(m, 3 * m).reshape(m, 2)
+        laws = ContactLaws(np.arange(m), across, np.arange(m), friction, np.zeros(0, dtype=int), np.zeros(0))
+        order = [np.concatenate([x[:, 0], x[:, 1:].ravel()]) for x in (b, f)]
+        response = rows @ M
+        found, _ = ContactProblem(response @ rows.T, order[0], laws).solve(order[1])
+        return np.column_stack([found[:m], found[m:].reshape(m, 2)]), (found @ response).reshape(self.n, 6)
+
+    def forces_of(self, step: FreeBodyStep) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""
+        near, places = step.contacts, self.table.gap_places(step.contacts.key)
+        normal = np.zeros(self.table.gaps[-1])
+        friction = np.zeros((normal.size, 3))
+        normal[places] = step.force[:, 0]
+        friction[places] = (step.force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1) * self.table.sides(near.key)[:, None]
+        return normal, friction
+
+    def _start(self, near: NearContacts) -> np.ndarray:
+        """Forces (m, 3) of the last step; zero of new contacts."""
+        keys, forces = self.known
+        found = np.zeros((near.gap.size, 3))
+        if keys.size:
+            places = np.minimum(np.searchsorted(keys, near.key), keys.size - 1)
+            same = keys[places] == near.key
+            found[same] = forces[places[same]]
+        return found
+
+    def _keep(self, near: NearContacts, force: np.ndarray):
+        order = np.argsort(near.key)
+        self.known = near.key[order], force[order]
+
+    def refuse_penetration(self, state: State):
+        """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
+        near = self._near(state, self._begin(state, 0.0, 0.0), 0.0, 0.0, 0.0)
+        worst = int(np.argmin(near.gap)) if near.gap.size else 0
+        if near.gap.size and near.gap[worst] < -START_OVERLAP * self.system.scale.length:
+            name = self.table.contacts[near.law[worst]].name
+            raise StateError(
+                f"t = {state.t:.6g} s: {-near.gap[worst]:.3g} [m, rad] inside of {name!r}; move it out with scene.start."
+            )
+
+
+def rates(near: NearContacts, twists: np.ndarray) -> np.ndarray:
+    """Relative velocities (m, 3, k) of contacts by k sets of twists (n, 8, k) of the bodies."""
+    found = near.J @ twists[near.bodies]
+    return found[:, 0] + found[:, 1]
+
+
+@cache
+def block_contact_solver() -> BlockContactSolver:
+    """Machine code of the contact problem, made once on a machine."""
+
+    def make() -> BlockContactSolver:
+        laws = contact_solver()
+        functions = laws.normal, laws.friction, laws.project_normal, laws.project_friction
+        return BlockContactSolver(BlockContactLaws(*functions, ROUNDS))
+
+    return from_disk((BlockContactSolver, ROUNDS), make)
+
+
+def free_body_stepper(system: System) -> FreeBodyStepper:
+    """Stepper of a system, made once."""
+    return cached(system, (FreeBodyStepper,), lambda: FreeBodyStepper(system))

@@ -1,0 +1,219 @@
+"""Shapes of a system as arrays, the laws of their pairs, and the pairs that are near (sweep and prune).
+
+Boxes along the world axes around the shapes are sorted by their lower ends along one axis; pairs that overlap there are
+tested along the others (Baraff 1992; Cohen, Lin, Manocha, Ponamgi 1995, I-COLLIDE).
+"""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.dynamics.contact.free_bodies import free_body_kernels
+from gauss.dynamics.contact.pair_kernels import SIZES
+from gauss.rotations import along
+from gauss.scene import Box, Capsule, Collider, Contact, HalfSpace, Points, Sphere
+from gauss.scene.values import unit
+from gauss.system import System
+
+KINDS = (Sphere, Capsule, Box, HalfSpace)
+MOST_FEATURES = 64  # pairs of features of one pair of parts, for keys of contacts
+RANK = {kind: k for k, kind in enumerate(KINDS)}  # the order of kinds in a rule of contacts
+
+
+class ConvexPart(NamedTuple):
+    """Convex part of a shape: ball, capsule, box or half-space.
+
+    Attributes
+    ----------
+    shape : str
+        Name of the shape.
+    kind : type
+        One of ``KINDS``.
+    body : int
+        Its body; −1 is the ground.
+    rotation, centre : ndarray
+        Its axes (3, 3) and centre (3,) in the principal central frame of the body.
+    sizes : ndarray, shape (4,)
+        Half edges, or half length as the last one; radius [m].
+    """
+
+    shape: str
+    kind: type
+    body: int
+    rotation: np.ndarray
+    centre: np.ndarray
+    sizes: np.ndarray
+
+
+def convex_parts(system: System, shape: Collider) -> list[ConvexPart]:
+    """Convex parts of a shape: each point of its own, any other shape as it is."""
+    frame = system.frame(shape.body)
+    centres = shape.corners if isinstance(shape, Points) else np.array([shape.at])
+    kind, axes, half = Sphere if isinstance(shape, Points) else type(shape), np.eye(3), np.zeros(3)
+    if isinstance(shape, Box):
+        axes, half = shape.axes, 0.5 * np.array(shape.size)
+    elif isinstance(shape, Capsule):
+        axes, half = along(unit(shape.axis)), np.array([0.0, 0.0, 0.5 * shape.length])
+    elif isinstance(shape, HalfSpace):
+        axes = along(unit(shape.normal))
+    sizes = np.append(half, shape.radius)
+    places = [(frame.R @ axes, frame.p + frame.R @ centre) for centre in centres]
+    return [ConvexPart(shape.name, kind, frame.body, *place, sizes) for place in places]
+
+
+def _parts(system: System, contacts: list[Contact]) -> list[ConvexPart]:
+    """Convex parts of the shapes of contacts, in the order of kinds: pairs are then in the order of a rule."""
+    names = dict.fromkeys(name for contact in contacts for name in (contact.shape, contact.other))
+    parts = [part for name in names for part in convex_parts(system, system.scene.shapes[name])]
+    return sorted(parts, key=lambda part: RANK[part.kind])
+
+
+class ShapeTable:
+    """Convex parts of the shapes of a system that take part in contacts, as arrays with one column for each part.
+
+    Parameters
+    ----------
+    system : System
+        The system; all of its unilateral constraints are contacts of shapes.
+
+    Attributes
+    ----------
+    parts : list of ConvexPart
+        The parts.
+    body : ndarray of int, shape (k,)
+        Their bodies, −1 for the ground.
+    law : ndarray of int, shape (k, k)
+        1 + the number of the contact of two parts, 0 where they have none.
+    friction, restitution : ndarray
+        Coefficients of each contact.
+    """
+
+    def __init__(self, system: System):
+        self.scene = system.scene
+        self.contacts = [contact for contact in system.scene.contacts.values() if isinstance(contact, Contact)]
+        self.parts = _parts(system, self.contacts)
+        self.body = np.array([part.body for part in self.parts], dtype=np.int64)
+        self.kind = np.array([RANK[part.kind] for part in self.parts], dtype=np.int64)
+        self.sizes = np.array([part.sizes for part in self.parts]).reshape(-1, SIZES).T.copy()
+        self.own = np.array([part.rotation.ravel() for part in self.parts]).reshape(-1, 9).T.copy()
+        self.centre = np.array([part.centre for part in self.parts]).reshape(-1, 3).T.copy()
+        self.friction = np.array([contact.friction for contact in self.contacts])
+        self.restitution = np.array([contact.restitution for contact in self.contacts])
+        self.law = self._laws()
+
+    def _laws(self) -> np.ndarray:
+        law, places = np.zeros((len(self.parts),) * 2, dtype=np.int64), dict[str, list[int]]()
+        for k, part in enumerate(self.parts):
+            places.setdefault(part.shape, []).append(k)
+        for number, contact in enumerate(self.contacts):
+            for i in places[contact.shape]:
+                for j in places[contact.other]:
+                    law[i, j] = law[j, i] = number + 1
+        return law
+
+    @cached_property
+    def length(self) -> np.ndarray:
+        """Distances (k,) of the farthest points of the parts from the centres of mass of their bodies [m]."""
+        half, radius = self.sizes[:3], self.sizes[3]
+        return np.linalg.norm(self.centre, axis=0) + np.linalg.norm(half, axis=0) + radius
+
+    @cached_property
+    def planes(self) -> np.ndarray:
+        """Half-spaces."""
+        return np.flatnonzero(self.kind == RANK[HalfSpace])
+
+    @cached_property
+    def solids(self) -> np.ndarray:
+        """All other parts."""
+        return np.flatnonzero(self.kind != RANK[HalfSpace])
+
+    @cached_property
+    def on_planes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of a solid and a half-space that have a contact."""
+        first, second = np.nonzero(self.law[np.ix_(self.solids, self.planes)])
+        return self.solids[first], self.planes[second]
+
+    @cached_property
+    def gaps(self) -> np.ndarray:
+        """Numbers (k + 1,) of the gap functions before each contact, in the order of the scene."""
+        return np.cumsum([0, *(len(contact.sides(self.scene)) for contact in self.contacts)])
+
+    @cached_property
+    def number(self) -> tuple[np.ndarray, np.ndarray]:
+        """Number of each part within its shape, and of the parts of that shape."""
+        names = [part.shape for part in self.parts]
+        own = [names[:k].count(name) for k, name in enumerate(names)]
+        return np.array(own), np.array([names.count(name) for name in names])
+
+    def sides(self, key: np.ndarray) -> np.ndarray:
+        """1 for contacts whose first part is of the first shape of the scene's contact, −1 for the others, by their keys."""
+        first, second = self.pair(key)
+        contacts = (self.contacts[law - 1] for law in self.law[first, second])
+        return np.array([1.0 if self.parts[i].shape == c.shape else -1.0 for i, c in zip(first, contacts, strict=True)])
+
+    def pair(self, key: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parts of contacts by their keys."""
+        first, second = np.divmod(key // MOST_FEATURES, len(self.parts))
+        return first, second
+
+    def gap_places(self, key: np.ndarray) -> np.ndarray:
+        """Places of contacts among all gap functions of the scene, by their keys."""
+        first, second = self.pair(key)
+        turned = self.sides(key) < 0.0
+        one, other = np.where(turned, second, first), np.where(turned, first, second)
+        place, count = self.number
+        return self.gaps[self.law[first, second] - 1] + place[one] * count[other] + place[other] + key % MOST_FEATURES
+
+    def poses(self, bodies: np.ndarray) -> np.ndarray:
+        """Poses and velocities (24, k) of the parts, by those of the bodies (21, n + 1), the ground last."""
+        return free_body_kernels().place(np.concatenate([bodies[:, self.body], self.own, self.centre]))
+
+    def near(self, poses: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of parts with a contact that may be nearer than ``reach`` [m], in the order of kinds.
+
+        Parameters
+        ----------
+        poses : ndarray, shape (24, k)
+            Poses of the parts.
+        reach : float
+            Distance [m].
+        """
+        solids = self.solids
+        R, centre = poses[:9, solids].reshape(3, 3, -1), poses[9:12, solids]
+        half, radius = self.sizes[:3, solids], self.sizes[3, solids]
+        extent = (np.abs(R) * half).sum(axis=1) + (radius + 0.5 * reach)
+        low, high = centre - extent, centre + extent
+        first, second = _overlaps(low, high)
+        first, second = solids[first], solids[second]
+        keep = self.law[first, second] > 0
+        one, other = np.minimum(first, second)[keep], np.maximum(first, second)[keep]
+        solid, plane = self._near_planes(poses, extent)
+        return np.concatenate([one, solid]), np.concatenate([other, plane])
+
+    def _near_planes(self, poses: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of a solid and a half-space whose plane reaches into the box around the solid."""
+        solid, plane = self.on_planes
+        if not solid.size:
+            return solid, plane
+        whole = np.zeros((3, len(self.parts)))
+        whole[:, self.solids] = extent
+        normal = poses[[2, 5, 8]][:, plane]
+        height = (normal * (poses[9:12, solid] - poses[9:12, plane])).sum(axis=0)
+        keep = height <= (np.abs(normal) * whole[:, solid]).sum(axis=0)
+        return solid[keep], plane[keep]
+
+
+def _overlaps(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of boxes (3, k) that overlap: sorted along the axis of the widest spread, tested along the others."""
+    axis = int(np.argmax(np.ptp(low, axis=1))) if low.shape[1] else 0
+    order = np.argsort(low[axis], kind="stable")
+    starts = low[axis, order]
+    counts = np.searchsorted(starts, high[axis, order], side="right") - np.arange(order.size) - 1
+    first = np.repeat(np.arange(order.size), counts)
+    second = first + 1 + np.arange(first.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    first, second = order[first], order[second]
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    keep = (low[j, first] <= high[j, second]) & (low[j, second] <= high[j, first])
+    keep &= (low[k, first] <= high[k, second]) & (low[k, second] <= high[k, first])
+    return first[keep], second[keep]

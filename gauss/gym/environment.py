@@ -1,0 +1,62 @@
+"""Environment of one motion."""
+
+import gymnasium
+import numpy as np
+
+from gauss.dynamics.outputs import split
+from gauss.errors import SimulationError
+from gauss.gym.task import Task
+from gauss.simulation import Simulator
+
+
+class MechanismEnv(gymnasium.Env):
+    """Environment of Gymnasium for a task; contacts and friction included.
+
+    The observation (m,) is the outputs of the scene, or coordinates and rates where it has none; an action (n_u,) is held
+    for 1 / rate. A motion that cannot continue terminates: ``info["failure"]`` says why.
+
+    Parameters
+    ----------
+    task : Task
+        Scene, reward and end of an episode.
+    integrator : str, optional
+        Fixed-step method, see :class:`gauss.Simulator`.
+    """
+
+    metadata: dict = {"render_modes": []}  # noqa: RUF012 (as Gymnasium declares it)
+
+    def __init__(self, task: Task, integrator: str | None = None):
+        self.task, self.simulator = task, Simulator(task.scene, task.step, integrator)
+        self.action_space = task.action_space
+        self.observation_space = task.observation_space(self._observed().size)
+        self._actions = 0
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
+        """Begin an episode from the start of the scene, changed at random; ``options={"state": State}`` gives another."""
+        super().reset(seed=seed)
+        state = (options or {}).get("state")
+        if state is None:
+            self.simulator.reset(seed=int(self.np_random.integers(2**31)), spread=self.task.spread)
+        else:
+            self.simulator.reset(state)
+        self._actions = 0
+        return self._observed(), {}
+
+    def step(self, action) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """Hold an action: (observation, reward, terminated, truncated, info)."""
+        before = self._observed()
+        try:
+            self.simulator.step(action, n=self.task.hold)
+        except SimulationError as error:
+            return before, 0.0, True, False, {"failure": str(error)}
+        self._actions += 1
+        state, u = self.simulator.state, np.asarray(action, dtype=float)
+        given = state.q, state.v, u, split(self.simulator.output_vector(), self.task.scene)
+        reward, ends = float(self.task.reward(*given)), bool(self.task.terminated(*given))
+        return self._observed(), reward, ends, self._actions >= self.task.actions, {}
+
+    def _observed(self) -> np.ndarray:
+        if self.task.scene.outputs:
+            return self.simulator.output_vector()
+        state = self.simulator.state
+        return np.concatenate([state.q, state.v])

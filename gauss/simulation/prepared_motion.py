@@ -1,0 +1,178 @@
+"""Prepared motions: everything of a motion but its initial state is decided, so that a call costs a few microseconds.
+
+The step loop is that of :func:`gauss.simulate`: from a consistent state, its results are the same bit for bit.
+"""
+
+import ctypes
+
+import numpy as np
+
+from gauss.arguments import named_arguments
+from gauss.codegen import one_tier
+from gauss.codegen.kernels import Control, LoopStatus, address
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
+from gauss.dynamics.plan import plan_of
+from gauss.errors import SimulationError, StateError
+from gauss.integrators import FixedStep
+from gauss.scene import Scene
+from gauss.simulation.arguments import checked_problem
+from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+from gauss.simulation.simulate import simulate
+from gauss.simulation.step_limits import BUDGET
+from gauss.simulation.trajectory import Trajectory
+from gauss.system import State, System
+
+
+class PreparedMotion:
+    """Function (q, v) → samples of the motion from there; made by :func:`prepare`.
+
+    Attributes
+    ----------
+    system : System
+        The system.
+    times : ndarray, shape (k,)
+        Samples [s], counted from the start.
+    """
+
+    def __init__(self, scene: Scene | System, duration: float, times, options: dict):
+        self.options, end = options, [duration] if times is None else times
+        given = {"integrator": "dop853", "step": None, "rtol": 1e-12, "atol": None, "stabilisation": "projection"} | options
+        integrator, step, rtol, atol, stabilisation = given.values()
+        with one_tier():
+            problem = checked_problem(
+                scene, duration, integrator, step, rtol, atol, "auto", stabilisation, None, end, (), False
+            )
+            self.system, self.duration, plan = problem.system, float(duration), plan_of(problem.question)
+            name = self.system.scene.name
+            if plan.driver != "compiled loop" or isinstance(problem.method, FixedStep):
+                fixed = "the integrator has fixed steps, which gauss.Simulator makes"
+                why = fixed if isinstance(problem.method, FixedStep) else f"its driver is {plan.driver!r}"
+                why = "; ".join(map(str, plan.rejected)) or why
+                raise SimulationError(f"a motion of {name!r} cannot be prepared: {why}.")
+            if problem.switching.times or problem.switching.conditional:
+                raise SimulationError(f"a motion of {name!r} cannot be prepared: laws switch; use gauss.simulate.")
+            run = CompiledAdaptiveRun(problem)
+            loop = run.prepared()
+            simulate(self.system, duration, times=end, progress=False, **options)  # confirms the accelerations of the loop
+        self._origin, self._layout, self._first = problem.start, run.layout, loop.function("start")
+        samples = np.asarray(problem.samples, dtype=float)
+        self.times, self._begins = samples - problem.start.t, bool(samples[0] == problem.start.t)
+        self._later = np.ascontiguousarray(samples[int(self._begins) :])
+        self._rows = np.empty((samples.size, run.layout.row))
+        run.control.samples, self._control = float(self._later.size), Control()
+        self._template = bytes(run.control)
+        self._numbers = np.ctypeslib.as_array((ctypes.c_double * len(Control.names())).from_buffer(self._control))
+        self._settings = np.frombuffer(self._template)
+        tolerance, n, size = problem.tolerance, self.system.n_q + self.system.n_v, run.layout.size
+        self._given = np.concatenate(
+            [[problem.start.t], np.zeros(n), [tolerance.rtol, tolerance.atol, tolerance.atol_rates]]
+        )
+        self._q, self._v = np.split(self._given[1 : 1 + n], [self.system.n_q])
+        self._begun, self._point, self._confirmed = np.empty(size + 7), np.empty(size), np.empty(size)
+        self._start_arguments = ctypes.c_void_p(address(self._given)), ctypes.c_void_p(address(self._begun))
+        out = self._rows[int(self._begins) :]
+        arrays = self._point, self._confirmed, self._later, out
+        self._arguments = ctypes.byref(self._control), *(ctypes.c_void_p(address(array)) for array in arrays)
+        self._loop = loop.entry
+
+    def __call__(self, q=None, v=None) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates (k, n_q) and rates (k, n_v) at the samples.
+
+        Parameters
+        ----------
+        q, v : array_like, shape (n_q,), (n_v,), optional
+            Consistent initial state; that of the scene when not given.
+
+        Returns
+        -------
+        tuple of ndarray
+            Views of one array, which the next call overwrites.
+
+        Raises
+        ------
+        StateError
+            If the state does not fit.
+        SimulationError
+            If the motion cannot continue.
+        """
+        try:
+            self._q[:], self._v[:] = self._origin.q if q is None else q, self._origin.v if v is None else v
+        except (TypeError, ValueError) as error:
+            raise StateError(
+                f"expected {self._q.size} coordinates and {self._v.size} rates, got {q!r} and {v!r}."
+            ) from error
+        if not self._is_done():
+            found = self.trajectory(self._q.copy(), self._v.copy())
+            return found.q, found.v
+        n_q = self._q.size
+        return self._rows[:, 1 : 1 + n_q], self._rows[:, 1 + n_q : 1 + n_q + self._v.size]
+
+    def _is_done(self) -> bool:
+        """Make the motion; whether it is confirmed to its end."""
+        size, begun, control = self._point.size, self._begun, self._control
+        self._first.call(*self._start_arguments)
+        self._point[:] = self._confirmed[:] = begun[:size]
+        self._numbers[:] = self._settings
+        error, _, control.kinetic, potential, control.initial, control.magnitude, control.h = begun[size:].tolist()
+        control.lowest = control.highest = potential
+        if not error <= ACCELERATION_TOLERANCE:
+            return False
+        if self._begins:
+            self._rows[0] = self._point[: self._layout.row]
+        self._loop.call(*self._arguments, BUDGET)
+        while control.status == LoopStatus.PAUSED:
+            self._loop.call(*self._arguments, BUDGET)
+        return control.status == LoopStatus.DONE and control.constraint_residual <= ACCELERATION_TOLERANCE
+
+    def trajectory(self, q=None, v=None) -> Trajectory:
+        """Motion as :func:`gauss.simulate` returns it, with work, statistics and energy balance."""
+        start = State(self._origin.t, self._origin.q if q is None else q, self._origin.v if v is None else v)
+        return simulate(self.system, self.duration, state=start, times=self.times, progress=False, **self.options)
+
+
+@named_arguments
+def prepare(
+    scene: Scene | System,
+    duration: float,
+    *,
+    times=None,
+    integrator: str = "dop853",
+    step: float | None = None,
+    rtol: float = 1e-12,
+    atol: float | tuple[float, float] | dict | None = None,
+    stabilisation: str = "projection",
+) -> PreparedMotion:
+    """Prepare motions that differ in their initial states only: a call costs a few microseconds besides its steps.
+
+    Parameters
+    ----------
+    scene : Scene or System
+        Smooth scene, or a compiled one, whose loads are traced and do not switch.
+    duration : float
+        Simulated time [s].
+    times : array_like, optional
+        Samples [s], counted from the start; the end when not given.
+    integrator, step, rtol, atol, stabilisation
+        As of :func:`gauss.simulate`, for methods that choose their steps.
+
+    Returns
+    -------
+    PreparedMotion
+        Function (q, v) → coordinates (k, n_q) and rates (k, n_v); its ``trajectory(q, v)`` is a
+        :class:`gauss.Trajectory`.
+
+    Raises
+    ------
+    SimulationError
+        If the steps are not compiled, with the reasons, or a law switches.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> swing = gauss.prepare(gauss.load("pendulum"), 0.5)
+    >>> q, v = swing([0.1], [0.0])
+    >>> q.shape
+    (1, 1)
+    """
+    options = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol, "stabilisation": stabilisation}
+    return PreparedMotion(scene, duration, times, options)
