@@ -63,7 +63,7 @@ def _scipy(method: str) -> Callable:
         from scipy import integrate
 
         begin, end = float(times[0]), float(times[-1])
-        sampled, interruption, failure = len(times) > 2, None, None
+        sampled, reached, interruption, failure = len(times) > 2, begin, None, None
         steps: list[tuple] = []  # time, values and interpolant of each, kept at once: an interruption may come in between
         with np.errstate(all="ignore"):  # divergence is reported
             solver = getattr(integrate, method)(f, begin, y0, end, rtol=max(rtol, 3e-14), atol=atol, max_step=largest)
@@ -72,20 +72,28 @@ def _scipy(method: str) -> Callable:
                     failure = solver.step()
                     if solver.status == "failed":
                         break
-                    if not sampled or solver.t != (steps[-1][0] if steps else begin):
+                    if not sampled or solver.t != reached:
+                        reached = solver.t
                         steps.append((solver.t, solver.y, solver.dense_output() if sampled else None))
             except KeyboardInterrupt as error:
                 interruption = error
         counts = len(steps), solver.nfev, int(solver.nlu)
-        t = np.array([begin, *(reached for reached, _, _ in steps)])
-        if not sampled or not steps:
-            return LibrarySolution(t, np.array([y0, *(y for _, y, _ in steps)]), *counts, failure, interruption)
-        inside = times[times <= t[-1]]
-        later_piece = method == "LSODA"  # at the end of a piece; as by solve_ivp
-        found = integrate.OdeSolution(t, [piece for _, _, piece in steps], alt_segment=later_piece)
-        return LibrarySolution(inside, found(inside).T, *counts, failure, interruption)
+        return LibrarySolution(*_values(method, times, y0, steps), *counts, failure, interruption)
 
     return solve
+
+
+def _values(method: str, times: np.ndarray, y0: np.ndarray, steps: list[tuple]) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values at every step, or at the samples that were reached."""
+    from scipy.integrate import OdeSolution
+
+    ends, values, pieces = zip(*steps, strict=True) if steps else ((), (), ())
+    t = np.array([times[0], *ends])
+    if len(times) == 2 or not steps:
+        return t, np.array([y0, *values])
+    inside = times[times <= t[-1]]
+    later_piece = method == "LSODA"  # at the end of a piece; as by solve_ivp
+    return inside, OdeSolution(t, pieces, alt_segment=later_piece)(inside).T
 
 
 class _Interruptible:
