@@ -20,6 +20,7 @@ class FreeBodyEngine(Engine):
 
     name = "free bodies, a kernel for each kind of pair of shapes"
     error = 0.0
+    evaluations, rescued = 0, 0
 
     def rates(self, system: System, state: State, load=None) -> Rates:
         """Refuse: contacts make accelerations of single states."""
@@ -43,8 +44,8 @@ class FreeBodyRun(PythonRun):
     """
 
     def __init__(self, problem: Problem):
-        engine = FreeBodyEngine()
-        super().__init__(problem.system, TIME_STEPPING, engine, None, problem.step, problem.end, switching=problem.switching)
+        self.engine = FreeBodyEngine()
+        super().__init__(problem.system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
         self.stepper = free_body_stepper(problem.system)
         self.largest, self.relaxed = 0.0, 0
         self.h = problem.step or 0.0  # a fixed step is always given
@@ -63,7 +64,7 @@ class FreeBodyRun(PythonRun):
 
     def _stepped(self, point: Point, t: float) -> Point:
         found = self.stepper.step(point.state, t - point.state.t)
-        self.solver.evaluations += 1
+        self.engine.evaluations += 1
         self.largest, self.relaxed = max(self.largest, found.error or 0.0), self.relaxed + (found.error is None)
         work = point.work + np.array([0.0, 0.0, (t - point.state.t) * found.dissipated])
         return Point(State(t, found.q, found.v), work, point.rates)
