@@ -44,8 +44,8 @@ class FreeBodyRun(PythonRun):
     """
 
     def __init__(self, problem: Problem):
-        self.engine = FreeBodyEngine()
-        super().__init__(problem.system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
+        self.engine, system = FreeBodyEngine(), problem.system
+        super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
         self.stepper = free_body_stepper(problem.system)
         self.largest, self.relaxed = 0.0, 0
         self.h = problem.step or 0.0  # a fixed step is always given
