@@ -112,7 +112,7 @@ def driven_as(system: System, laws: dict[str, Callable]) -> System:
 
 
 def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
-    """Values (n_u,) of inputs as a law returned them.
+    """Values (n_u,) of inputs as a control law returned them, or as they were given to a step.
 
     Raises
     ------
@@ -121,8 +121,8 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     """
     found = _numbers(value)
     if found is None or found.size != len(names):
-        expected = f"{len(names)} numbers ({', '.join(names)})" if len(names) > 1 else f"a number ({names[0]})"
-        raise SimulationError(f"t = {t:.6g} s: the control law returned {value!r}; expected {expected}.")
+        expected = f"expected {len(names)} number(s) ({', '.join(names)})" if names else "the scene declares none"
+        raise SimulationError(f"t = {t:.6g} s: the values of the inputs are {value!r}; {expected}.")
     found = found.reshape(-1)
     if not np.isfinite(found).all():
         k = int(np.flatnonzero(~np.isfinite(found))[0])

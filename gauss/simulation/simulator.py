@@ -7,6 +7,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
+from numbers import Integral
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from gauss.simulation.held_inputs import HeldInputs, checked_inputs
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import steps_per_check
+from gauss.simulation.tolerances import check_tolerances
 from gauss.system import State, System, retract
 
 FAILURES = {
@@ -102,6 +104,7 @@ class Simulator:
     @named_arguments
     def __init__(self, scene: Scene | System, step: float, integrator: str | None = None, stabilisation: str = "projection"):
         require(scene, (Scene, System), "Simulator")
+        check_tolerances(step=step)
         whole = scene if isinstance(scene, Scene) else scene.scene
         integrator = integrator or ("time_stepping" if whole.nonsmooth else "rk4")
         with one_tier():
@@ -210,12 +213,10 @@ class Simulator:
             self._recover(n)
 
     def _set(self, u):
-        try:
-            self._u[:] = u
-        except (TypeError, ValueError):
-            self._u[:] = checked_inputs(u, self.inputs, self.t)
-        if not isfinite(self._u @ self._u):
-            checked_inputs(self._u.copy(), self.inputs, self.t)
+        given = u if isinstance(u, np.ndarray) and u.dtype == float else _floats(u)
+        if given is None or given.shape != self._u.shape or not isfinite(given @ given):
+            given = checked_inputs(u, self.inputs, self.t)
+        self._u[:] = given
         if self._run.method.starts_from_accelerations:  # its method state holds those under the inputs before
             point = self._layout.point(self._point)
             rates = self._run.evaluated(point.state)
@@ -223,7 +224,7 @@ class Simulator:
 
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
-        if n < 1:
+        if not isinstance(n, Integral) or n < 1:
             raise SimulationError(f"n: expected a positive number of steps, got {n!r}.")
         if n > len(self._grid):
             self._grid = _unchecked(n)
@@ -306,6 +307,13 @@ def _run_of(problem: Problem) -> CompiledFixedRun:
 def _unchecked(n: int) -> np.ndarray:
     """Grid (n, 2) of steps that are checked every few steps, not where a call ends."""
     return np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
+
+
+def _floats(u) -> np.ndarray | None:
+    try:
+        return np.asarray(u, dtype=float)
+    except (TypeError, ValueError):
+        return None
 
 
 def _zero(count: int) -> Callable:

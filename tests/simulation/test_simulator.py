@@ -78,10 +78,26 @@ def test_the_seed_decides_the_start():
     assert np.abs(phi).max() <= ROUNDING
 
 
-@pytest.mark.parametrize("u, message", [([np.nan], "input 'u' is nan"), ([1.0, 2.0], "expected a number"), ("x", "number")])
-def test_invalid_inputs_are_refused(u, message):
-    with pytest.raises(SimulationError, match=message):
-        simulator("cart_pole", "rail", None).step(u)
+@pytest.mark.parametrize("u", [[np.nan], [np.inf], [1.0, 2.0], [], "x", None, [[1.0], [2.0]]])
+def test_refused_inputs_change_nothing(u):
+    sim, other = simulator("cart_pole", "rail", None), simulator("cart_pole", "rail", None)
+    sim.step([1.0]), other.step([1.0])
+    with pytest.raises(SimulationError):
+        sim.step([u] if u is None else u)
+    sim.step(), other.step()
+    assert np.array_equal(sim.state.q, other.state.q)
+
+
+def test_inputs_that_a_scene_does_not_declare_are_refused():
+    sim = gauss.Simulator(gauss.load("pendulum"), STEP)
+    with pytest.raises(SimulationError, match="declares none"):
+        sim.step([1.0])
+
+
+@pytest.mark.parametrize("step, n", [(0.0, 1), (np.nan, 1), ("1", 1), (STEP, 0), (STEP, 1.5)])
+def test_steps_are_positive(step, n):
+    with pytest.raises(SimulationError, match="positive number"):
+        gauss.Simulator(gauss.load("pendulum"), step).step(n=n)
 
 
 def test_scenes_without_a_compiled_step_are_refused():
