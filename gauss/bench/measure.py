@@ -140,7 +140,7 @@ def _judged(instance: Instance, programme: Programme, outcome: Outcome, toleranc
     row = {"claimed": outcome.found, "iterations": outcome.iterations, "reason": outcome.message, "outcome": "refused"}
     if outcome.x is None:
         return row
-    if not all(np.isfinite(part).all() for part in (outcome.x, outcome.y, outcome.z) if part is not None):
+    if not _is_finite(outcome):
         return row | {"outcome": "not finite"}
     y = np.zeros(programme.d.size) if outcome.y is None or not np.size(outcome.y) else outcome.y
     z = np.zeros(programme.k.size) if outcome.z is None or not np.size(outcome.z) else outcome.z
@@ -157,6 +157,11 @@ def _judged(instance: Instance, programme: Programme, outcome: Outcome, toleranc
         return row | {"outcome": "answered", "error": instance.error(None, outcome.x), "dual_error": dual_error}
     answer = read(instance.compulsion, programme, outcome)
     return row | {"outcome": "answered"} | _certified(instance, answer)
+
+
+def _is_finite(outcome: Outcome) -> bool:
+    """Whether all numbers of an outcome are finite."""
+    return all(np.isfinite(part).all() for part in (outcome.x, outcome.y, outcome.z) if part is not None)
 
 
 def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:
