@@ -11,6 +11,8 @@ from scipy import sparse
 from scipy.io import savemat
 
 from gauss.bench.folders import of_folder
+from gauss.bench.publish import publish
+from gauss.bench.qp import compare
 from gauss.errors import FileError
 
 NONE = np.array(None)  # how qpsolvers writes what is not there
@@ -147,3 +149,16 @@ def test_what_is_no_file_is_left_out(tmp_path):
     os.mkfifo(tmp_path / "pipe.npz")
     with pytest.raises(FileError, match="no .npz"):
         list(of_folder(tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", ["high", "low"])
+def test_a_folder_of_problems_has_a_page(tmp_path, level):
+    """With one that is infeasible, one without rows, and one that is called like a number."""
+    np.savez(tmp_path / "001.npz", **PLAIN)
+    np.savez(tmp_path / "nan.npz", **PLAIN | {"lb": np.ones(2), "ub": np.zeros(2)})
+    np.savez(tmp_path / "free.npz", **PLAIN | {"A": NONE, "b": NONE})
+    given = of_folder(tmp_path)
+    table = compare(tmp_path / "out", instances=given, backends=["daqp"], levels=[level], progress=False)
+    page, *_ = publish(tmp_path / "out", table.path, None)
+    assert all(f"**{name}**" in page.read_text(encoding="utf-8") for name in ("001", "nan", "free"))
