@@ -170,13 +170,19 @@ class Programmed:
 def attempt(solver: Solver, programme: Programme) -> Outcome:
     """Outcome of a QP solver; whatever it raises or wrongly returns becomes the message of a failed one."""
     try:
-        return _checked(call(solver, programme), programme)
+        return checked_outcome(call(solver, programme), programme)
     except BackendError as error:
         return Outcome(None, None, None, False, f"{solver.name}: {error}")
 
 
-def _checked(said, programme: Programme) -> Outcome:
-    """Outcome with vectors of the sizes of its programme; a BackendError if it has none."""
+def checked_outcome(said, programme: Programme) -> Outcome:
+    """Outcome with vectors of the sizes of its programme.
+
+    Raises
+    ------
+    BackendError
+        If it is no outcome, or holds other things than real numbers of these shapes, a claim and a number of iterations.
+    """
     if not isinstance(said, Outcome):
         raise BackendError(f"failed: it returned a {type(said).__name__}, expected a gauss.backends.programme.Outcome.")
     sizes = {"x": programme.c.size, "y": programme.d.size, "z": programme.k.size}

@@ -11,7 +11,7 @@ import numpy as np
 import qpsolvers
 
 from gauss.backends import qpsolvers_
-from gauss.backends.programme import Outcome, Programme, Programmed
+from gauss.backends.programme import Outcome, Programme, Programmed, checked_outcome
 from gauss.bench import casadi_, clocks, conic, coulomb, mujoco_
 from gauss.bench.instances import FILE, Instance
 from gauss.bench.levels import settings
@@ -126,33 +126,16 @@ def imported(solver: str) -> Callable[[], Callable[[Programme], Outcome]]:
     module, _, name = solver.partition(":")
     try:
         return getattr(import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
+    except Exception as error:  # whatever a module of somebody else raises
         raise BackendError(
-            f"solver {solver!r}: {error}. Expected module:Class, importable from here, whose objects "
-            "are called with a gauss.backends.programme.Programme and return an Outcome."
+            f"solver {solver!r}: {type(error).__name__}: {error}. Expected module:Class, importable from here, whose "
+            "objects are called with a gauss.backends.programme.Programme and return an Outcome."
         ) from None
 
 
 def _own(solver: str, programme: Programme) -> Ready:
     make = imported(solver)
-    return Ready(lambda: make()(programme), lambda found: _checked(found, programme))
-
-
-def _checked(found, programme: Programme) -> Outcome:
-    """Outcome of a solver of one's own, if it is one.
-
-    Raises
-    ------
-    BackendError
-        If it is none, or its parts have other shapes than the programme.
-    """
-    if not isinstance(found, Outcome):
-        raise BackendError(f"the solver returned {type(found).__name__}, expected gauss.backends.programme.Outcome.")
-    for name, size in (("x", programme.c.size), ("y", programme.d.size), ("z", programme.k.size)):
-        part = getattr(found, name)
-        if part is not None and np.shape(part) != (size,):
-            raise BackendError(f"the solver returned {name} of shape {np.shape(part)}, expected ({size},).")
-    return found
+    return Ready(lambda: make()(programme), lambda found: checked_outcome(found, programme))
 
 
 def _read(found: qpsolvers.Solution, solver: str, problem: qpsolvers.Problem, chosen: dict) -> Outcome:

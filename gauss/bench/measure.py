@@ -1,5 +1,6 @@
 """One cell of the comparison, measured in a worker: a backend on an instance, in a form, at a level."""
 
+from dataclasses import replace
 from functools import lru_cache
 from statistics import median
 
@@ -41,12 +42,27 @@ def measure(instance: Instance, backend: str, form: str, level: str) -> dict:
     if not takes(backend, programme):
         raise BackendError(f"takes dense matrices only; {programme.c.size} unknowns are too many for these")
     _loaded(backend, level, instance.structure.kind)
-    outcome, times = _called(backend, programme, level)
+    given = _copied(programme)  # a solver may change what it is given; it is judged by the programme itself
+    outcome, times = _called(backend, given, level)
+    if _differs(given, programme):
+        outcome = replace(outcome, found=False, message="the solver changed the programme that it was given")
     row = _nothing() | times | _judged(instance, programme, outcome, LEVELS[level])
     row["warm"] = _warm(instance, backend, programme, level)
     if times["seconds"] > LIMIT:
         row |= {"outcome": "timed out", "claimed": False, "reason": f"{times['seconds']:.2g} s, the limit is {LIMIT:g} s"}
     return row
+
+
+def _copied(programme: Programme) -> Programme:
+    """Programme with matrices and vectors of its own."""
+    return replace(programme, **{name: getattr(programme, name).copy() for name in ("H", "c", "C", "d", "K", "k")})
+
+
+def _differs(given: Programme, programme: Programme) -> bool:
+    """Whether any number of two programmes of the same shape differs; the order in which they are stored may."""
+    vectors = zip((given.c, given.d, given.k), (programme.c, programme.d, programme.k), strict=True)
+    matrices = zip((given.H, given.C, given.K), (programme.H, programme.C, programme.K), strict=True)
+    return not all(np.array_equal(a, b, equal_nan=True) for a, b in vectors) or any((a != b).nnz for a, b in matrices)
 
 
 def _nothing() -> dict:
@@ -124,7 +140,7 @@ def _judged(instance: Instance, programme: Programme, outcome: Outcome, toleranc
     row = {"claimed": outcome.found, "iterations": outcome.iterations, "reason": outcome.message, "outcome": "refused"}
     if outcome.x is None:
         return row
-    if not np.isfinite(outcome.x).all():
+    if not _is_finite(outcome):
         return row | {"outcome": "not finite"}
     y = np.zeros(programme.d.size) if outcome.y is None or not np.size(outcome.y) else outcome.y
     z = np.zeros(programme.k.size) if outcome.z is None or not np.size(outcome.z) else outcome.z
@@ -141,6 +157,11 @@ def _judged(instance: Instance, programme: Programme, outcome: Outcome, toleranc
         return row | {"outcome": "answered", "error": instance.error(None, outcome.x), "dual_error": dual_error}
     answer = read(instance.compulsion, programme, outcome)
     return row | {"outcome": "answered"} | _certified(instance, answer)
+
+
+def _is_finite(outcome: Outcome) -> bool:
+    """Whether all numbers of an outcome are finite."""
+    return all(np.isfinite(part).all() for part in (outcome.x, outcome.y, outcome.z) if part is not None)
 
 
 def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:

@@ -40,15 +40,15 @@ class Measurement:
 
 
 def chosen(names: Iterable[str] | None, existing: Iterable[str], what: str) -> tuple[str, ...]:
-    """Return the names, or all if none is given.
+    """Return the names, each once, or all if none is given.
 
     Raises
     ------
     BackendError
         If one does not exist.
     """
-    existing = tuple(existing)
-    for name in names or ():
+    existing, names = tuple(existing), tuple(names or ())
+    for name in names:
         if name not in existing:
             raise BackendError(f"no {what} {name!r}. {did_you_mean(name, existing)}")
-    return tuple(names) if names else existing
+    return tuple(dict.fromkeys(names)) if names else existing

@@ -7,6 +7,7 @@ import numpy as np
 from gauss.bench.class_page import at_main_level, class_page
 from gauss.bench.classes import name_of
 from gauss.bench.fronts import front, fronts
+from gauss.bench.instances import FILE
 from gauss.bench.levels import OWN
 from gauss.bench.markdown import when_and_where
 from gauss.bench.problems import INCONSISTENT
@@ -48,7 +49,10 @@ def _charts(folder: Path, rows, header) -> list[Path]:
     problems = [name for found in classes.values() for name in found]
     where = when_and_where(header)
     paths = [folder / f"qp_{name}.png" for name in ("errors", "time_error", "profile")]
-    view.plot_errors(*_errors(rows, names, problems), paths[0], f"Form {FORM}, level {LEVEL}; {where}")
+    errors = _errors(rows, names, problems)
+    if not errors[2].size:  # no problem with a solution, or not measured in this form, or at this level
+        return []
+    view.plot_errors(*errors, paths[0], f"Form {FORM}, level {LEVEL}; {where}")
     view.plot_time_error(rows, names, paths[1], f"All problems and forms; grey: all backends; {where}")
     profiles = {
         f"{group}, error ≤ {a:g}": profile(rows, found, FORM, LEVEL, a, RATIOS)
@@ -61,7 +65,8 @@ def _charts(folder: Path, rows, header) -> list[Path]:
 
 def _errors(rows, names: list[str], problems: list[str]) -> tuple[list[str], list[str], np.ndarray, np.ndarray]:
     """Backends, problems, errors of their answers (backends, problems), and which of these are claimed beyond."""
-    cells = {(r["backend"], r["problem"]): r for r in rows if (r["form"], r["level"]) in ((FORM, LEVEL), (OWN, OWN))}
+    main = (FORM, LEVEL), (FILE, LEVEL), (OWN, OWN)
+    cells = {(r["backend"], r["problem"]): r for r in rows if (r["form"], r["level"]) in main}
     shown = [name for name in names if any(key[0] == name for key in cells)]
     errors = np.array([[cells[n, p]["error"] if (n, p) in cells else np.nan for p in problems] for n in shown])
     broken = np.array([[(n, p) in cells and is_broken(cells[n, p]) for p in problems] for n in shown])

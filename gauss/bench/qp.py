@@ -7,6 +7,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from gauss.backends import BACKENDS
+from gauss.backends.programme import FORMS as PROGRAMMES
 from gauss.bench import compiled
 from gauss.bench.clocks import COMPILING
 from gauss.bench.contestants import everyone, imported, suits
@@ -18,6 +19,7 @@ from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers
+from gauss.errors import BackendError
 
 NAME = "qp"  # of the table of the selection
 LOCK, CLASS_LOCK = "qp.lock", "qp_classes.lock"  # beside it, and beside tables of classes
@@ -88,20 +90,24 @@ def compare(
     Raises
     ------
     BackendError
-        If there is no such backend, problem, class, level or solver.
+        If there is no such backend, problem, form, class, level or solver, or two problems have the same name.
     """
     solvers = tuple(solvers)
     for solver in solvers:
         imported(solver)
     names = (*chosen(backends, (AUTO, *BACKENDS, *everyone()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
-    levels = chosen(levels, LEVELS, "level")
+    levels, forms = chosen(levels, LEVELS, "level"), chosen(forms, PROGRAMMES, "form")
     table = ResultTable(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
     write_lock(Path(folder) / (LOCK if name == NAME else CLASS_LOCK))
     given = of_selection(problems, chosen(groups, GROUPS, "class")) if instances is None else instances
     count = len(problems) if instances is None else None
     with nullcontext(workers) if workers else Workers() as places:
+        named: set[str] = set()
         for instance in tqdm(given, total=count, unit="problem", disable=not progress, desc="bench qp"):
+            if instance.name in named:
+                raise BackendError(f"two problems have the name {instance.name!r}; the table tells them apart by it.")
+            named.add(instance.name)
             for cell in _cells(instance, names, forms, levels):
                 _measure(table, instance, cell, places)
             if instances is None and not table.has(problem=instance.name, form=OWN, backend=compiled.NAME, level=OWN):

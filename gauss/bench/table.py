@@ -6,6 +6,8 @@ from pathlib import Path
 
 from gauss.errors import FileError
 
+TEXTS = ("problem", "group", "backend", "reason")  # columns of names and words, be they "001" or "nan"
+
 
 class ResultTable:
     """Rows of one measurement in a CSV file with a header of comments; rows that are there are not measured again.
@@ -52,17 +54,17 @@ class ResultTable:
 
     def numbers(self) -> list[dict]:
         """All rows, numbers and truths as such."""
-        return [{column: _value(text) for column, text in row.items()} for row in self.rows.values()]
+        return [_values(row) for row in self.rows.values()]
 
     def _key(self, row: dict) -> tuple:
-        return tuple(str(row[key]) for key in self.keys)
+        return tuple(_text(row[key]) for key in self.keys)
 
     def _take_up(self, comments: list[str]):
         lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
-        found = [line for line in lines if line.startswith("#")]
+        found, rest = _parted(lines)
         if found[1:] != comments[1:]:  # the first is the date
             raise FileError(f"{self.path} was measured elsewhere or with other versions; --fresh starts over.")
-        reader = csv.DictReader(line for line in lines if not line.startswith("#") and line.endswith("\n"))
+        reader = csv.DictReader(line for line in rest if line.endswith("\n"))
         if reader.fieldnames != list(self.columns):
             raise FileError(f"{self.path} has other columns than this table; --fresh starts over.")
         self.rows = {self._key(row): row for row in reader if None not in row.values() and None not in row}
@@ -90,20 +92,30 @@ def write_table(path: Path, header: Iterable[str], rows: Sequence[dict], columns
 def read_table(path: Path) -> list[dict]:
     """Rows of a finished table."""
     with open(path, newline="", encoding="utf-8") as file:
-        return [
-            {column: _value(text) for column, text in row.items()}
-            for row in csv.DictReader(line for line in file if not line.startswith("#"))
-        ]
+        return [_values(row) for row in csv.DictReader(_parted(file)[1])]
 
 
 def header_of(path: Path) -> list[str]:
     """Lines of the header of a table."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return [line.removeprefix("# ") for line in lines if line.startswith("#")]
+    return [line.removeprefix("# ") for line in _parted(path.read_text(encoding="utf-8").splitlines())[0]]
+
+
+def _parted(lines: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Lines of comments at the head, and those that follow; the name of a problem may begin like a comment."""
+    lines = list(lines)
+    count = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    return lines[:count], lines[count:]
 
 
 def _text(value) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value).replace("\n", " ")[:200]
+    """A number in six digits; of words, what can be printed in one line: solvers and names of files hold anything."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "".join(c if c.isprintable() else " " for c in str(value))[:200]
+
+
+def _values(row: dict) -> dict:
+    return {column: text if column in TEXTS else _value(text) for column, text in row.items()}
 
 
 def _value(text: str):

@@ -93,7 +93,7 @@ class Worker:
         pipe, far = self.context.Pipe()
         self.pipe = pipe
         self.process = process = self.context.Process(target=_serve, args=(far,), daemon=True)
-        with STARTING, _environment(self.environment):
+        with STARTING, _environment(self.environment), _uninterrupted():
             process.start()
         far.close()
         if not pipe.poll(START) or pipe.recv() != "ready":
@@ -143,6 +143,19 @@ def _environment(given: dict[str, str]):
     finally:
         for name, value in before.items():
             os.environ.pop(name) if value is None else os.environ.update({name: value})
+
+
+@contextmanager
+def _uninterrupted():
+    """Hold back interruptions, so that a process that starts here never sees one: not even while it imports."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _death(code: int | None) -> str:

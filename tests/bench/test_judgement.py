@@ -84,6 +84,32 @@ class NotANumber:
         return Outcome(np.full(programme.c.size, np.nan), None, None, True, "solved")
 
 
+class LiarWithoutMultipliers(Perfect):
+    """Its multipliers are not finite."""
+
+    def __call__(self, programme):
+        found = super().__call__(programme)
+        return Outcome(found.x, np.nan * found.y, found.z, True, "solved")
+
+
+class Changes:
+    """It makes zero right by changing what is asked."""
+
+    def __call__(self, programme):
+        for part in (programme.H.data, programme.C.data, programme.K.data, programme.c, programme.d, programme.k):
+            part[:] = 0.0
+        return SaysSolved()(programme)
+
+
+class ClaimsInWords(Perfect):
+    """What it claims is neither True nor False."""
+
+    def __call__(self, programme):
+        found = super().__call__(programme)
+        object.__setattr__(found, "found", "no")  # past the types that are checked here
+        return found
+
+
 class Raises:
     """It fails."""
 
@@ -103,6 +129,8 @@ def four_bar() -> Instance:
         ("LiarInX", "answered", False, True),
         ("LiarInY", "answered", False, True),
         ("NotANumber", "not finite", False, True),
+        ("LiarWithoutMultipliers", "not finite", False, True),
+        ("Changes", "answered", False, False),
         ("Raises", "refused", False, False),
     ],
 )
@@ -111,9 +139,12 @@ def test_solvers_of_ones_own_are_caught_in_what_they_claim(four_bar, solver, out
     assert (row["outcome"], is_right(row), is_broken(row)) == (outcome, right, broken)
 
 
-def test_wrong_shapes_of_solvers_of_ones_own_are_named(four_bar):
-    with pytest.raises(BackendError, match=r"x of shape \(\d+,\), expected"):
-        measure(four_bar, f"{__name__}:WrongShape", "F2s", "high")
+@pytest.mark.parametrize(
+    ("solver", "says"), [("WrongShape", r"x is .* of shape \(\d+,\), expected"), ("ClaimsInWords", "found is a str")]
+)
+def test_outcomes_of_solvers_of_ones_own_that_are_none_are_named(four_bar, solver, says):
+    with pytest.raises(BackendError, match=says):
+        measure(four_bar, f"{__name__}:{solver}", "F2s", "high")
 
 
 @pytest.mark.slow

@@ -168,11 +168,29 @@ def test_tables_do_not_mix_machines(tmp_path):
     assert not ResultTable(tmp_path / "t.csv", ["date", "other machine"], ("key",), ("value",), True).rows
 
 
+def test_tables_hold_any_names_and_words(tmp_path):
+    """Of files, which may be called like numbers or comments, and of solvers, which may say anything."""
+
+    def table():
+        return ResultTable(tmp_path / "t.csv", ["date", "here"], ("problem",), ("reason",), False)
+
+    said = {"#1": "a\rb", "001": "1.5", "1": "True", "nan": "a\x85b\u2028c", "a\udcff": "\x00", 'a,"b': '"\n#'}
+    for problem, reason in said.items():
+        table().add({"problem": problem, "reason": reason})
+    assert all(table().has(problem=problem) for problem in said)
+    found = {row["problem"]: row["reason"] for row in read_table(tmp_path / "t.csv")}
+    assert found == {"#1": "a b", "001": "1.5", "1": "True", "nan": "a b c", "a ": " ", 'a,"b': '" #'}
+
+
 def test_unknown_names_are_refused_at_once(tmp_path):
     with pytest.raises(BackendError, match="no backend 'clarabell'.*clarabel"):
         compare(tmp_path, backends=["clarabell"])
     with pytest.raises(BackendError, match="no problem 'pandas'.*panda"):
         compare(tmp_path, problems=["pandas"])
+    with pytest.raises(BackendError, match="no form 'F5'"):
+        compare(tmp_path, forms=["F5"])
+    with pytest.raises(BackendError, match="no level 'highest'.*high"):
+        compare(tmp_path, levels=["highest"])
     with pytest.raises(BackendError, match="no class 'equal'.*equality"):
         compare(tmp_path, groups=["equal"])
     with pytest.raises(BackendError, match="solver 'tests.support.exact:Solver'.*module:Class"):

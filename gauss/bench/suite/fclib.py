@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
+from gauss.bench.checked_arrays import require_small, require_sparse
 from gauss.bench.suite.doubled import product
 from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
@@ -67,16 +68,30 @@ def read_fclib(path: Path) -> SuiteInstance:
             raise FileError(f"{path}: expected the group fclib_local with spacedim 3; it has {', '.join(file)}.")
         group, vectors = file["fclib_local/W"], file["fclib_local/vectors"]
         m, n, nz = (int(np.ravel(group[name])[0]) for name in ("m", "n", "nz"))
-        p, i, x = (group[name][()] for name in ("p", "i", "x"))
+        p, i, x = (_numbers(group, name) for name in ("p", "i", "x"))
         kinds = {-1: sparse.csc_array, -2: sparse.csr_array}
         W = kinds[nz]((x, i, p), shape=(m, n)) if nz in kinds else sparse.coo_array((x, (i, p)), shape=(m, n))
-        q, friction = vectors["q"][()], vectors["mu"][()]
+        require_sparse("W", W)
+        q, friction = _numbers(vectors, "q"), _numbers(vectors, "mu")
         title = bytes(file["fclib_local/info/title"][()]).decode() if "info/title" in file["fclib_local"] else path.stem
+    if not (friction >= 0.0).all() or q.size != 3 * friction.size:
+        raise FileError(f"{path}: expected a coefficient of friction ≥ 0 for each three of the {q.size} numbers of q.")
     G = -sparse.diags_array(np.column_stack([friction, np.ones((friction.size, 2))]).ravel())
     story, units = f"read from {path.name}", ("N s",) * n
     return programme(
         title, "coulomb", story, W, q, G=G, h=np.zeros(n), cones=(3,) * friction.size, friction=friction, units=units
     )
+
+
+def _numbers(group, name: str) -> np.ndarray:
+    """Numbers of a data set that stand in the file itself."""
+    import h5py
+
+    found = group[name]
+    if isinstance(group.get(name, getlink=True), h5py.ExternalLink) or found.external or found.is_virtual:
+        raise ValueError(f"{name} stands in another file, which is not opened.")
+    require_small(found.nbytes)
+    return np.ravel(found[()])
 
 
 def _h5py():

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import io, sparse
 
+from gauss.bench.checked_arrays import require_sparse
 from gauss.bench.export import file_name
 from gauss.bench.suite import fclib, qps
 from gauss.bench.suite.catalogue import CLASSES, VERSION
@@ -131,6 +132,8 @@ def read_npz(path: Path) -> SuiteInstance:
             M: sparse.csc_matrix(tuple(data[f"{M}_{part}"] for part in parts), shape=tuple(data[f"{M}_shape"]))
             for M in MATRICES
         }
+        for M, matrix in matrices.items():
+            require_sparse(M, matrix)
         wide: dict[str, Any] = {name: Doubled(data[name], data[f"{name}_low"]) for name in WIDE}
         plain = {name: data[name] if data[name].ndim else data[name].item() for name in PLAIN}
         fields: dict[str, Any] = matrices | {name: data[name] for name in VECTORS}

@@ -16,6 +16,7 @@ from gauss.bench.export import file_name
 from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
 
+KINDS = "N", "E", "L", "G"  # of rows
 SECTIONS = "NAME", "ROWS", "COLUMNS", "RHS", "RANGES", "BOUNDS", "QUADOBJ", "QMATRIX", "ENDATA"
 
 
@@ -105,6 +106,8 @@ class _QpsReader:
         return self.takes.get(section)
 
     def _row(self, words: list[str]):
+        if words[0] not in KINDS:
+            raise FileError(f"{self.path}: a row of kind {words[0]!r} is not read; known are {', '.join(KINDS)}.")
         self.kinds[words[1]] = words[0]
         if words[0] == "N" and self.objective is None:
             self.objective = words[1]
@@ -112,6 +115,8 @@ class _QpsReader:
     def _column(self, words: list[str]):
         column = self.columns.setdefault(words[0], len(self.columns))
         for row, value in zip(words[1::2], words[2::2], strict=True):
+            if row not in self.kinds:
+                raise FileError(f"{self.path}: column {words[0]!r} has an entry in row {row!r}, which is not there.")
             if row == self.objective:
                 self.cost[column] = float(value)
             else:
