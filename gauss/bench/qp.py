@@ -13,7 +13,7 @@ from gauss.bench.contestants import everyone, imported, suits
 from gauss.bench.instances import GROUPS, Instance, of_selection
 from gauss.bench.levels import LEVELS, OWN
 from gauss.bench.machine import header, libraries, write_lock
-from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure
+from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure, unanswered
 from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import ResultTable
@@ -34,11 +34,12 @@ QUICK = (
     "three stops",
     "box on 8 points",
 )  # problems
-# [s] of wall time that a cell may take, for CPU time ends it before, and what a solver compiles before it
+# Limits [s] of the wall time of a cell, whose CPU time is limited before, and of compilation.
 CELL_TIME, COMPILATION_TIME = 60.0, 100.0
-PACKAGES = ("numpy", "scipy", "qpsolvers", "casadi", *sorted(("clarabel", "cvxopt", "daqp", "ecos", "highspy", "osqp")))
-PACKAGES += ("kvxopt", "piqp", "proxsuite", "pyqpmad", "qpalm", "qpax", "jax", "jaxlib", "jaxopt", "qtqp", "quadprog", "scs")
-PACKAGES += ("sip-qp-python", "mujoco")
+PACKAGES = tuple(
+    "numpy scipy qpsolvers casadi clarabel cvxopt daqp ecos highspy osqp kvxopt piqp proxsuite pyqpmad qpalm qpax "
+    "jax jaxlib jaxopt qtqp quadprog scs sip-qp-python mujoco".split()
+)
 
 
 def quick_backends() -> list[str]:
@@ -146,5 +147,4 @@ def _row(reply: Reply) -> dict:
     """What a worker measured, or what became of it."""
     if reply.outcome == "answered":
         return reply.value
-    nothing = dict.fromkeys(FIGURES, float("nan")) | {"claimed": False, "certified": False, "iterations": 0}
-    return nothing | {"outcome": "refused" if reply.outcome == "raised" else reply.outcome, "reason": reply.reason}
+    return unanswered() | {"outcome": "refused" if reply.outcome == "raised" else reply.outcome, "reason": reply.reason}

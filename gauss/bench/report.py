@@ -24,6 +24,7 @@ from gauss.bench.summary import (
     groups,
     is_broken,
     is_kept,
+    is_lost,
     is_right,
     is_wrong,
     sensitivity,
@@ -100,7 +101,7 @@ def _shown(row) -> bool:
 def _cell(row) -> str:
     if row is None:
         return ""
-    if row["outcome"] in ("crashed", "timed out"):
+    if is_lost(row):
         return row["outcome"]
     if row["outcome"] == "answered" and np.isnan(row["error"]):  # nothing is known of it but its residuals
         return "kept" if is_kept(row) else "**claimed**" if is_broken(row) else "not kept"
