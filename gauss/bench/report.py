@@ -59,8 +59,8 @@ open; a solver that gives none is off by 1."""
 def markdown(rows, reused, header) -> str:
     """The whole report."""
     lines = head("QP backends on mechanism problems", [*header, "all packages: [qp.lock](qp.lock)"])
-    lines += [HOW, "", "![Errors of the backends](qp_errors.png)", "![Time against error](qp_time_error.png)", ""]
-    lines += ["![Performance profiles](qp_profile.png)", ""]
+    lines += [HOW, "", *(["![Errors of the backends](qp_errors.png)"] if cells_shown(rows) else [])]
+    lines += ["![Time against error](qp_time_error.png)", "", "![Performance profiles](qp_profile.png)", ""]
     lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], LEVEL)
     lines += _errors(rows) + _totals(rows) + _verdicts(rows) + _times(rows) + _means(rows) + _against(rows) + _honesty(rows)
     return "\n".join(lines + (reuse_lines(reused, rows) if reused else [])) + "\n"
@@ -77,7 +77,7 @@ def _problems(rows) -> list[str]:
 
 def _errors(rows) -> list[str]:
     problems = [name for group, names in groups(rows).items() if group != INCONSISTENT for name in names]
-    cells = {(r["backend"], r["problem"]): r for r in rows if _shown(r) or r["form"] == OWN}
+    cells = cells_shown(rows)
     lines = [
         f"## Errors, {FORM}, level {LEVEL}",
         "",
@@ -91,6 +91,12 @@ def _errors(rows) -> list[str]:
         "",
     ]
     return lines
+
+
+def cells_shown(rows) -> dict[tuple[str, str], dict]:
+    """Cells of the table and of the chart of errors, by backend and problem."""
+    shown = (row for row in rows if row["group"] != INCONSISTENT and (_shown(row) or row["form"] == OWN))
+    return {(row["backend"], row["problem"]): row for row in shown}
 
 
 def _shown(row) -> bool:
