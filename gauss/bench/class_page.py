@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
 from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, is_answered, of_special_form, special_cells
-from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
 from gauss.bench.markdown import head, number, share, table
 from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
@@ -13,7 +13,6 @@ from gauss.bench.structured import COULOMB
 from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_lost, is_right, mean_time
 from gauss.bench.verdicts import is_false, stated, truth
 
-MAIN = "high"  # level of leaderboards, sentences and charts
 HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
 acceleration of a body or joint, is at most {RIGHT:g}, that of multipliers at most {WRONG:g}; of a problem without a
 solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for. **Claimed,
@@ -75,7 +74,7 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
 def at_main_level(rows) -> list[dict]:
     """Rows of the level that a page is about, high or the only one, and those of methods without levels."""
     levels = {row["level"] for row in rows} - {OWN}
-    main = MAIN if MAIN in levels else max(levels, key=list(LEVELS).index, default=OWN)
+    main = MAIN_LEVEL if MAIN_LEVEL in levels else max(levels, key=list(LEVELS).index, default=OWN)
     return [row for row in rows if row["level"] in (main, OWN)]
 
 

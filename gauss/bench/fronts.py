@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.bench.instances import MAIN_FORM
 from gauss.bench.levels import OWN
 from gauss.bench.measure import OURS, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.summary import complete, is_without_multipliers, mean_time
 from gauss.bench.verdicts import truth
-
-FORM = "F2s"  # of what is asked; programmes of files have their own
 
 
 class FrontPoint(NamedTuple):
@@ -24,7 +23,7 @@ class FrontPoint(NamedTuple):
 def cells(rows) -> dict[str, list[dict]]:
     """Cells of each solver that was asked all problems; named with its level if there are several."""
     problems = list(dict.fromkeys(row["problem"] for row in rows))
-    found = complete(rows, problems, FORM)
+    found = complete(rows, problems, MAIN_FORM)
     several = len({level for _, level in found} - {OWN}) > 1
     return {f"{name} {level}" if several and level != OWN else name: mine for (name, level), mine in found.items()}
 

@@ -7,9 +7,11 @@ import numpy as np
 from gauss.bench.class_page import at_main_level, class_page
 from gauss.bench.classes import name_of
 from gauss.bench.fronts import front, fronts
+from gauss.bench.instances import MAIN_FORM
+from gauss.bench.levels import MAIN_LEVEL
 from gauss.bench.markdown import when_and_where
 from gauss.bench.problems import INCONSISTENT
-from gauss.bench.report import FORM, LEVEL, cells_shown, markdown
+from gauss.bench.report import cells_shown, markdown
 from gauss.bench.summary import backends, groups, is_broken, profile
 from gauss.bench.table import header_of, read_table
 
@@ -48,14 +50,14 @@ def _charts(folder: Path, rows, header) -> list[Path]:
     where = when_and_where(header)
     errors, time_error, profiled = (folder / f"qp_{name}.png" for name in ("errors", "time_error", "profile"))
     if cells := cells_shown(rows):
-        view.plot_errors(*_errors(cells, names, problems), errors, f"Form {FORM}, level {LEVEL}; {where}")
+        view.plot_errors(*_errors(cells, names, problems), errors, f"Form {MAIN_FORM}, level {MAIN_LEVEL}; {where}")
     view.plot_time_error(rows, names, time_error, f"All problems and forms; grey: all backends; {where}")
     profiles = {
-        f"{group}, error ≤ {a:g}": profile(rows, found, FORM, LEVEL, a, RATIOS)
+        f"{group}, error ≤ {a:g}": profile(rows, found, MAIN_FORM, MAIN_LEVEL, a, RATIOS)
         for group, found in classes.items()
         for a in (1e-6, 1e-12)
     }
-    view.plot_profiles(profiles, RATIOS, profiled, f"Form {FORM}, level {LEVEL}; {where}")
+    view.plot_profiles(profiles, RATIOS, profiled, f"Form {MAIN_FORM}, level {MAIN_LEVEL}; {where}")
     return [*([errors] if cells else []), time_error, profiled]
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from gauss.bench import compiled
 from gauss.bench.clocks import AROUND
-from gauss.bench.instances import FILE as FILE_FORM
-from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.instances import FILE, MAIN_FORM
+from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
 from gauss.bench.markdown import head, in_time, number, share, table
 from gauss.bench.measure import OURS, WRONG
 from gauss.bench.problems import INCONSISTENT, SELECTION
@@ -32,8 +32,6 @@ from gauss.bench.summary import (
     verdict,
 )
 from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
-
-FORM, LEVEL = "F2s", "high"  # of the table of errors
 
 HOW = f"""Every backend gets the same quadratic programmes of mechanisms, in a process of its own with one thread. The
 error of an answer is the largest relative error of a body's or joint's acceleration against a reference with residuals of
@@ -61,7 +59,7 @@ def markdown(rows, reused, header) -> str:
     lines = head("QP backends on mechanism problems", [*header, "all packages: [qp.lock](qp.lock)"])
     lines += [HOW, "", *(["![Errors of the backends](qp_errors.png)"] if cells_shown(rows) else [])]
     lines += ["![Time against error](qp_time_error.png)", "", "![Performance profiles](qp_profile.png)", ""]
-    lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], LEVEL)
+    lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], MAIN_LEVEL)
     lines += _errors(rows) + _totals(rows) + _verdicts(rows) + _times(rows) + _means(rows) + _against(rows) + _honesty(rows)
     return "\n".join(lines + (reuse_lines(reused, rows) if reused else [])) + "\n"
 
@@ -79,7 +77,7 @@ def _errors(rows) -> list[str]:
     problems = [name for group, names in groups(rows).items() if group != INCONSISTENT for name in names]
     cells = cells_shown(rows)
     lines = [
-        f"## Errors, {FORM}, level {LEVEL}",
+        f"## Errors, {MAIN_FORM}, level {MAIN_LEVEL}",
         "",
         "In brackets: not certified. Bold: claimed, beyond. –: refused, or no finite "
         f"answer; {compiled.NAME}, which has no certificate: errors of joints alone. Kept: residuals are within the "
@@ -101,7 +99,7 @@ def cells_shown(rows) -> dict[tuple[str, str], dict]:
 
 def _shown(row) -> bool:
     """Whether a cell is one of a QP solver that tables problem by problem show."""
-    return row["form"] in (FORM, FILE_FORM) and row["level"] == LEVEL
+    return row["form"] in (MAIN_FORM, FILE) and row["level"] == MAIN_LEVEL
 
 
 def _cell(row) -> str:
@@ -190,7 +188,7 @@ def _times(rows) -> list[str]:
         if group == INCONSISTENT or not names:
             continue
         lines += [
-            f"## Times, class {group}, {_form_of(rows, group)}, level {LEVEL}",
+            f"## Times, class {group}, {_form_of(rows, group)}, level {MAIN_LEVEL}",
             "",
             "Microseconds of right answers: call from Python / reported by the library, – where it reports none (of "
             f"{', '.join(AROUND)}: around the call of the library).",
@@ -200,7 +198,7 @@ def _times(rows) -> list[str]:
             "Medians over right answers: first call over later ones, quartiles apart over the median, library over "
             "call, set-up over library.",
             "",
-            *table(CLOCKS, map(_clock, clocks(rows, problems, FORM, LEVEL))),
+            *table(CLOCKS, map(_clock, clocks(rows, problems, MAIN_FORM, MAIN_LEVEL))),
             "",
         ]
     return lines
@@ -209,7 +207,7 @@ def _times(rows) -> list[str]:
 def _form_of(rows, group: str) -> str:
     """Form of a class in tables that show one: of programmes of files their own."""
     forms = {row["form"] for row in rows if row["group"] == group}
-    return FILE_FORM if FILE_FORM in forms else FORM
+    return FILE if FILE in forms else MAIN_FORM
 
 
 CLOCKS = ("backend", "right", "cold / warm", "spread", "library / call", "set-up / library")
@@ -231,11 +229,11 @@ def _means(rows) -> list[str]:
     lines = []
     columns = [f"{1e3 * shift:g} ms, {penalty * LIMIT:g} s" for shift in SHIFTS for penalty in PENALTIES]
     for group, problems in groups(rows).items():
-        found = sensitivity(rows, problems, FORM, LEVEL)
+        found = sensitivity(rows, problems, MAIN_FORM, MAIN_LEVEL)
         if group == INCONSISTENT or not found:
             continue
         lines += [
-            f"## What means hinge on, class {group}, {_form_of(rows, group)}, level {LEVEL}",
+            f"## What means hinge on, class {group}, {_form_of(rows, group)}, level {MAIN_LEVEL}",
             "",
             "Shifted geometric means by shift and by what a problem costs that is not solved right; in brackets the rank.",
             "",
