@@ -208,6 +208,12 @@ class SolverRecord(NamedTuple):
         found = [ours.get("as_published", "") for ours, _ in self.pairs]
         return float(np.mean(found)) if "" not in found else np.nan
 
+    @property
+    def differing(self) -> str:
+        """Problems whose verdicts differ, with the largest residual of each over the tolerance."""
+        other = [(ours, theirs) for ours, theirs in self.pairs if ours["kept"] != theirs["kept"]]
+        return "; ".join(f"{ours['problem']} {over(ours)} / {over(theirs)}" for ours, theirs in other)
+
     def cells(self) -> list:
         """Line of the table."""
         (ours, theirs), means = self.shares, self.means
@@ -240,15 +246,9 @@ def _level(level: str, rows) -> list[str]:
         "",
         "Where verdicts differ, with the largest residual of each over the tolerance:",
         "",
-        *(_differing(record) for record in records if record.same < len(record.pairs)),
+        *(f"* {record.solver}: {record.differing}." for record in records if record.same < len(record.pairs)),
         "",
     ]
-
-
-def _differing(record: SolverRecord) -> str:
-    other = [(ours, theirs) for ours, theirs in record.pairs if ours["kept"] != theirs["kept"]]
-    named = "; ".join(f"{ours['problem']} {over(ours)} / {over(theirs)}" for ours, theirs in other)
-    return f"* {record.solver}: {named}."
 
 
 def _control(records: list[SolverRecord]) -> str:

@@ -27,7 +27,7 @@ import qpsolvers
 from scipy import io, sparse
 
 LIMIT = 1.0  # [CPU s] of one solve; a later answer is none
-PATIENCE = 60.0  # [s] after which a solver that does not end is stopped
+WALL_LIMIT = 60.0  # [s] of wall time after which the process of a solver is ended
 RESIDUALS = ("primal", "dual", "gap")
 COLUMNS = ("problem", "solver", "level", "claimed", "seconds", *RESIDUALS)
 
@@ -61,7 +61,7 @@ def _answers(data: Path, cells):
     for problem, solver, _, settings in cells:
         pool = pool or ProcessPoolExecutor(1, get_context("spawn"))
         try:
-            yield pool.submit(solved, data / f"{problem}.mat", solver, settings).result(PATIENCE)
+            yield pool.submit(solved, data / f"{problem}.mat", solver, settings).result(WALL_LIMIT)
         except (BrokenProcessPool, TimeoutError):
             for process in list(pool._processes.values()):  # it offers no other way to end one that hangs
                 process.kill()

@@ -20,7 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from benchmarks.command import RESULTS
-from benchmarks.maros_meszaros import SETTINGS, SolverRecord, figures, over, pairs, published
+from benchmarks.maros_meszaros import SETTINGS, SolverRecord, figures, pairs, published
 from gauss.bench.export import file_name
 from gauss.bench.levels import LEVELS
 from gauss.bench.markdown import head, table
@@ -79,9 +79,7 @@ def _solvers(rows) -> list[str]:
 
 def _line(record: SolverRecord) -> list:
     kept = [sum(pair[side]["kept"] for pair in record.pairs) for side in (0, 1)]
-    other = [(ours, theirs) for ours, theirs in record.pairs if ours["kept"] != theirs["kept"]]
-    named = "; ".join(f"{ours['problem']} {over(ours)} / {over(theirs)}" for ours, theirs in other)
-    return [record.solver, len(record.pairs), *kept, record.same, named]
+    return [record.solver, len(record.pairs), *kept, record.same, record.differing]
 
 
 if __name__ == "__main__":

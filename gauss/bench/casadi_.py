@@ -95,13 +95,12 @@ def _hpipm(programme: StructuredProgramme, bounds: Bounds, settings: dict):
     """HPIPM takes rows of the dynamics with their sign turned."""
     import casadi
 
-    steps, n_x, n_u = programme.structure.stages
     H, rows = casadi.DM(programme.H), casadi.DM(-programme.C)
     given: dict[str, Any] = {"h": H, "g": programme.c, "a": rows, "lba": -programme.d, "uba": -programme.d}
     given |= {"lbx": bounds.lower, "ubx": bounds.upper}
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
-    stages = {"N": steps, "nx": [0] + [n_x] * steps, "nu": [n_u] * steps + [0], "ng": [0] * (steps + 1)}
-    options: dict[str, Any] = {"inf": FREE, "error_on_fail": False, "record_time": True, "hpipm": settings} | stages
+    options: dict[str, Any] = {"inf": FREE, "error_on_fail": False, "record_time": True, "hpipm": settings}
+    options |= _stages(programme)
 
     def call():
         made = casadi.conic("solver", "hpipm", pattern, options)
@@ -110,8 +109,7 @@ def _hpipm(programme: StructuredProgramme, bounds: Bounds, settings: dict):
     def read(found) -> Outcome:
         result, said = found
         x, y, box = (np.asarray(result[name], dtype=float).ravel() for name in ("x", "lam_a", "lam_x"))
-        message = f"hpipm: {'solved' if said['success'] else 'return status {}'.format(said['return_status'])}"
-        return Outcome(x, -y, bounds.multipliers(box), said["success"], message, max(int(said["iter_count"]), 0))
+        return Outcome(x, -y, bounds.multipliers(box), *_claim("hpipm", said))
 
     return call, read, _wall_time, _quiet()
 
@@ -120,13 +118,12 @@ def _fatrop(programme: StructuredProgramme, bounds: Bounds, settings: dict):
     """Fatrop as the solver of nonlinear programmes that it is; the functions that it evaluates are made beforehand."""
     import casadi
 
-    steps, n_x, n_u = programme.structure.stages
     x = casadi.MX.sym("x", programme.c.size)
     rows = casadi.mtimes(casadi.DM(programme.C), x)
     cost = 0.5 * casadi.bilin(casadi.DM(programme.H), x, x) + casadi.dot(casadi.DM(programme.c), x)
     options: dict[str, Any] = {"expand": True, "print_time": False, "record_time": True, "error_on_fail": False}
     options |= {"structure_detection": "manual", "equality": [True] * programme.d.size}
-    options |= {"N": steps, "nx": [0] + [n_x] * steps, "nu": [n_u] * steps + [0], "ng": [0] * (steps + 1)}
+    options |= _stages(programme)
     options["fatrop"] = {"print_level": 0} | settings
     made = casadi.nlpsol("solver", "fatrop", {"x": x, "f": cost, "g": rows}, options)
     given: dict[str, Any] = {"lbg": programme.d, "ubg": programme.d, "lbx": bounds.lower, "ubx": bounds.upper}
@@ -137,10 +134,21 @@ def _fatrop(programme: StructuredProgramme, bounds: Bounds, settings: dict):
     def read(found) -> Outcome:
         result, said = found
         x, y, box = (np.asarray(result[name], dtype=float).ravel() for name in ("x", "lam_g", "lam_x"))
-        message = f"fatrop: {'solved' if said['success'] else 'return status {}'.format(said['return_status'])}"
-        return Outcome(x, y, bounds.multipliers(box), said["success"], message, max(int(said["iter_count"]), 0))
+        return Outcome(x, y, bounds.multipliers(box), *_claim("fatrop", said))
 
     return call, read, _wall_time, _quiet()
+
+
+def _stages(programme: StructuredProgramme) -> dict[str, Any]:
+    """Options that give CasADi the stages of a programme; the initial state is no unknown."""
+    steps, n_x, n_u = programme.structure.stages
+    return {"N": steps, "nx": [0] + [n_x] * steps, "nu": [n_u] * steps + [0], "ng": [0] * (steps + 1)}
+
+
+def _claim(solver: str, said: dict[str, Any]) -> tuple[bool, str, int]:
+    """Claim, message and iterations of a solver of stages."""
+    words = "solved" if said["success"] else f"return status {said['return_status']}"
+    return said["success"], f"{solver}: {words}", max(int(said["iter_count"]), 0)
 
 
 STAGEWISE: dict[str, Callable[..., Any]] = {"fatrop": _fatrop, "hpipm": _hpipm}

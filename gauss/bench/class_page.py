@@ -3,17 +3,16 @@
 import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
-from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time, of_special_form
-from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, is_answered, of_special_form, special_cells
+from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
 from gauss.bench.markdown import head, number, share, table
 from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
 from gauss.bench.structured import COULOMB
-from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_right, mean_time
+from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_lost, is_right, mean_time
 from gauss.bench.verdicts import is_false, stated, truth
 
-MAIN = "high"  # level of leaderboards, sentences and charts
 HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
 acceleration of a body or joint, is at most {RIGHT:g}, that of multipliers at most {WRONG:g}; of a problem without a
 solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for. **Claimed,
@@ -62,19 +61,20 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     lines += [BY_CLASS[kind], ""] if kind in BY_CLASS else []
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
     lines += _board("Leaderboard", mine, solvable) + _sentences(list(mine), mine, *fronts(rows)[1:])
-    special = of_special_form(rows, set(mine))
-    lines += _special_board(special, set(mine), solvable)
+    special = of_special_form(rows, mine)
+    others = ordered(special_cells(special, mine))
+    lines += _special_board(special, list(others), solvable)
     if set(OURS) & set(mine):
         lines += [OWN_TIMES, ""]
     elif kind != COULOMB:
         lines += [NONE_OF_OURS, ""]
-    return "\n".join(lines + _by_level(every, list(mine)) + _by_problem(problems, mine | _added(special, mine))) + "\n"
+    return "\n".join(lines + _by_level(every, list(mine)) + _by_problem(problems, mine | others)) + "\n"
 
 
 def at_main_level(rows) -> list[dict]:
     """Rows of the level that a page is about, high or the only one, and those of methods without levels."""
     levels = {row["level"] for row in rows} - {OWN}
-    main = MAIN if MAIN in levels else max(levels, key=list(LEVELS).index, default=OWN)
+    main = MAIN_LEVEL if MAIN_LEVEL in levels else max(levels, key=list(LEVELS).index, default=OWN)
     return [row for row in rows if row["level"] in (main, OWN)]
 
 
@@ -122,19 +122,13 @@ def ordered(mine: dict[str, list[dict]]) -> dict[str, list[dict]]:
     return dict(sorted(mine.items(), key=lambda item: (-sum(map(is_right, item[1])), mean_time(item[1]))))
 
 
-def _special_board(rows: list[dict], general: set[str], solvable: bool) -> list[str]:
+def _special_board(rows: list[dict], named: list[str], solvable: bool) -> list[str]:
     """Leaderboard of the problems that solvers of a special form take, and sentences about these; none without any."""
     if not rows:
         return []
     mine, overall, panels = ordered(cells(rows)), *fronts(rows)[1:]
     title = f"Leaderboard of the {len(set(row['problem'] for row in rows))} problems that solvers of a special form take"
-    named = [name for name in mine if name not in general]
     return _board(title, mine, solvable) + _sentences(named, mine, overall, panels)[2:]
-
-
-def _added(rows: list[dict], general: dict[str, list[dict]]) -> dict[str, list[dict]]:
-    """Cells of solvers of a special form."""
-    return {name: found for name, found in ordered(cells(rows)).items() if name not in general}
 
 
 def _board(title: str, mine: dict[str, list[dict]], solvable: bool) -> list[str]:
@@ -147,7 +141,7 @@ def _board(title: str, mine: dict[str, list[dict]], solvable: bool) -> list[str]
     for rank, (name, found) in enumerate(mine.items(), start=1):
         texts = [rank, name, f"{sum(map(is_right, found))}/{len(found)}", sum(map(is_false, found))]
         texts += [sum(map(is_broken, found)), *(_accuracy(found) if solvable else [sum(not stated(row) for row in found)])]
-        texts += [sum(row["outcome"] in ("crashed", "timed out") for row in found), _factor(mean_time(found) / least)]
+        texts += [sum(map(is_lost, found)), _factor(mean_time(found) / least)]
         texts += [_in_library(found)]
         body.append(texts + ([_warm(found)] if warm else []))
     return [f"## {title}", "", *table(titles, body), *(["", WARM] if warm else []), ""]
@@ -156,7 +150,7 @@ def _board(title: str, mine: dict[str, list[dict]], solvable: bool) -> list[str]
 def _accuracy(found: list[dict]) -> list[str]:
     """Share of kept promises, and median errors."""
     kept = share(sum(map(is_kept, found)) / len(found)) if found[0]["level"] != OWN else ""
-    errors = [dual_error(row) if in_time(row) else np.nan for row in found]
+    errors = [dual_error(row) if is_answered(row) else np.nan for row in found]
     return [kept, number(middle(list(map(error_of, found)))), number(middle(errors))]
 
 
@@ -235,7 +229,7 @@ def _by_problem(problems: list[str], mine: dict[str, list[dict]]) -> list[str]:
 def _cell(row) -> str:
     if row is None:  # not asked
         return ""
-    if row["outcome"] in ("crashed", "timed out"):
+    if is_lost(row):
         return row["outcome"]
     verdict = stated(row)
     if verdict:

@@ -84,10 +84,13 @@ def summary(seconds: list[float]) -> dict:
 
 
 def median_times(times: list[Times], seconds: list[float]) -> dict:
-    """Medians of what the library reports [s], in wall time: of warm calls that took no more than that; nan if all did."""
+    """Medians of the wall times [s] that the library reports of uninterrupted warm calls; nan if there are none.
+
+    A call was interrupted if its library reports more than the time of the call.
+    """
     pairs = list(zip(times, seconds, strict=True))
-    told = [one for one, call in pairs[1:] or pairs if not np.fmax.reduce(one) > call]  # interrupted ones are longer
-    setup, solve, total = np.median(np.array(told or [UNKNOWN]), axis=0)
+    uninterrupted = [one for one, call in pairs[1:] or pairs if not np.fmax.reduce(one) > call]
+    setup, solve, total = np.median(np.array(uninterrupted or [UNKNOWN]), axis=0)
     return {"setup": float(setup), "solve": float(solve), "library": float(total)}
 
 
@@ -134,16 +137,15 @@ def asked_daqp(problem, settings: dict) -> tuple:
     """What DAQP itself returns for a problem of qpsolvers: x, objective, exit flag, information."""
     import daqp
 
-    A, G = (part for part in (problem.A, problem.G))
-    rows = np.vstack([part for part in (G, A) if part is not None])
+    rows = np.vstack([part for part in (problem.G, problem.A) if part is not None])
     upper = np.concatenate([part for part in (problem.h, problem.b) if part is not None])
     sense = np.zeros(upper.size, dtype=np.intc)
     sense[0 if problem.h is None else problem.h.size :] = 5  # an equality
     return daqp.solve(problem.P, problem.q, rows, upper, np.full(upper.size, -1e30), sense, **settings)
 
 
-def said(found) -> tuple[str, int]:
-    """Words of a solver and its iterations, from a solution of qpsolvers; "" and 0 where it tells none."""
+def status_and_iterations(found) -> tuple[str, int]:
+    """Status text and iterations of a solver, from a solution of qpsolvers; "" and 0 where it reports none."""
     extras = found.extras
     info = extras.get("info", extras) if isinstance(extras, dict) else {}
     look = info.get if isinstance(info, dict) else lambda name, default=None: getattr(info, name, default)

@@ -6,7 +6,7 @@ from statistics import median
 import numpy as np
 
 from gauss.backends.solution import Answer
-from gauss.bench.measure import FIGURES
+from gauss.bench.measure import unanswered
 from gauss.bench.problems import MechanismProblem
 from gauss.bench.reference import ReferenceSolution
 from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
@@ -20,7 +20,7 @@ def compiled(problem: MechanismProblem, expected: ReferenceSolution) -> dict | N
     """Time and error of the compiled forward dynamics; None where the problem is not that of a system."""
     if problem.system is None or problem.state is None:
         return None
-    row = dict.fromkeys(FIGURES, np.nan) | {"claimed": False, "certified": False, "iterations": 0}
+    row = unanswered()
     try:
         function = problem.system.forward_dynamics
     except GaussError as error:

@@ -140,7 +140,7 @@ def _own(solver: str, programme: Programme) -> Ready:
 
 def _read(found: qpsolvers.Solution, solver: str, problem: qpsolvers.Problem, chosen: dict) -> Outcome:
     outcome = qpsolvers_.outcome(found, solver)
-    words, iterations = clocks.said(found)
+    words, iterations = clocks.status_and_iterations(found)
     if solver == "daqp" and not outcome.found:  # qpsolvers keeps its exit flag to itself
         words = clocks.DAQP.get(clocks.asked_daqp(problem, chosen)[2], "")
     message = f"{solver}: {words}" if words else outcome.message

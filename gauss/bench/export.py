@@ -75,10 +75,10 @@ def export(problems: Iterable[MechanismProblem], folder: Path, kind: str, form: 
 
     Parameters
     ----------
-    problems : iterable of Problem
-        What is written, one file each, by its name.
+    problems : iterable of MechanismProblem
+        Problems to write, one file each, named after it.
     folder : Path
-        Where; made if it is not there.
+        Folder of the files, made where there is none.
     kind : str
         * "npz": P, q, G, h, A, b, lb, ub, as ``qpsolvers.Problem.load`` reads them;
         * "mat": P, q, r, A, l, u, as the Maros–Mészáros problems are distributed for OSQP;

@@ -12,7 +12,7 @@ from gauss.bench.suite import read_fclib, read_npz, read_qps
 from gauss.bench.suite_instances import of_suite_instance
 from gauss.errors import FileError
 
-UNBOUNDED = 1e20  # bounds of this size are none: the convention of the files of Matlab, and of SIF before them
+INFINITE_BOUND = 1e20  # larger bounds are infinite: the convention of the files of Matlab, and of SIF before them
 
 
 def of_folder(folder: Path) -> Iterator[Instance]:
@@ -119,7 +119,7 @@ READERS = {".npz": _of_npz, ".mat": _of_mat, ".mps": _of_qps, ".qps": _of_qps, "
 
 def _one_sided(rows, lower: np.ndarray, upper: np.ndarray) -> list:
     """Rows of G x ≤ h and their h, for lower ≤ rows x ≤ upper."""
-    above, below = upper < UNBOUNDED, lower > -UNBOUNDED
+    above, below = upper < INFINITE_BOUND, lower > -INFINITE_BOUND
     return [(rows[above], upper[above]), (-rows[below], -lower[below])]
 
 

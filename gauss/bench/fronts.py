@@ -5,13 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.bench.instances import MAIN_FORM
 from gauss.bench.levels import OWN
 from gauss.bench.measure import OURS, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.summary import complete, is_without_multipliers, mean_time
 from gauss.bench.verdicts import truth
-
-FORM = "F2s"  # of what is asked; programmes of files have their own
 
 
 class FrontPoint(NamedTuple):
@@ -24,7 +23,7 @@ class FrontPoint(NamedTuple):
 def cells(rows) -> dict[str, list[dict]]:
     """Cells of each solver that was asked all problems; named with its level if there are several."""
     problems = list(dict.fromkeys(row["problem"] for row in rows))
-    found = complete(rows, problems, FORM)
+    found = complete(rows, problems, MAIN_FORM)
     several = len({level for _, level in found} - {OWN}) > 1
     return {f"{name} {level}" if several and level != OWN else name: mine for (name, level), mine in found.items()}
 
@@ -35,14 +34,20 @@ def of_special_form(rows, general: Iterable[str]) -> list[dict]:
     return [row for row in rows if row["problem"] in problems]
 
 
-def in_time(row) -> bool:
-    """Whether there is an answer: one that comes late is none."""
+def special_cells(special: list[dict], general: Iterable[str]) -> dict[str, list[dict]]:
+    """Cells of the solvers of a special form, of the rows of the problems that they were asked."""
+    general = set(general)
+    return {name: found for name, found in cells(special).items() if name not in general}
+
+
+def is_answered(row) -> bool:
+    """Whether there is an answer, within the limit of time."""
     return row["outcome"] == "answered"
 
 
 def error_of(row) -> float:
     """Error of an answer; nan where there is none, or one without its multipliers."""
-    return row["error"] if in_time(row) and not is_without_multipliers(row) else np.nan
+    return row["error"] if is_answered(row) and not is_without_multipliers(row) else np.nan
 
 
 def fronts(rows) -> tuple[list[str], dict[str, FrontPoint], dict[str, dict[str, FrontPoint]]]:
@@ -57,11 +62,7 @@ def fronts(rows) -> tuple[list[str], dict[str, FrontPoint], dict[str, dict[str, 
     means = {name: mean_time(found) for name, found in mine.items()}
     errors = {name: middle([error_of(row) for row in found]) for name, found in mine.items()}
     overall = _points({name: (means[name], errors[name]) for name in mine})
-    everyone = (
-        mine
-        if _several_levels(rows)
-        else mine | {n: f for n, f in cells(of_special_form(rows, mine)).items() if n not in mine}
-    )
+    everyone = mine if _several_levels(rows) else mine | special_cells(of_special_form(rows, mine), mine)
     return list(everyone), overall, _panels(everyone)
 
 

@@ -18,6 +18,7 @@ from gauss.errors import BackendError
 EQUALITY, INEQUALITY = "equality", "inequality"
 GROUPS = (EQUALITY, INEQUALITY, INCONSISTENT)  # classes of the selection
 FILE = "file"  # form of programmes that are no compulsions
+MAIN_FORM = "F2s"  # of tables and charts about one form, and of quick comparisons
 
 
 class Matrices(NamedTuple):

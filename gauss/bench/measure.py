@@ -21,9 +21,8 @@ from gauss.errors import BackendError
 AUTO = "auto"  # gauss's own choice, with its rescue
 OURS = (AUTO, *BACKENDS)
 WRONG = 1e-3  # relative error above which an answer is wrong for any purpose
-TERM_ROUNDING_RELATIVE = (
-    10.0 * np.finfo(float).eps
-)  # of the terms that a residual sums up: by so much it may be off for no fault of a solver
+# Relative to the terms that a residual sums: rounding of a residual that is no fault of a solver.
+TERM_ROUNDING_RELATIVE = 10.0 * np.finfo(float).eps
 FIGURES: tuple[str, ...] = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
 FIGURES += ("warm", "error", "dual_error", "primal", "dual", "gap", "excess", "certificate")
 
@@ -46,7 +45,7 @@ def measure(instance: Instance, backend: str, form: str, level: str) -> dict:
     outcome, times = _called(backend, given, level)
     if _differs(given, programme):
         outcome = replace(outcome, found=False, message="the solver changed the programme that it was given")
-    row = _nothing() | times | _judged(instance, programme, outcome, LEVELS[level])
+    row = unanswered() | times | _judged(instance, programme, outcome, LEVELS[level])
     row["warm"] = _warm(instance, backend, programme, level)
     if times["seconds"] > LIMIT:
         row |= {"outcome": "timed out", "claimed": False, "reason": f"{times['seconds']:.2g} s, the limit is {LIMIT:g} s"}
@@ -65,8 +64,8 @@ def _differs(given: Programme, programme: Programme) -> bool:
     return not all(np.array_equal(a, b, equal_nan=True) for a, b in vectors) or any((a != b).nnz for a, b in matrices)
 
 
-def _nothing() -> dict:
-    """A row of no answer."""
+def unanswered() -> dict:
+    """Row of a cell without an answer."""
     return dict.fromkeys(FIGURES, np.nan) | {"claimed": False, "certified": False, "iterations": 0, "reason": ""}
 
 
@@ -169,9 +168,10 @@ def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:
     p, x, y, z = programme, np.abs(x), np.abs(y), np.abs(z)
     H, C, K = abs(p.H), abs(p.C), abs(p.K)
     rows = max((C @ x + np.abs(p.d)).max(initial=0.0), (K @ x + np.abs(p.k)).max(initial=0.0))
-    pull = (H @ x + np.abs(p.c) + C.T @ y + K.T @ z).max(initial=0.0)
+    stationarity = (H @ x + np.abs(p.c) + C.T @ y + K.T @ z).max(initial=0.0)
     gap = x @ (H @ x) + np.abs(p.c) @ x + np.abs(p.d) @ y + np.abs(p.k) @ z
-    return TERM_ROUNDING_RELATIVE * float(rows), TERM_ROUNDING_RELATIVE * float(pull), TERM_ROUNDING_RELATIVE * float(gap)
+    largest, stationarity, terms = (TERM_ROUNDING_RELATIVE * float(size) for size in (rows, stationarity, gap))
+    return largest, stationarity, terms
 
 
 def _certified(instance: Instance, answer: Answer) -> dict:
@@ -197,9 +197,8 @@ def _own(instance: Instance, backend: str) -> dict:
     method = _automatic if backend == AUTO else make(backend)
     found, seconds = timed(lambda: method(compulsion), LIMIT)
     answer = found[-1]
-    row = (
-        _nothing() | summary(seconds) | {"claimed": answer.found, "iterations": answer.iterations, "reason": answer.message}
-    )
+    claims = {"claimed": answer.found, "iterations": answer.iterations, "reason": answer.message}
+    row = unanswered() | summary(seconds) | claims
     outcome = "answered" if np.isfinite(answer.qdd).all() else ("not finite" if answer.found else "refused")
     return row | {"outcome": outcome} | _certified(instance, answer)
 

@@ -7,11 +7,11 @@ import numpy as np
 from gauss.bench.class_page import at_main_level, class_page
 from gauss.bench.classes import name_of
 from gauss.bench.fronts import front, fronts
-from gauss.bench.instances import FILE
-from gauss.bench.levels import OWN
+from gauss.bench.instances import MAIN_FORM
+from gauss.bench.levels import MAIN_LEVEL
 from gauss.bench.markdown import when_and_where
 from gauss.bench.problems import INCONSISTENT
-from gauss.bench.report import FORM, LEVEL, markdown
+from gauss.bench.report import cells_shown, markdown
 from gauss.bench.summary import backends, groups, is_broken, profile
 from gauss.bench.table import header_of, read_table
 
@@ -48,25 +48,23 @@ def _charts(folder: Path, rows, header) -> list[Path]:
     names, classes = backends(rows), {g: found for g, found in groups(rows).items() if g != INCONSISTENT}
     problems = [name for found in classes.values() for name in found]
     where = when_and_where(header)
-    paths = [folder / f"qp_{name}.png" for name in ("errors", "time_error", "profile")]
-    errors = _errors(rows, names, problems)
-    if not errors[2].size:  # no problem with a solution, or not measured in this form, or at this level
-        return []
-    view.plot_errors(*errors, paths[0], f"Form {FORM}, level {LEVEL}; {where}")
-    view.plot_time_error(rows, names, paths[1], f"All problems and forms; grey: all backends; {where}")
+    errors, time_error, profiled = (folder / f"qp_{name}.png" for name in ("errors", "time_error", "profile"))
+    if cells := cells_shown(rows):
+        view.plot_errors(*_errors(cells, names, problems), errors, f"Form {MAIN_FORM}, level {MAIN_LEVEL}; {where}")
+    view.plot_time_error(rows, names, time_error, f"All problems and forms; grey: all backends; {where}")
     profiles = {
-        f"{group}, error ≤ {a:g}": profile(rows, found, FORM, LEVEL, a, RATIOS)
+        f"{group}, error ≤ {a:g}": profile(rows, found, MAIN_FORM, MAIN_LEVEL, a, RATIOS)
         for group, found in classes.items()
         for a in (1e-6, 1e-12)
     }
-    view.plot_profiles(profiles, RATIOS, paths[2], f"Form {FORM}, level {LEVEL}; {where}")
-    return paths
+    view.plot_profiles(profiles, RATIOS, profiled, f"Form {MAIN_FORM}, level {MAIN_LEVEL}; {where}")
+    return [*([errors] if cells else []), time_error, profiled]
 
 
-def _errors(rows, names: list[str], problems: list[str]) -> tuple[list[str], list[str], np.ndarray, np.ndarray]:
-    """Backends, problems, errors of their answers (backends, problems), and which of these are claimed beyond."""
-    main = (FORM, LEVEL), (FILE, LEVEL), (OWN, OWN)
-    cells = {(r["backend"], r["problem"]): r for r in rows if (r["form"], r["level"]) in main}
+def _errors(
+    cells: dict[tuple[str, str], dict], names: list[str], problems: list[str]
+) -> tuple[list[str], list[str], np.ndarray, np.ndarray]:
+    """Backends, problems, errors of the answers (backends, problems), and which are claimed beyond the tolerance."""
     shown = [name for name in names if any(key[0] == name for key in cells)]
     errors = np.array([[cells[n, p]["error"] if (n, p) in cells else np.nan for p in problems] for n in shown])
     broken = np.array([[(n, p) in cells and is_broken(cells[n, p]) for p in problems] for n in shown])

@@ -11,10 +11,10 @@ from gauss.backends.programme import FORMS as PROGRAMMES
 from gauss.bench import compiled
 from gauss.bench.clocks import COMPILING
 from gauss.bench.contestants import everyone, imported, suits
-from gauss.bench.instances import GROUPS, Instance, of_selection
+from gauss.bench.instances import Instance, of_selection
 from gauss.bench.levels import LEVELS, OWN
 from gauss.bench.machine import header, libraries, write_lock
-from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure
+from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure, unanswered
 from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import ResultTable
@@ -36,11 +36,12 @@ QUICK = (
     "three stops",
     "box on 8 points",
 )  # problems
-# [s] of wall time that a cell may take, for CPU time ends it before, and what a solver compiles before it
+# Limits [s] of the wall time of a cell, whose CPU time is limited before, and of compilation.
 CELL_TIME, COMPILATION_TIME = 60.0, 100.0
-PACKAGES = ("numpy", "scipy", "qpsolvers", "casadi", *sorted(("clarabel", "cvxopt", "daqp", "ecos", "highspy", "osqp")))
-PACKAGES += ("kvxopt", "piqp", "proxsuite", "pyqpmad", "qpalm", "qpax", "jax", "jaxlib", "jaxopt", "qtqp", "quadprog", "scs")
-PACKAGES += ("sip-qp-python", "mujoco")
+PACKAGES = tuple(
+    "numpy scipy qpsolvers casadi clarabel cvxopt daqp ecos highspy osqp kvxopt piqp proxsuite pyqpmad qpalm qpax "
+    "jax jaxlib jaxopt qtqp quadprog scs sip-qp-python mujoco".split()
+)
 
 
 def quick_backends() -> list[str]:
@@ -55,7 +56,6 @@ def compare(
     problems: Iterable[str] | None = None,
     forms: Iterable[str] = FORMS,
     levels: Iterable[str] | None = None,
-    groups: Iterable[str] | None = None,
     instances: Iterable[Instance] | None = None,
     name: str = NAME,
     workers: Workers | None = None,
@@ -72,8 +72,6 @@ def compare(
         ``qp_classes.lock`` where the table has another name.
     backends, problems, forms, levels : sequence of str, optional
         What is measured; all that there are when not given.
-    groups : sequence of str, optional
-        Classes of problems, "equality", "inequality" and "inconsistent"; all when not given.
     instances : iterable of Instance, optional
         What is measured instead of the selection of problems.
     name : str
@@ -90,7 +88,7 @@ def compare(
     Raises
     ------
     BackendError
-        If there is no such backend, problem, form, class, level or solver, or two problems have the same name.
+        If there is no such backend, problem, form, level or solver, or two problems have the same name.
     """
     solvers = tuple(solvers)
     for solver in solvers:
@@ -100,7 +98,7 @@ def compare(
     levels, forms = chosen(levels, LEVELS, "level"), chosen(forms, PROGRAMMES, "form")
     table = ResultTable(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
     write_lock(Path(folder) / (LOCK if name == NAME else CLASS_LOCK))
-    given = of_selection(problems, chosen(groups, GROUPS, "class")) if instances is None else instances
+    given = of_selection(problems) if instances is None else instances
     count = len(problems) if instances is None else None
     with nullcontext(workers) if workers else Workers() as places:
         named: set[str] = set()
@@ -110,7 +108,7 @@ def compare(
             named.add(instance.name)
             for cell in _cells(instance, names, forms, levels):
                 _measure(table, instance, cell, places)
-            if instances is None and not table.has(problem=instance.name, form=OWN, backend=compiled.NAME, level=OWN):
+            if instances is None:
                 _add_compiled(table, instance)
     return table
 
@@ -118,13 +116,18 @@ def compare(
 def _measure(table: ResultTable, instance: Instance, cell: tuple[str, str, str], places: Workers):
     """Measure a cell that is not measured yet; methods of gauss share a worker, a foreign solver may kill its own."""
     backend, form, level = cell
-    key = {"problem": instance.name, "form": form, "backend": backend, "level": level}
+    key = _key(instance, *cell)
     if table.has(**key):
         return
     place = "gauss" if backend in OURS else backend
     timeout = CELL_TIME + (COMPILATION_TIME if backend in COMPILING else 0.0)
     row = _row(places[place].call(measure, instance, backend, form, level, timeout=timeout))
     table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
+
+
+def _key(instance: Instance, backend: str, form: str, level: str) -> dict[str, str]:
+    """Columns that name the row of a cell."""
+    return {"problem": instance.name, "form": form, "backend": backend, "level": level}
 
 
 def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, str]]:
@@ -142,9 +145,12 @@ def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, 
 
 
 def _add_compiled(table: ResultTable, instance: Instance):
-    row = compiled.compiled(make_problem(instance.name), instance.expected) if instance.expected is not None else None
+    """Measure the compiled dynamics of a problem with a reference, if it is that of a system and not measured yet."""
+    key = _key(instance, compiled.NAME, OWN, OWN)
+    if instance.expected is None or table.has(**key):
+        return
+    row = compiled.compiled(make_problem(instance.name), instance.expected)
     if row is not None:
-        key = {"problem": instance.name, "form": OWN, "backend": compiled.NAME, "level": OWN}
         table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
 
 
@@ -152,5 +158,4 @@ def _row(reply: Reply) -> dict:
     """What a worker measured, or what became of it."""
     if reply.outcome == "answered":
         return reply.value
-    nothing = dict.fromkeys(FIGURES, float("nan")) | {"claimed": False, "certified": False, "iterations": 0}
-    return nothing | {"outcome": "refused" if reply.outcome == "raised" else reply.outcome, "reason": reply.reason}
+    return unanswered() | {"outcome": "refused" if reply.outcome == "raised" else reply.outcome, "reason": reply.reason}

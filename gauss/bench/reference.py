@@ -20,7 +20,7 @@ from gauss.errors import BackendError
 
 DIGITS = 50
 CONVERGED = 1e-25  # correction relative to the answer, body by body
-ENOUGH = 1e-18  # of the same, where rows contradict each other and what is left of them keeps moving the last digits
+STAGNATED = 1e-18  # the same bound, where inconsistent redundant rows keep changing the last digits
 STEPS = 60
 GUESSES = ("daqp", "clarabel", "piqp")  # of the active rows, in turn until one is confirmed
 
@@ -93,23 +93,23 @@ def _refined(compulsion: Compulsion, active: np.ndarray) -> ReferenceSolution:
         last = np.inf
         for _ in range(STEPS):
             r1, r2, r3 = wide.residuals(a, qdd, multipliers)
-            pull = G.T @ mu if active.size else exact(np.zeros(a.size + qdd.size))
-            r1, r3 = r1 + pull[: a.size], r3 + pull[a.size :]
+            forces = G.T @ mu if active.size else exact(np.zeros(a.size + qdd.size))
+            r1, r3 = r1 + forces[: a.size], r3 + forces[a.size :]
             r4 = G @ np.concatenate([a, qdd]) - h if active.size else np.zeros(0)
             step = factor.solve(*(np.array(r, dtype=float) for r in (r1, r2, r3, r4)))
             a, qdd, multipliers, mu = (old - exact(new) for old, new in zip((a, qdd, multipliers, mu), step, strict=True))
             answer = _rounded(a, qdd, multipliers, mu)
             before, last = last, float(acceleration_errors(compulsion, answer, step, suspicious=0.0).max(initial=0.0))
-            if last <= CONVERGED or (last <= ENOUGH and last > before / 2):
+            if last <= CONVERGED or (last <= STAGNATED and last > before / 2):
                 break
         else:
             raise BackendError(f"refinement stays at {last:.1e}; the rows are too close to dependent.")
         scale = max(np.abs(answer.a).max(), np.abs(compulsion.a_free).max(), np.abs(compulsion.D).max(initial=0.0))
         contradiction = float(np.abs(r2).max()) / scale if r2.size else 0.0
     _confirm(compulsion, answer, active)
-    pushes = np.zeros(compulsion.h.size)
-    pushes[active] = answer.inequality_multipliers
-    return ReferenceSolution(answer.a, answer.qdd, active, last, contradiction, answer.multipliers, pushes)
+    inequality_multipliers = np.zeros(compulsion.h.size)
+    inequality_multipliers[active] = answer.inequality_multipliers
+    return ReferenceSolution(answer.a, answer.qdd, active, last, contradiction, answer.multipliers, inequality_multipliers)
 
 
 def _widened(compulsion: Compulsion, exact) -> Compulsion:

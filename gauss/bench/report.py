@@ -6,8 +6,8 @@ import numpy as np
 
 from gauss.bench import compiled
 from gauss.bench.clocks import AROUND
-from gauss.bench.instances import FILE as FILE_FORM
-from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.instances import FILE, MAIN_FORM
+from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
 from gauss.bench.markdown import head, in_time, number, share, table
 from gauss.bench.measure import OURS, WRONG
 from gauss.bench.problems import INCONSISTENT, SELECTION
@@ -24,6 +24,7 @@ from gauss.bench.summary import (
     groups,
     is_broken,
     is_kept,
+    is_lost,
     is_right,
     is_wrong,
     sensitivity,
@@ -31,8 +32,6 @@ from gauss.bench.summary import (
     verdict,
 )
 from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
-
-FORM, LEVEL = "F2s", "high"  # of the table of errors
 
 HOW = f"""Every backend gets the same quadratic programmes of mechanisms, in a process of its own with one thread. The
 error of an answer is the largest relative error of a body's or joint's acceleration against a reference with residuals of
@@ -58,9 +57,9 @@ open; a solver that gives none is off by 1."""
 def markdown(rows, reused, header) -> str:
     """The whole report."""
     lines = head("QP backends on mechanism problems", [*header, "all packages: [qp.lock](qp.lock)"])
-    lines += [HOW, "", "![Errors of the backends](qp_errors.png)", "![Time against error](qp_time_error.png)", ""]
-    lines += ["![Performance profiles](qp_profile.png)", ""]
-    lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], LEVEL)
+    lines += [HOW, "", *(["![Errors of the backends](qp_errors.png)"] if cells_shown(rows) else [])]
+    lines += ["![Time against error](qp_time_error.png)", "", "![Performance profiles](qp_profile.png)", ""]
+    lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], MAIN_LEVEL)
     lines += _errors(rows) + _totals(rows) + _verdicts(rows) + _times(rows) + _means(rows) + _against(rows) + _honesty(rows)
     return "\n".join(lines + (reuse_lines(reused, rows) if reused else [])) + "\n"
 
@@ -76,9 +75,9 @@ def _problems(rows) -> list[str]:
 
 def _errors(rows) -> list[str]:
     problems = [name for group, names in groups(rows).items() if group != INCONSISTENT for name in names]
-    cells = {(r["backend"], r["problem"]): r for r in rows if _shown(r) or r["form"] == OWN}
+    cells = cells_shown(rows)
     lines = [
-        f"## Errors, {FORM}, level {LEVEL}",
+        f"## Errors, {MAIN_FORM}, level {MAIN_LEVEL}",
         "",
         "In brackets: not certified. Bold: claimed, beyond. –: refused, or no finite "
         f"answer; {compiled.NAME}, which has no certificate: errors of joints alone. Kept: residuals are within the "
@@ -92,15 +91,21 @@ def _errors(rows) -> list[str]:
     return lines
 
 
+def cells_shown(rows) -> dict[tuple[str, str], dict]:
+    """Cells of the table and of the chart of errors, by backend and problem."""
+    shown = (row for row in rows if row["group"] != INCONSISTENT and (_shown(row) or row["form"] == OWN))
+    return {(row["backend"], row["problem"]): row for row in shown}
+
+
 def _shown(row) -> bool:
     """Whether a cell is one of a QP solver that tables problem by problem show."""
-    return row["form"] in (FORM, FILE_FORM) and row["level"] == LEVEL
+    return row["form"] in (MAIN_FORM, FILE) and row["level"] == MAIN_LEVEL
 
 
 def _cell(row) -> str:
     if row is None:
         return ""
-    if row["outcome"] in ("crashed", "timed out"):
+    if is_lost(row):
         return row["outcome"]
     if row["outcome"] == "answered" and np.isnan(row["error"]):  # nothing is known of it but its residuals
         return "kept" if is_kept(row) else "**claimed**" if is_broken(row) else "not kept"
@@ -183,7 +188,7 @@ def _times(rows) -> list[str]:
         if group == INCONSISTENT or not names:
             continue
         lines += [
-            f"## Times, class {group}, {_form_of(rows, group)}, level {LEVEL}",
+            f"## Times, class {group}, {_form_of(rows, group)}, level {MAIN_LEVEL}",
             "",
             "Microseconds of right answers: call from Python / reported by the library, – where it reports none (of "
             f"{', '.join(AROUND)}: around the call of the library).",
@@ -193,7 +198,7 @@ def _times(rows) -> list[str]:
             "Medians over right answers: first call over later ones, quartiles apart over the median, library over "
             "call, set-up over library.",
             "",
-            *table(CLOCKS, map(_clock, clocks(rows, problems, FORM, LEVEL))),
+            *table(CLOCKS, map(_clock, clocks(rows, problems, MAIN_FORM, MAIN_LEVEL))),
             "",
         ]
     return lines
@@ -202,7 +207,7 @@ def _times(rows) -> list[str]:
 def _form_of(rows, group: str) -> str:
     """Form of a class in tables that show one: of programmes of files their own."""
     forms = {row["form"] for row in rows if row["group"] == group}
-    return FILE_FORM if FILE_FORM in forms else FORM
+    return FILE if FILE in forms else MAIN_FORM
 
 
 CLOCKS = ("backend", "right", "cold / warm", "spread", "library / call", "set-up / library")
@@ -224,11 +229,11 @@ def _means(rows) -> list[str]:
     lines = []
     columns = [f"{1e3 * shift:g} ms, {penalty * LIMIT:g} s" for shift in SHIFTS for penalty in PENALTIES]
     for group, problems in groups(rows).items():
-        found = sensitivity(rows, problems, FORM, LEVEL)
+        found = sensitivity(rows, problems, MAIN_FORM, MAIN_LEVEL)
         if group == INCONSISTENT or not found:
             continue
         lines += [
-            f"## What means hinge on, class {group}, {_form_of(rows, group)}, level {LEVEL}",
+            f"## What means hinge on, class {group}, {_form_of(rows, group)}, level {MAIN_LEVEL}",
             "",
             "Shifted geometric means by shift and by what a problem costs that is not solved right; in brackets the rank.",
             "",

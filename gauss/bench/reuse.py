@@ -57,13 +57,14 @@ def along(compulsions: list[Compulsion], accelerations: list, backend: str, leve
             for mode in modes:
                 if mode == ONE_SHOT:
                     found, seconds = _timed(prepared.call)
-                    answer, reported = prepared.read(found), Reported(*prepared.library(found), np.nan)
+                    answer, library = prepared.read(found), prepared.library(found)
+                    reported = Reported(library.setup, np.nan, library.solve)
                 else:
                     solver, programme = (method(**chosen), lean) if mode == ANEW else (kept[mode], whole)
                     answer, seconds = _timed(partial(attempt, solver, programme))
                     reported = _reported(solver, backend)
                 answers[mode].append(answer)
-                figures[mode].append((seconds, reported.setup, reported.update, reported.solve))
+                figures[mode].append((seconds, *reported))
     errors = {mode: _errors(compulsions, programmes, answers[mode], accelerations) for mode in modes}
     return [_row(mode, max(errors[mode]), figures[mode]) for mode in modes]
 
@@ -82,20 +83,19 @@ def _timed(call: Callable) -> tuple[Any, float]:
 
 
 class Reported(NamedTuple):
-    """What a library says of its last call [s]; nan where it says nothing."""
+    """Times [s] that a library reports of its last call; nan where it reports none."""
 
     setup: float
-    solve: float
-    total: float
     update: float
+    solve: float
 
 
 def _reported(solver, backend: str) -> Reported:
     """Times that OSQP and PIQP report of a workspace; set-up is that of its making."""
     if backend == "clarabel":
-        return Reported(np.nan, np.nan, np.nan, np.nan)
+        return Reported(np.nan, np.nan, np.nan)
     info = solver._solver._solver.info if backend == "osqp" else solver._solver.result.info
-    return Reported(info.setup_time, info.solve_time, info.run_time, info.update_time)
+    return Reported(info.setup_time, info.update_time, info.solve_time)
 
 
 def _errors(compulsions, programmes, outcomes, accelerations) -> list[float]:

@@ -17,7 +17,7 @@ from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.suite.instance import INFEASIBLE
-from gauss.bench.verdicts import is_false, said, stated, truth
+from gauss.bench.verdicts import said, stated, truth
 
 RIGHT = 1e-6  # relative error of a right answer, the tolerance of certificates
 SHIFT, PENALTY = 1e-3, 1.0  # [s] of the shifted geometric mean, about the time of one solve; limits that a failure costs
@@ -82,6 +82,11 @@ def is_wrong(row) -> bool:
     return bool(row["claimed"]) and (row["error"] > WRONG or row["outcome"] == "not finite")
 
 
+def is_lost(row) -> bool:
+    """Whether the process of a solver died, or its time was over."""
+    return row["outcome"] in ("crashed", "timed out")
+
+
 def complete(rows, problems: list[str], form: str) -> dict[tuple[str, str], list[dict]]:
     """Cells of each backend and level that was measured on all the problems, so that shares and means compare."""
     found: dict[tuple[str, str], list[dict]] = {}
@@ -109,9 +114,8 @@ def totals(rows, problems: list[str], form: str) -> list[dict]:
                 "error": middle([r["error"] for r in cells]),
                 "dual_error": middle([dual_error(r) for r in cells]),
                 "wrong": sum(map(is_wrong, cells)),
-                "false": sum(map(is_false, cells)),
                 "refused": sum(r["outcome"] in ("refused", "not finite") for r in cells),
-                "lost": sum(r["outcome"] in ("crashed", "timed out") for r in cells),
+                "lost": sum(map(is_lost, cells)),
                 "mean": mean_time(cells),
             }
         )

@@ -90,11 +90,13 @@ def qp(
 
 def _selection(backend, form, level, solver, quick: bool) -> dict:
     """Backends, forms, levels and solvers of the user, with the usual ones where there are none."""
+    from gauss.bench.instances import MAIN_FORM
+    from gauss.bench.levels import MAIN_LEVEL
     from gauss.bench.qp import FORMS, quick_backends
 
     if solver:
         _import_from_here()
-    forms, levels = (["F2s"], ["high"]) if quick else (FORMS, None)
+    forms, levels = ([MAIN_FORM], [MAIN_LEVEL]) if quick else (FORMS, None)
     return {
         "backends": backend or (quick_backends() if quick else None),
         "forms": form or forms,

@@ -19,12 +19,14 @@ from gauss.bench.folders import of_folder
 from gauss.bench.fronts import FrontPoint, front, fronts
 from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_problem, of_selection
 from gauss.bench.levels import LIMIT
-from gauss.bench.measure import measure
+from gauss.bench.measure import FIGURES, measure
 from gauss.bench.problems import INCONSISTENT, SOLVABLE, make_problem
+from gauss.bench.publish import publish
 from gauss.bench.report import markdown
 from gauss.bench.suite.instance import INFEASIBLE, UNBOUNDED
 from gauss.bench.suite_instances import SUITE, of_suite
 from gauss.bench.summary import complete, is_broken, is_kept, is_right, mean_time, profile, sensitivity, totals, verdict
+from gauss.bench.table import write_table
 from gauss.bench.verdicts import is_false, said
 from gauss.bench.worker import Worker
 from gauss.errors import BackendError, FileError
@@ -42,7 +44,7 @@ GOOD |= {
 }
 BEYOND = {"primal": 1e-6, "excess": 1e3}  # residuals above the tolerance
 ROUNDED = {"primal": 1e-6, "excess": 0.5}  # above the tolerance, but not above rounding
-NOTHING = {"error": np.nan, "primal": np.nan, "dual": np.nan, "gap": np.nan, "excess": np.nan}
+NO_FIGURES = {"error": np.nan, "primal": np.nan, "dual": np.nan, "gap": np.nan, "excess": np.nan}
 
 
 class Perfect:
@@ -166,20 +168,20 @@ def test_what_a_row_says():
     assert not is_broken(GOOD | BEYOND | {"claimed": False})
     late = GOOD | {"outcome": "timed out", "claimed": False}
     assert not is_right(late) and not is_kept(late)
-    own = GOOD | NOTHING | {"error": 1e-3, "level": "own", "certified": True}
+    own = GOOD | NO_FIGURES | {"error": 1e-3, "level": "own", "certified": True}
     assert not is_right(own)  # whatever its certificate says
     assert is_right(GOOD | {"error": np.nan})  # no reference: residuals are all that there is
     assert not is_right(GOOD | BEYOND | {"error": np.nan})
 
 
 def test_verdicts_on_what_has_no_solution():
-    lacking = GOOD | NOTHING
+    unmeasured = GOOD | NO_FIGURES
     cases = {
         "within": GOOD | {"error": np.nan},
-        "broken": lacking | BEYOND,
-        "said": lacking | {"claimed": False, "reason": "PrimalInfeasible"},
-        "no answer": lacking | {"claimed": False, "reason": "singular"},
-        "claimed": lacking | {"level": "own"},
+        "broken": unmeasured | BEYOND,
+        "said": unmeasured | {"claimed": False, "reason": "PrimalInfeasible"},
+        "no answer": unmeasured | {"claimed": False, "reason": "singular"},
+        "claimed": unmeasured | {"level": "own"},
     }
     assert {name: verdict(row) for name, row in cases.items()} == {name: name for name in cases}
 
@@ -294,7 +296,7 @@ def test_errors_of_x_and_of_multipliers_are_those_that_were_put_in(kind, name):
         work = right.work[right.held]
         loose[right.held] = scaled * np.abs(right.work * right.multipliers).max() / np.where(work > 0.0, work, np.inf)
         assert np.abs(loose).max() > 0.0 or right.basis.shape[0] == right.basis.shape[1]
-        size = instance.known.x * 0.0 + np.abs(rows.T) @ np.abs(loose)
+        size = np.abs(rows.T) @ np.abs(loose)
         assert (np.abs(rows.T @ loose) <= 1e-9 * np.maximum(size, size.max())).all()
     for size in (0.0, 1e-8, 1e-3):
         assert right.dual_error((1.0 + size) * right.multipliers + loose) == pytest.approx(size, rel=1e-2, abs=1e-11)
@@ -427,6 +429,19 @@ def test_answers_without_a_reference_are_named_by_their_residuals():
     errors = text[text.index("## Errors") : text.index("## Class")]
     assert "| daqp | kept |" in errors and "LiarInY | **claimed** |" in errors
     assert "class mine, file" in text and "Level low" not in text
+
+
+@pytest.mark.parametrize(
+    ("change", "has_errors"),
+    [({"form": FILE}, True), ({"form": "F2s", "level": "low"}, False), ({"form": "F2s", "group": INCONSISTENT}, False)],
+)
+def test_pages_are_written_whatever_was_asked(tmp_path, change, has_errors):
+    """Of programmes from files; of another level, or of an inconsistent problem, without a chart of errors."""
+    row = GOOD | dict.fromkeys(FIGURES, np.nan) | {"certified": False} | change
+    write_table(tmp_path / "qp.csv", ["date: today", "machine: this one"], [row])
+    written = publish(tmp_path, tmp_path / "qp.csv", None)
+    assert set(written) == set(tmp_path.iterdir()) - {tmp_path / "qp.csv"}
+    assert (tmp_path / "qp_errors.png" in written) == has_errors == ("qp_errors.png" in (tmp_path / "qp.md").read_text())
 
 
 def test_names_stand_for_several_classes():

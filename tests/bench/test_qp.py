@@ -16,6 +16,7 @@ from scipy import io
 import gauss
 from gauss.backends import make
 from gauss.backends.programme import FORMS
+from gauss.bench.classes import compare_class
 from gauss.bench.export import TEST_SET, along, export, without_inequalities
 from gauss.bench.problems import INCONSISTENT, SELECTION, make_problem
 from gauss.bench.qp import compare
@@ -192,7 +193,7 @@ def test_unknown_names_are_refused_at_once(tmp_path):
     with pytest.raises(BackendError, match="no level 'highest'.*high"):
         compare(tmp_path, levels=["highest"])
     with pytest.raises(BackendError, match="no class 'equal'.*equality"):
-        compare(tmp_path, groups=["equal"])
+        compare_class(tmp_path, "equal")
     with pytest.raises(BackendError, match="solver 'tests.support.exact:Solver'.*module:Class"):
         compare(tmp_path, solvers=["tests.support.exact:Solver"])
     with pytest.raises(FileError, match="no format 'csv'"):

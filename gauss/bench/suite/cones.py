@@ -15,7 +15,7 @@ from gauss.bench.suite.doubled import Doubled, joined, product, taken, wide, zer
 from gauss.bench.suite.guess import guessed
 from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, speeds
-from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS, held_rows
+from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, STAGNATED, STEPS, held_rows
 from gauss.errors import BackendError
 
 ROUNDS = 500  # of convex problems, each with the sliding of the one before, until Coulomb's law is met (Acary, Cadoux 2011)
@@ -42,7 +42,7 @@ def refined_with_cones(instance: SuiteInstance) -> SuiteReference:
         step = _solved(slope / scale[:, None], value.rounded() / scale)
         unknown = unknown - step
         last = float(np.abs(step).max() / max(np.abs(unknown.hi).max(), TINY))
-        if last <= CONVERGED or (last <= ENOUGH and last > before / 2):
+        if last <= CONVERGED or (last <= STAGNATED and last > before / 2):
             break
         before = last
     else:

@@ -24,7 +24,7 @@ ROUNDED = 1e-13  # the same, where rows are dependent to the round-off of their 
 DEPENDENT = 1e-11  # relative pivot of rows that are dependent to round-off; the next ones are at 1e-7
 LITTLE = 1e-14  # of entries near one: less than dependent
 CHANGES, STEPS = 40, 60
-CONVERGED, ENOUGH = 1e-31, 1e-20  # last correction, relative: target, and limit where the refinement stagnates
+CONVERGED, STAGNATED = 1e-31, 1e-20  # last correction, relative: target, and limit where the refinement stagnates
 
 
 class Held(NamedTuple):
@@ -127,7 +127,7 @@ def solve_wide(K, target: np.ndarray, name: str) -> tuple[Doubled, float]:
         last = float(np.abs(step / scale).max(initial=0.0) / size) if size else CONVERGED
         if not np.isfinite(last):
             break
-        if last <= CONVERGED or (last <= ENOUGH and last > before / 2):
+        if last <= CONVERGED or (last <= STAGNATED and last > before / 2):
             return unknown, max(last, CONVERGED)
         before = last
     raise BackendError(f"{name}: refinement stays at {last:.1e}; the rows that hold are too close to dependent.")
