@@ -101,17 +101,17 @@ def header_of(path: Path) -> list[str]:
 
 
 def _parted(lines: Iterable[str]) -> tuple[list[str], list[str]]:
-    """Lines of comments at the head, and those that follow; the name of a problem may begin like a comment."""
+    """Lines of comments at the head, and the rows after them without further comments; a name may begin with a hash sign."""
     lines = list(lines)
     count = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
-    return lines[:count], lines[count:]
+    return lines[:count], [line for line in lines[count:] if not line.startswith("# ")]
 
 
 def _text(value) -> str:
     """A number in six digits; of words, what can be printed in one line: solvers and names of files hold anything."""
     if isinstance(value, float):
         return f"{value:.6g}"
-    return "".join(c if c.isprintable() else " " for c in str(value))[:200]
+    return "".join(c if c.isprintable() else " " for c in str(value).removeprefix("# "))[:200]
 
 
 def _values(row: dict) -> dict:
