@@ -63,11 +63,13 @@ class TieredFunction:
         The first tier.
     make : callable
         () → the second tier.
-    evaluations : int
-        Number of evaluations of the first tier that take as long as making the second.
+    evaluations : int, optional
+        Number of evaluations of the first tier that take as long as making the second; that of refined dynamics when not
+        given.
     """
 
-    def __init__(self, function: Callable, make: Callable[[], Callable], evaluations: int = COMPILE_THRESHOLD):
+    def __init__(self, function: Callable, make: Callable[[], Callable], evaluations: int | None = None):
+        evaluations = COMPILE_THRESHOLD if evaluations is None else evaluations
         self.function, self.threshold = function, CompileThreshold(evaluations - 1)  # the last counted one compiles
         self.make: Callable[[], Callable] | None = make
 
