@@ -106,7 +106,7 @@ def test_without_a_law_inputs_are_zero():
     "arguments, message",
     [
         ({"control": lambda t, q, v: np.nan, "rate": 20}, "input 'u' is nan"),
-        ({"control": lambda t, q, v: (1.0, 2.0), "rate": 20}, "expected a number"),
+        ({"control": lambda t, q, v: (1.0, 2.0), "rate": 20}, "expected 1 number"),
         ({"control": lambda t: 1.0, "rate": 20}, "law"),
         ({"control": np.zeros((2, 1)), "rate": 20}, "6 samples"),
         ({"control": law}, "rate"),

@@ -168,6 +168,8 @@ class FreeBodyStepper:
             speed = reached
             near = self._near(state, begun, speed, h, share)
             known = rates(near, begun.both)
+        else:
+            raise SimulationError(f"t = {state.t:.6g} s: contacts make bodies faster and faster; shorten the step.")
         self._keep(near, force)
         found = np.empty(state.q.size), np.empty(state.v.size)
         change = (after - begun.both[..., 0])[: self.n, :6].T
