@@ -10,8 +10,8 @@ from gauss.backends.accuracy import tolerances
 LEVELS = {"low": 1e-3, "mid": 1e-6, "high": 1e-9, "tightest": 1e-12}  # absolute tolerances of residuals and gap
 MAIN_LEVEL = "high"  # of tables, charts and sentences about one level, and of quick comparisons
 OWN = "own"  # level of methods that have no tolerance
-LIMIT = 1.0  # [CPU s] of one solve; an answer that comes later is none, whether or not a solver can be told
-# [s] of one solve that libraries are told, whose clocks are of wall time: on a busy machine the CPU time ends it, not they.
+LIMIT = 1.0  # [CPU s] of one solve; later answers do not count, whatever limits a solver takes
+# Limit of wall time [s] that libraries get for one solve: so large that on a busy machine the CPU time ends it first.
 WALL_LIMIT = 10.0 * LIMIT
 # Iterations of one solve, so many that the time ends it and not their number: at least the default of every solver of a
 # kind.

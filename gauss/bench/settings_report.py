@@ -20,7 +20,7 @@ def settings_lines(solvers: list[str], level: str) -> list[str]:
         f"## Settings of the comparison, level {level}",
         "",
         f"Tolerances are those that qpbenchmark sets, limits of iterations are common to all that take them. {LIMIT:g} s of "
-        f"CPU time ends a call, whatever a solver can be told; its own limits, of wall time, are {WALL_LIMIT:g} s. "
+        f"CPU time ends a call, whatever limits a solver takes; its own limits, of wall time, are {WALL_LIMIT:g} s. "
         "All others are the defaults of the solver, tuned for none. At other levels the tolerances differ and nothing "
         "else.",
         "",
