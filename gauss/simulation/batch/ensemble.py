@@ -59,7 +59,7 @@ class Ensemble:
         system = self.family.system
         self.code: FixedStepBatchLoop | AdaptiveBatchCode
         if integrator in FIXED:
-            self.code = fixed_batch(Program(system, laws, family=self.family), FIXED[integrator])
+            self.code = FixedStepBatchLoop(*fixed_batch(Program(system, laws, family=self.family), FIXED[integrator]))
         else:
             program = Program(system, laws, memory=method_state_size(pattern), family=self.family)
             self.code = AdaptiveBatchCode(program, ADAPTIVE[integrator], self.tolerance.shares)
