@@ -1,7 +1,7 @@
 """Exponential, logarithm and arc tangent in LLVM IR, for processors without a C library; below 1, 1 and 2 ulp.
 
 Argument reductions and minimax polynomials of the public FDLIBM kernels (Sun Microsystems 1993, e_exp.c, e_log.c, s_atan.c):
-eˣ = 2ᵏ eʳ, |r| ≤ ½ ln 2; ln x = k ln 2 + ln(1 + f), ½√2 < 1 + f < √2; the arc tangent of a quotient in [0, 1] about 0, ½ or 1.
+eˣ = 2ᵏ eʳ, |r| ≤ ½ ln 2; ln x = k ln 2 + ln(1 + f), ½√2 < 1 + f < √2; the arc tangent of a quotient up to 1 about 0, ½ or 1.
 """
 
 from collections.abc import Callable

@@ -10,6 +10,7 @@ from functools import cache
 
 import numpy as np
 
+from gauss.codegen.gpu import dlpack
 from gauss.codegen.gpu.device import Lowered
 from gauss.codegen.gpu.ptx import LEAST_CAPABILITY, ptx
 from gauss.codegen.gpu.thread_code import THREADS_PER_BLOCK, ThreadCode
@@ -89,13 +90,12 @@ class CudaDevice:
     """
 
     def __init__(self, number: int = 0):
-        self.driver, self.name = driver(), f"cuda:{number}"
+        self.driver, self.number, self.name = driver(), number, f"cuda:{number}"
         count = self.driver.call("cuDeviceGetCount")
         if number >= count:
             raise DeviceError(f"device {self.name!r} does not exist: the driver has {count}, numbered from 0.")
         device = self.driver.call("cuDeviceGet", number)
-        parts = (self.driver.attribute(f"COMPUTE_CAPABILITY_{part}", device) for part in ("MAJOR", "MINOR"))
-        major, minor = parts
+        major, minor = (self.driver.attribute(f"COMPUTE_CAPABILITY_{part}", device) for part in ("MAJOR", "MINOR"))
         if 10 * major + minor < LEAST_CAPABILITY:
             raise DeviceError(f"device {self.name!r} has compute capability {major}.{minor}; at least 6.0 is needed.")
         self.capability = min(10 * major + minor, NEWEST_CAPABILITY)
@@ -114,6 +114,10 @@ class CudaDevice:
         """Thread code, ready to run."""
         return CudaProgram(self, lowered)
 
+    def view(self, given) -> "CudaView | None":
+        """An array of another library on a GPU, as it is; None if it is none."""
+        return CudaView(given) if hasattr(given, "__cuda_array_interface__") else None
+
     def put(self, array: np.ndarray) -> "CudaArray":
         """Copy of an array in the memory of the device."""
         found = self.empty(np.shape(array))
@@ -131,7 +135,7 @@ class CudaDevice:
 
 
 class CudaArray:
-    """Array of doubles on a GPU; other packages read it without a copy (``__cuda_array_interface__``).
+    """Array of doubles on a GPU; other packages read it without a copy (``__cuda_array_interface__``, DLPack).
 
     Parameters
     ----------
@@ -155,6 +159,14 @@ class CudaArray:
     def __cuda_array_interface__(self) -> dict:
         return {"shape": self.shape, "typestr": "<f8", "data": (self.pointer, False), "strides": None, "version": 3}
 
+    def __dlpack_device__(self) -> tuple[int, int]:
+        """Kind of memory, and number of the device."""
+        return dlpack.CUDA, self.device.number
+
+    def __dlpack__(self, **_):
+        """Capsule of the array; programs wait for their threads, so that no stream needs to."""
+        return dlpack.capsule(self, self.pointer, self.shape, *self.__dlpack_device__())
+
     def numpy(self) -> np.ndarray:
         """A copy in the memory of this process."""
         found = np.empty(self.shape)
@@ -169,6 +181,23 @@ class CudaArray:
         self.device.current()
         if self.nbytes:
             self.device.driver.call("cuMemcpyHtoD", self.pointer, given.ctypes.data, self.nbytes)
+
+
+class CudaView:
+    """Array of another library on a GPU.
+
+    Parameters
+    ----------
+    given : object
+        Array with ``__cuda_array_interface__``.
+    """
+
+    def __init__(self, given):
+        described = given.__cuda_array_interface__
+        self.given, self.shape, self.dtype = given, tuple(described["shape"]), described["typestr"]
+        self.pointer, strides = described["data"][0], described.get("strides")
+        contiguous = [8 * int(np.prod(self.shape[k + 1 :], dtype=np.int64)) for k in range(len(self.shape))]
+        self.strides = tuple(contiguous if strides is None else strides)
 
 
 class CudaProgram:
@@ -204,9 +233,9 @@ class CudaProgram:
         if hasattr(self, "module"):
             self.device.driver.api.cuModuleUnload(self.module)
 
-    def __call__(self, threads: int, arguments: Sequence[CudaArray | int]):
+    def __call__(self, threads: int, arguments: Sequence[CudaArray | CudaView | int]):
         """Run the threads, and wait for them."""
-        values = tuple(given.pointer if isinstance(given, CudaArray) else given for given in arguments)
+        values = tuple(given if isinstance(given, int) else given.pointer for given in arguments)
         kinds = tuple(ctypes.c_void_p if is_array else ctypes.c_int64 for is_array in self.is_array)
         blocks = -(-threads // THREADS_PER_BLOCK)
         if not blocks:

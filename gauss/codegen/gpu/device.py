@@ -34,6 +34,24 @@ class DeviceArray(Protocol):
         """Overwrite it with an array of its shape."""
 
 
+class DeviceView(Protocol):
+    """Array of another library in the memory of a device.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Its shape.
+    strides : tuple of int
+        Its strides [bytes].
+    dtype : str
+        Type of its entries, as numpy writes it.
+    """
+
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    dtype: str
+
+
 class Program(Protocol):
     """Thread code that can be run."""
 
@@ -63,6 +81,9 @@ class Device(Protocol):
 
     def program(self, lowered: Lowered) -> Program:
         """Thread code, ready to run."""
+
+    def view(self, given) -> "DeviceView | None":
+        """An array of another library on the device, as it is; None if it is none."""
 
     def put(self, array: np.ndarray) -> DeviceArray:
         """Copy of an array on the device."""

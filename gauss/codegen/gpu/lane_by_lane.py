@@ -1,4 +1,4 @@
-"""A device that is this CPU: the threads of a GPU run one after the other, so that its results can be checked without one."""
+"""A device that is this CPU: the threads of a GPU run one after the other, and results are checked without one."""
 
 import ctypes
 from collections.abc import Sequence
@@ -48,6 +48,9 @@ class LaneByLane:
     def program(self, lowered: Lowered) -> "HostProgram":
         """Thread code, ready to run."""
         return HostProgram(lowered)
+
+    def view(self, given) -> None:
+        """No array of another library is on this device."""
 
     def put(self, array: np.ndarray) -> HostArray:
         """Copy of an array."""
