@@ -63,12 +63,12 @@ class _Elementary:
     """Emitter of one function."""
 
     def __init__(self, module: ir.Module, name: str):
-        write: Callable = {"exp": self._exp, "log": self._log, "atan2": self._atan2}[name]
+        writers: dict[str, Callable] = {"exp": self._exp, "log": self._log, "atan2": self._atan2}
         kind = ir.FunctionType(DOUBLE, [DOUBLE] * (2 if name == "atan2" else 1))
         self.module, self.function = module, ir.Function(module, kind, f"elementary_{name}")
         self.function.linkage = "internal"
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
-        self.b.ret(write(*self.function.args))
+        self.b.ret(writers[name](*self.function.args))
 
     def _call(self, name: str, *given):
         return self.b.call(intrinsic(self.module, name, DOUBLE, len(given)), given)

@@ -185,7 +185,7 @@ class StateFunctions:
         ----------
         *names : str
             Names of these functions, "inverse_dynamics" or "loop_constraints"; those of frames with the frame, as in
-            "jacobian:hand".
+            "jacobian:hand". "forward_dynamics" alone.
         reference : str
             Axes and point of Jacobians: "local_world_aligned", "world" or "local".
         independent : sequence of str, optional

@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.codegen.function import Function
 from gauss.codegen.gpu.batch_threads import adaptive_threads, fixed_step_threads
-from gauss.codegen.gpu.device import Device, DeviceArray, Lowered
+from gauss.codegen.gpu.device import Device, DeviceArray, Lowered, Program
 from gauss.codegen.gpu.devices import device
 from gauss.codegen.gpu.thread_code import states_code
 from gauss.codegen.kernels.adaptive import Adaptive
@@ -14,6 +14,7 @@ from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, MotionQueue
 from gauss.codegen.kernels.fixed_step import Fixed
 from gauss.codegen.kernels.fixed_step_batch import BatchSpan
 from gauss.codegen.kernels.loop_control import LoopStatus, Numbers
+from gauss.codegen.native_function import NativeFunction
 
 WHOLE = 1 << 40  # budget of steps that is never used up
 
@@ -31,7 +32,7 @@ class OnDevice:
 
     def __init__(self, name: str, lowered: Lowered):
         self.device_name, self.lowered = name, lowered
-        self._program = None
+        self._program: Program | None = None
 
     def __getstate__(self) -> dict:
         return vars(self) | {"_program": None}
@@ -41,7 +42,7 @@ class OnDevice:
         """The device."""
         return device(self.device_name)
 
-    def run(self, threads: int, arguments: Sequence[DeviceArray | int]):
+    def run(self, threads: int, arguments: Sequence):
         """Run the threads, and wait for them."""
         if self._program is None:
             self._program = self.device.program(self.lowered)
@@ -55,11 +56,11 @@ class DeviceKernel(OnDevice):
     ----------
     name : str
         Name of the device.
-    function : Function
+    function : Function or NativeFunction
         The function.
     """
 
-    def __init__(self, name: str, function: Function):
+    def __init__(self, name: str, function: Function | NativeFunction):
         super().__init__(name, device(name).lowered(states_code(function)))
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
 

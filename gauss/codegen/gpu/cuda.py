@@ -199,6 +199,14 @@ class CudaView:
         contiguous = [8 * int(np.prod(self.shape[k + 1 :], dtype=np.int64)) for k in range(len(self.shape))]
         self.strides = tuple(contiguous if strides is None else strides)
 
+    def numpy(self) -> np.ndarray:
+        """A copy in the memory of this process."""
+        last = sum(step * (size - 1) for step, size in zip(self.strides, self.shape, strict=True))
+        whole = np.empty(1 + last // 8 if all(self.shape) else 0)
+        if whole.size:
+            driver().call("cuMemcpyDtoH", whole.ctypes.data, self.pointer, whole.nbytes)
+        return np.lib.stride_tricks.as_strided(whole, self.shape, self.strides).copy()
+
 
 class CudaProgram:
     """Thread code on a GPU.
@@ -233,7 +241,7 @@ class CudaProgram:
         if hasattr(self, "module"):
             self.device.driver.api.cuModuleUnload(self.module)
 
-    def __call__(self, threads: int, arguments: Sequence[CudaArray | CudaView | int]):
+    def __call__(self, threads: int, arguments: Sequence):
         """Run the threads, and wait for them."""
         values = tuple(given if isinstance(given, int) else given.pointer for given in arguments)
         kinds = tuple(ctypes.c_void_p if is_array else ctypes.c_int64 for is_array in self.is_array)

@@ -51,11 +51,14 @@ class DeviceView(Protocol):
     strides: tuple[int, ...]
     dtype: str
 
+    def numpy(self) -> np.ndarray:
+        """A copy in the memory of this process."""
+
 
 class Program(Protocol):
     """Thread code that can be run."""
 
-    def __call__(self, threads: int, arguments: Sequence[DeviceArray | int]):
+    def __call__(self, threads: int, arguments: Sequence):
         """Run a number of threads, and wait for them."""
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.codegen.gpu.rows import UNMARKED, RowsOnDevice
+from gauss.codegen.gpu.rows import RowsOnDevice
 from gauss.codegen.python_wrapper import Interface
 from gauss.errors import GaussError, StateError
 
@@ -23,7 +23,7 @@ class DeviceFunction:
     interface : Interface
         Arguments, results and limits.
     own : callable
-        The same function on this CPU, which says why it refuses a row.
+        The same function on this CPU, for rows that exceed the limits; it says why it refuses one.
     name : str
         Its name.
     """
@@ -56,14 +56,12 @@ class DeviceFunction:
         numbers = np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
         table = [(array, *(step // 8 for step in apart)) for array, apart in zip(held, strides, strict=True)]
         found, marked = self.rows(count, table, device.put(numbers))
-        if marked != UNMARKED:
-            self._refuse(marked, arrays, views, numbers)
-        shapes = [(count, *shape) for shape in self.interface.shapes]
-        if any(views):
-            for array, shape in zip(found, shapes, strict=True):
-                array.shape = shape
-            return found[0] if len(found) == 1 else tuple(found)
-        results = [array.numpy().reshape(shape) for array, shape in zip(found, shapes, strict=True)]
+        if marked:
+            self._repair(arrays, numbers, found)
+        found = found[: len(self.interface.shapes)]
+        for array, shape in zip(found, self.interface.shapes, strict=True):
+            array.shape = (count, *shape)
+        results = found if any(views) else [array.numpy() for array in found]
         return results[0] if len(results) == 1 else tuple(results)
 
     def _arguments(self, vectors, views):
@@ -76,17 +74,20 @@ class DeviceFunction:
                     )
             yield (name, size), given, view
 
-    def _refuse(self, row: int, arrays, views, numbers: np.ndarray):
-        """Raise the reason why a row is refused."""
-        if not any(views):
+    def _repair(self, arrays, numbers: np.ndarray, found):
+        """Replace the results of rows that exceed a limit by those of the function on this CPU."""
+        *results, errors = (array.numpy() for array in found)
+        given = [array if isinstance(array, np.ndarray) else array.numpy() for array in arrays]
+        for row in np.flatnonzero(~(errors <= self.interface.limits).all(axis=1)).tolist():
             try:
-                self.own(*(array[row] for array in arrays), t=float(numbers[row]))
+                own = self.own(*(array[row] for array in given), t=float(numbers[row]))
             except GaussError as error:
                 error.add_note(f"in row {row} of the batch")
                 raise
-        raise StateError(
-            f"{self.__name__}: row {row} of the batch is refused: it is not finite, or a quaternion is not of unit length."
-        )
+            for result, replaced in zip(results, own if len(results) > 1 else (own,), strict=True):
+                result[row] = np.ravel(replaced)
+        for array, result in zip(found, results, strict=False):
+            array.put(result)
 
 
 def _rows(name: str, given, size: int) -> np.ndarray:

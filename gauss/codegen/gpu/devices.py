@@ -34,4 +34,5 @@ def device(name: str) -> Device:
 
 @cache
 def _device(number: int | None) -> Device:
-    return LaneByLane() if number is None else CudaDevice(number)
+    found: Device = LaneByLane() if number is None else CudaDevice(number)
+    return found

@@ -27,11 +27,11 @@ class HostArray:
 
     def numpy(self) -> np.ndarray:
         """A copy."""
-        return self.array.copy()
+        return self.array.reshape(self.shape).copy()
 
     def put(self, array: np.ndarray):
         """Overwrite it."""
-        self.array[...] = array
+        self.array[...] = array.reshape(self.array.shape)
 
 
 class LaneByLane:
@@ -79,6 +79,6 @@ class HostProgram:
         self.code = machine.load(lowered.text, optimise=2)
         self._run = self.code.entry(lowered.name, ctypes.CFUNCTYPE(None, ctypes.c_int64, *kinds))
 
-    def __call__(self, threads: int, arguments: Sequence[HostArray | int]):
+    def __call__(self, threads: int, arguments: Sequence):
         """Run the threads one after the other."""
         self._run.call(threads, *(given.array.ctypes.data if isinstance(given, HostArray) else given for given in arguments))

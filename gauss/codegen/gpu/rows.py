@@ -1,7 +1,7 @@
 """A function over rows of arrays on a device: states (n, …) in, results (n, …) out, a row in a thread.
 
 A thread copies its row to memory of its own, evaluates the function, and compares the limited quantities with their limits;
-where one is exceeded, it writes its number to a mark, so that only the mark travels back.
+where one is exceeded, it sets a mark, and only then the limited quantities travel back.
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,6 @@ from gauss.codegen.ir_blocks import POINTER, counted_loop
 from gauss.codegen.lanes import DOUBLE, INTEGER
 from gauss.codegen.python_wrapper import Interface
 
-UNMARKED = -1.0
-
 
 def rows_code(function: Function, interface: Interface) -> ThreadCode:
     """``rows(count, (vector, row stride, entry stride)…, numbers, results…, mark)`` of a function of vectors and a number.
@@ -27,7 +25,6 @@ def rows_code(function: Function, interface: Interface) -> ThreadCode:
     The strides are whole numbers of doubles; results and numbers are contiguous.
     """
     sizes, results = interface.sizes, interface.result_sizes(len(function.outputs))
-    results = results[:-1] if interface.limits else results
     kinds = [INTEGER, *[POINTER, INTEGER, INTEGER] * len(sizes), POINTER, *[POINTER] * len(results), POINTER]
     code = ThreadCode("rows", kinds)
     b, (count, *given), row = code.b, code.arguments, code.thread
@@ -50,9 +47,9 @@ def rows_code(function: Function, interface: Interface) -> ThreadCode:
                 b.store(b.load(b.gep(found, [b.add(i, INTEGER(place))])), b.gep(first, [i]))
             place += size
         for k, limit in enumerate(interface.limits):
-            value = b.load(b.gep(found, [INTEGER(place + k)]))
+            value = b.load(b.gep(found, [INTEGER(sum(results) - len(interface.limits) + k)]))
             with b.if_then(b.fcmp_unordered(">", value, ir.Constant(DOUBLE, limit))):
-                b.store(b.sitofp(row, DOUBLE), mark)
+                b.store(DOUBLE(1.0), mark)
     b.ret_void()
     return code
 
@@ -72,10 +69,10 @@ class RowsOnDevice(OnDevice):
 
     def __init__(self, name: str, function: Function, interface: Interface):
         super().__init__(name, device(name).lowered(rows_code(function, interface)))
-        self.sizes = interface.result_sizes(len(function.outputs))[: len(interface.result_shapes(len(function.outputs)))]
+        self.sizes = interface.result_sizes(len(function.outputs))
 
-    def __call__(self, count: int, vectors: Sequence, numbers: DeviceArray) -> tuple[list[DeviceArray], int]:
-        """Results (count, size) of all rows, and a row that exceeds a limit, or -1.
+    def __call__(self, count: int, vectors: Sequence, numbers: DeviceArray) -> tuple[list[DeviceArray], bool]:
+        """Results (count, size) of all rows, the limited quantities last, and whether a row exceeds a limit.
 
         Parameters
         ----------
@@ -87,6 +84,6 @@ class RowsOnDevice(OnDevice):
             The number of each row.
         """
         own = self.device
-        found, mark = [own.empty((count, size)) for size in self.sizes], own.put(np.array([UNMARKED]))
+        found, mark = [own.empty((count, size)) for size in self.sizes], own.put(np.zeros(1))
         self.run(count, [count, *(part for vector in vectors for part in vector), numbers, *found, mark])
-        return found, int(mark.numpy()[0])
+        return found, bool(mark.numpy()[0])

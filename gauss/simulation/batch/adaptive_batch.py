@@ -128,7 +128,7 @@ class AdaptiveBatch:
         )
         self.begun = initial_energy_record(look)
 
-    def _by_lanes(self, kernel: Kernel, columns: np.ndarray) -> np.ndarray:
+    def _by_lanes(self, kernel: Kernel | DeviceKernel, columns: np.ndarray) -> np.ndarray:
         """Outputs for columns, all of them by vector code: scalar code may round differently."""
         count = columns.shape[1]
         return kernel(np.pad(columns, ((0, 0), (0, -count % self.code.loop.width)), mode="edge"))[:, :count]
@@ -172,20 +172,20 @@ class AdaptiveBatch:
 
     def _until(self, motions: np.ndarray, grid: np.ndarray, out: np.ndarray, settings: dict, threads: int):
         """Move all motions to the end in ``settings``; all arrays are changed."""
-        code, count = self.code, motions.shape[1]
-        if isinstance(code.loop, DeviceAdaptiveLoop):
-            code.loop.until(MotionQueue(columns=count, rows=len(grid) - 1, **settings), motions, grid, out, DEVICE_BUDGET)
+        loop, count = self.code.loop, motions.shape[1]
+        if isinstance(loop, DeviceAdaptiveLoop):
+            loop.until(MotionQueue(columns=count, rows=len(grid) - 1, **settings), motions, grid, out, DEVICE_BUDGET)
             return
-        share = count if threads == 1 else max(code.loop.width, count // (CHUNKS_PER_THREAD * threads))
+        share = count if threads == 1 else max(loop.width, count // (CHUNKS_PER_THREAD * threads))
         chunks, stopped = iter(range(0, count, share)), Event()
 
         def work(_):
-            queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), code.loop.lanes()
+            queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), loop.lanes()
             while queue.status == LoopStatus.PAUSED and not stopped.is_set():
                 if queue.following >= queue.last:
                     begin = next(chunks, count)
                     queue.following, queue.last, queue.more = begin, min(begin + share, count), float(begin < count)
-                code.loop(queue, lanes, motions, grid, out, BUDGET)
+                loop(queue, lanes, motions, grid, out, BUDGET)
 
         in_threads(work, range(threads), threads, stopped)
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
-from gauss.codegen.gpu.batches import DeviceFixedStepLoop
-from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
@@ -37,7 +35,6 @@ from gauss.system import State, System, refuse_changed
 
 FIXED = {method.name: method for method in EXPLICIT_FIXED}
 ADAPTIVE = {method.name: method for method in EXPLICIT}
-FIXED_BATCHES = (FixedStepBatch, FixedStepBatchLoop), (DeviceFixedStepBatch, DeviceFixedStepLoop)  # of this CPU, of a device
 LARGE_BATCH = 1_000_000  # steps of all motions that take about as long as optimising the code of a robot arm
 ADAPTIVE_STEPS = 100  # number of steps that an adaptive motion is taken to make
 
@@ -192,9 +189,9 @@ def _fixed(
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
     held = control is not None
-    kind, loop = FIXED_BATCHES[device is not None]
+    kind = FixedStepBatch if device is None else DeviceFixedStepBatch
     named = () if device is None else (device,)
-    make = lambda laws: loop(*named, *fixed_batch(Program(system, laws, inputs=held), method))  # noqa: E731
+    make = lambda laws: fixed_batch(Program(system, laws, inputs=held), method, device)  # noqa: E731
     batch = kind(_machine_code(system, (method_key(method), held, *named), make), starts)
     refuse_inconsistent(system, starts, batch.residual)
     times, t = _switching(system, starts, steps * step).times, step * every * np.arange(steps // every + 1)
