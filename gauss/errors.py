@@ -57,6 +57,10 @@ class BackendError(GaussError, ValueError):
     """A backend does not exist, is not installed, or does not take this problem."""
 
 
+class DeviceError(GaussError, RuntimeError):
+    """A device does not exist, its driver is missing, or it cannot run a function."""
+
+
 class SimulationError(GaussError, RuntimeError):
     """A simulation cannot go on; ``trajectory`` holds what was computed so far.
 

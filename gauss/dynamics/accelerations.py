@@ -18,6 +18,8 @@ from gauss.codegen import (
     fastcall,
     write,
 )
+from gauss.codegen.gpu.device_function import DeviceFunction
+from gauss.codegen.gpu.rows import RowsOnDevice
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
@@ -30,7 +32,7 @@ from gauss.dynamics.engines.tree_recursion import corrected_recursion
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_forces import LoadForces
-from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
+from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_refinement import refined, refined_once
@@ -109,6 +111,28 @@ def forward_dynamics(system: System) -> Callable:
     loads = LoadForces(system, laws.called)
     interface = Interface(_sizes(system), "t")
     return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
+
+
+def forward_dynamics_on_device(system: System, device: str) -> DeviceFunction:
+    """Function (q, v, load, t=0.0) → q̈ of batches on a device; rows that fail the check are repeated on this CPU.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled as a whole, with the reasons.
+    """
+    laws = Laws(system)
+    BATCHES.plan(Question(system, laws))
+    limits = (ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE)
+    interface = Interface(_sizes(system), "t", limits, ((system.n_v,),))
+
+    def make() -> RowsOnDevice:
+        trace = write(partial(refined_once, Program(system, laws)), *interface.sizes, 1, name=NAME)
+        return RowsOnDevice(device, trace, interface)
+
+    key = forward_dynamics_on_device, laws.key, device
+    rows = cached_on_disk(system, key, make)
+    return cached(system, (DeviceFunction, *key), lambda: DeviceFunction(rows, interface, forward_dynamics(system), NAME))
 
 
 def compiled(system: System, laws: Laws, plan: Plan) -> Callable:

@@ -4,6 +4,8 @@ Points are a structure of arrays, one column per motion. A vector of motions mak
 begins, so that it stays in the first-level cache; a motion does not depend on the others, nor on the number of threads.
 """
 
+from llvmlite import ir
+
 from gauss.codegen import INTEGER, Function, Writer, intrinsic, machine
 from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record
@@ -11,7 +13,7 @@ from gauss.codegen.kernels.fixed_step import Fixed
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
-POINTERS = ("control", "points", "worst", "out")
+NAME, POINTERS = "fixed_step_batch", ("control", "points", "worst", "out")
 WORST_RECORD = ("error", "constraint_residual", "unseen", *ENERGY_RECORD)  # record of a motion
 
 
@@ -68,10 +70,9 @@ class FixedStepBatchLoop(BatchLoop):
 
     def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0):
         self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
-        writer, pointers = Writer(), (*POINTERS, *(["inputs"] if inputs else []))
-        code = LoopCode(writer, "fixed_step_batch", pointers, BatchSpan, machine.width())
-        _write(code, method, start, written, inputs)
-        super().__init__(writer, "fixed_step_batch", BatchSpan, len(pointers) - 1)
+        writer = Writer()
+        write_fixed_step_batch(writer, method, start, written, inputs, machine.width())
+        super().__init__(writer, NAME, BatchSpan, len(POINTERS) - 1 + bool(inputs))
 
     def __call__(self, span: BatchSpan, points, worst, out, *inputs):
         """Make steps of a range of motions; releases Python's global lock.
@@ -93,7 +94,11 @@ class FixedStepBatchLoop(BatchLoop):
         self._run.call(span, points, worst, out, *inputs, 0)
 
 
-def _write(code: LoopCode, method: Fixed, start: Function, written: slice, inputs: int):
+def write_fixed_step_batch(
+    writer: Writer, method: Fixed, start: Function, written: slice, inputs: int, width: int
+) -> ir.Function:
+    """Write the loop for a number of motions at a time: (*POINTERS, inputs if there are some, budget)."""
+    code = LoopCode(writer, NAME, (*POINTERS, *(["inputs"] if inputs else [])), BatchSpan, width)
     b, size = code.b, method.size
     given, reached = code.buffer(size + 1), code.buffer(max(len(method.step.outputs), len(start.outputs)))
     error, worst = code.buffer(len(method.check.outputs)), code.buffer(len(WORST_RECORD))
@@ -137,6 +142,7 @@ def _write(code: LoopCode, method: Fixed, start: Function, written: slice, input
         _scatter(code, worsts, worst, columns, len(WORST_RECORD))
         b.store(b.add(column, INTEGER(code.width)), motion)
     code.finish()
+    return code.function
 
 
 def _take_inputs(code: LoopCode, room, count: int, column, row):

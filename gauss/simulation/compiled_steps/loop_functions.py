@@ -8,6 +8,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, NativeFunction, Scalar, write
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, CheckedSwitch, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
@@ -167,8 +168,8 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     return Fixed(size, layout.row, step, project, program.point_check, method.evaluations, program.rates)
 
 
-def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
-    """Machine code of a fixed-step method, for a batch of motions."""
+def fixed_batch(program: Program, method: FixedStep, device: str | None = None) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+    """Machine code of a fixed-step method for a batch of motions, of this CPU or of a device."""
     layout = program.layout
 
     def start(x):
@@ -177,4 +178,7 @@ def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
         return begun, [program.residual(point.state)], program.energies(x)
 
     states = slice(1, 1 + layout.n_q + layout.n_v)
-    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states, len(program.inputs))
+    begin, functions, inputs = write(start, layout.size, name="start"), fixed(program, method), len(program.inputs)
+    if device is None:
+        return FixedStepBatchLoop(functions, begin, states, inputs)
+    return DeviceFixedStepLoop(device, functions, begin, states, inputs)
