@@ -37,7 +37,7 @@ from benchmarks import published_form, published_form_report
 from benchmarks.command import RESULTS
 from gauss.bench.contestants import contestants
 from gauss.bench.folders import of_folder
-from gauss.bench.levels import BEYOND, LEVELS, LIMIT, settings
+from gauss.bench.levels import LEVELS, LIMIT, as_qpbenchmark_sets
 from gauss.bench.markdown import head, share, table
 from gauss.bench.qp import compare
 from gauss.bench.summary import is_kept, mean_time
@@ -94,11 +94,6 @@ def in_published_form(data: Path, work: Path, solvers: list[str], problems: list
         command = [sys.executable, published_form.__file__, *map(str, (data, asked, verdicts))]
         subprocess.run(command, check=True, env=os.environ | ONE_THREAD)
     return verdicts
-
-
-def as_qpbenchmark_sets(solver: str, level: str) -> dict:
-    """Settings without what the comparison adds to qpbenchmark's, but for limits of iterations."""
-    return {name: value for name, value in settings(solver, level).items() if name not in BEYOND.get(solver, ())}
 
 
 def verdicts(path: Path) -> list[dict]:
