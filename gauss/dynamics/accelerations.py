@@ -1,6 +1,6 @@
 """Accelerations of single states: machine code with an error check, and the certified recursion where the check fails."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -25,7 +25,7 @@ from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes
 from gauss.dynamics.contact.unilateral import unilateral_dynamics
-from gauss.dynamics.engines.call_graph import call_graph_kernels
+from gauss.dynamics.engines.call_graph import refined_call_graph
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.engines.tree_recursion import corrected_recursion
@@ -59,7 +59,10 @@ StateError
 SimulationError
     If no accelerations can be certified.
 """
-BY_KERNELS = "call graph", "tree recursion"  # dynamics with all laws evaluated by Python
+BY_KERNELS: dict[str, Callable[[System, Sequence], NativeFunction]] = {  # dynamics with all laws evaluated by Python
+    "call graph": refined_call_graph,
+    "tree recursion": corrected_recursion,
+}
 
 
 class Accelerations:
@@ -144,12 +147,10 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
     def make():
         interface = Interface(_sizes(system), "t", limits=(ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE))
         last = _last(system, laws.traced)
-        if plan.dynamics == "call graph":
-            kernels, loads = call_graph_kernels(system), LoadForces(system, (), laws)
-            return PythonWrapper(lambda given: kernels.refined(given, loads), interface, system.n_v + 3, last, NAME, DOC)
-        if plan.dynamics == "tree recursion":
-            entry = written(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
-            rows = batched(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
+        if plan.dynamics in BY_KERNELS:
+            by_kernels = BY_KERNELS[plan.dynamics]
+            entry = written(by_kernels, interface, lambda: by_kernels(system, laws.traced))
+            rows = batched(by_kernels, interface, lambda: by_kernels(system, laws.traced))
             return fastcall(entry, interface, last, NAME, DOC, rows)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
 

@@ -13,8 +13,9 @@ events              compiled        unilateral constraints, joint friction, limi
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
+compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
-Python loop         call graph      many kinematic loops
+Python loop         call graph      many kinematic loops with opaque laws
 Python loop         tree recursion  large trees with opaque laws
 Python loop         compiled        opaque laws, and systems too large for a compiled step
 library             certified       all other scenes, by integrators of other libraries
@@ -112,7 +113,7 @@ _WHOLE = *_CODE, written_out, traced_laws, narrow
 _STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
-_TREE_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
+_KERNEL_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
 
 MOTIONS = RuleTable(
     (
@@ -125,7 +126,8 @@ MOTIONS = RuleTable(
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
         Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _LOOP),
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _LOOP),
-        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _TREE_LOOP),
+        Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
+        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _KERNEL_LOOP),
         Rule("samples", "compiled", "certified", _both(_held, _by_accelerations)),
         Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
