@@ -101,7 +101,7 @@ class MechanismVectorEnv(VectorEnv):
             q = retract(self.system, self._start.q, change[0])
             moved = self.system.projected(State(0.0, q, self._start.v + change[1]))
             points[:, k] = 0.0
-            points[self._loop.written, k] = self._packed(moved)
+            points[self._batch.states, k] = self._packed(moved)
             self._actions[k] = 0
         self._ended[which] = False
 

@@ -1,4 +1,5 @@
-from gauss.simulation.batch.rollout import Rollout, rollout
+from gauss.simulation.batch.batch_result import Rollout
+from gauss.simulation.batch.rollout import rollout
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.prepared_motion import PreparedMotion, prepare
 from gauss.simulation.simulate import simulate

@@ -83,7 +83,7 @@ class AdaptiveBatchLoop(BatchLoop):
         _AdaptiveBatchWriter(
             method, LoopCode(writer, "adaptive_batch", POINTERS, MotionQueue, machine.width()), written
         ).write()
-        super().__init__(writer, "adaptive_batch", MotionQueue, len(POINTERS) - 1)
+        super().__init__(writer, "adaptive_batch", MotionQueue, len(POINTERS) - 1, machine.width())
 
     def lanes(self) -> np.ndarray:
         """Array (size + len(MOTION_RECORD) + 1, width) of empty lanes."""

@@ -12,7 +12,7 @@ from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
 POINTERS = ("control", "points", "worst", "out")
-WORST_RECORD = ("error", "constraint_residual", "unseen", *ENERGY_RECORD)  # record of a motion
+WORST_RECORD = ("error", "constraint_residual", "unseen", "unsolved", *ENERGY_RECORD)  # record of a motion
 
 
 @numbers
@@ -64,14 +64,17 @@ class FixedStepBatchLoop(BatchLoop):
         Part of a point that is a sample.
     inputs : int
         Number of inputs, the last entries of a point: each motion has a row of them for every ``hold`` steps.
+    width : int, optional
+        Number of lanes; as many as the vector register holds when not given.
     """
 
-    def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0):
+    def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0, width: int | None = None):
         self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
         writer, pointers = Writer(), (*POINTERS, *(["inputs"] if inputs else []))
-        code = LoopCode(writer, "fixed_step_batch", pointers, BatchSpan, machine.width())
+        width = machine.width() if width is None else width
+        code = LoopCode(writer, "fixed_step_batch", pointers, BatchSpan, width)
         _write(code, method, start, written, inputs)
-        super().__init__(writer, "fixed_step_batch", BatchSpan, len(pointers) - 1)
+        super().__init__(writer, "fixed_step_batch", BatchSpan, len(pointers) - 1, width)
 
     def __call__(self, span: BatchSpan, points, worst, out, *inputs):
         """Make steps of a range of motions; releases Python's global lock.
@@ -82,9 +85,9 @@ class FixedStepBatchLoop(BatchLoop):
             Motions and steps.
         points : ndarray, shape (size, columns)
             Points of the motions, changed; before step 0 their rates may be missing.
-        worst : ndarray, shape (len(WORST), columns)
-            Largest error of the accelerations and largest constraint residual (NaN propagates), and the energy record;
-            changed.
+        worst : ndarray, shape (len(WORST_RECORD), columns)
+            Largest error of the accelerations, largest constraint residual, steps that may have passed a condition of a law,
+            unsolved equations (NaN propagates), and the energy record; changed.
         out : ndarray, shape (columns, rows, row)
             Sample k of each motion is that after ``k * keep`` steps.
         inputs : ndarray, shape (motions, changes, n_u)
@@ -125,6 +128,7 @@ def _write(code: LoopCode, method: Fixed, start: Function, written: slice, input
             code.copy(given, reached, size)
             _raise(code, worst, 1, code.take(reached, size))
             _raise(code, worst, 2, code.take(reached, size + 4))
+            _raise(code, worst, 3, code.take(reached, size + 3))
             due = b.or_(_is_multiple(code, done, "every"), b.icmp_signed("==", done, last))
             with b.if_then(due):
                 code.call(method.check, reached, error)

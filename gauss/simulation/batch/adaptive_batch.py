@@ -41,7 +41,7 @@ class AdaptiveBatchCode:
 
     def __init__(self, program: Program, method: ExplicitPair, shares=None):
         self.evaluations, self.layout = method.evaluations, program.layout
-        self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
+        self.states, written = slice(1, 1 + self.layout.n_q + self.layout.n_v), slice(1, self.layout.row)
         functions = adaptive(program, method, batch=True, shares=shares)
 
         first = ExplicitStages(program, method, batch=True, shares=shares).first(functions.check)
@@ -55,7 +55,7 @@ class AdaptiveBatchCode:
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
         self.check = Kernel(functions.check)
-        self.loop = AdaptiveBatchLoop(functions, self.states)
+        self.loop = AdaptiveBatchLoop(functions, written)
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class AdaptiveBatchResult:
 
     Parameters
     ----------
-    samples : ndarray, shape (batch, k, n_q + n_v)
-        States.
+    samples : ndarray, shape (batch, k, n_q + n_v + 3)
+        States and work.
     error : ndarray, shape (batch,)
         Largest error of the accelerations, relative to the largest of them; infinite where a motion failed.
     steps, rejected : ndarray, shape (batch,)
@@ -128,8 +128,9 @@ class AdaptiveBatch:
         times = np.minimum(times, end)
         begun = int(np.searchsorted(times, 0.0, side="right"))
         grid = np.append(times, np.inf)
-        out = np.empty((count, len(times), len(self.starts)))
-        out[:, :begun] = self.starts.T[:, None]
+        row = self.code.layout.row
+        out = np.empty((count, len(times), row - 1))
+        out[:, :begun] = self.points[1:row].T[:, None]
         motions = np.zeros((self.size + len(MOTION_RECORD), count))
         record = dict(zip(MOTION_RECORD, motions[self.size :], strict=True))
         motions[: self.size] = self.points

@@ -112,14 +112,14 @@ class Ensemble:
             adaptive = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
             found = adaptive.run(times, self.step, threads, switched.times)
             return (
-                found.samples,
+                found.samples[:, :, : len(starts)],
                 ~(found.error <= ACCELERATION_TOLERANCE),
-                shares(system, found.energies, starts, found.samples, duration),
+                shares(system, found.energies, starts, found.samples[:, :, : len(starts)], duration),
             )
         batch = FixedStepBatch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         step = (times[1] - times[0]) / between
-        samples = batch.run(between * (len(times) - 1), step, between, threads)
+        samples = batch.run(between * (len(times) - 1), step, between, threads)[:, :, : len(starts)]
         warn_of_passages(system, batch.unseen + switched.times.unresolved(0.0, duration, step), self.integrator)
         finite = np.isfinite(samples).all(axis=(1, 2))
         doubtful = ~((batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE) & finite)

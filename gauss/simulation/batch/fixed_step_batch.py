@@ -33,7 +33,8 @@ class FixedStepBatch:
         filled = self._filled(starts)
         self.columns = filled.shape[1]
         self.points = np.zeros((loop.size, self.columns))
-        self.points[1 : 1 + len(filled)] = filled
+        self.states = slice(1, 1 + len(starts))
+        self.points[self.states] = filled
         if parameters is not None:
             self.points[loop.size - len(parameters) :] = self._filled(parameters)
         self.worst = np.zeros((len(WORST_RECORD), self.columns))
@@ -60,17 +61,22 @@ class FixedStepBatch:
         return self.worst[2, : self.size]
 
     @property
+    def unsolved(self) -> np.ndarray:
+        """Above 0 where the equations of a step were not solved."""
+        return self.worst[3, : self.size]
+
+    @property
     def energies(self) -> EnergyRecord:
         """Energies (batch,) so far."""
-        return EnergyRecord(*self.worst[3:, : self.size])
+        return EnergyRecord(*self.worst[WORST_RECORD.index("kinetic") :, : self.size])
 
     @property
     def reached(self) -> np.ndarray:
         """States (n_q + n_v, batch) so far."""
-        return self.points[self.loop.written, : self.size]
+        return self.points[self.states, : self.size]
 
     def run(self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None) -> np.ndarray:
-        """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps of length h [s].
+        """States and work (batch, k, n_q + n_v + 3) at the start and after every ``keep`` steps of length h [s].
 
         Rows of ``control`` (batch, rows, n_u) are held for equally many steps.
         """

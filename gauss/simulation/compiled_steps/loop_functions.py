@@ -169,12 +169,27 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
 
 def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
     """Machine code of a fixed-step method, for a batch of motions."""
+    return batch_loop(program, fixed(program, method))
+
+
+def batch_loop(program: Program, functions: Fixed, width: int | None = None) -> FixedStepBatchLoop:
+    """Machine code of a batch of motions; samples are coordinates, rates and work.
+
+    Parameters
+    ----------
+    program : Program
+        The system.
+    functions : Fixed
+        Functions of the step.
+    width : int, optional
+        Number of motions at a time, 1 for steps of one motion; that of the vector register when not given.
+    """
     layout = program.layout
 
     def start(x):
         point = layout.point(x)
-        begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state)))
+        begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state), point.method_state))
         return begun, [program.residual(point.state)], program.energies(x)
 
-    states = slice(1, 1 + layout.n_q + layout.n_v)
-    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states, len(program.inputs))
+    start = write(start, layout.size, name="start")
+    return FixedStepBatchLoop(functions, start, slice(1, layout.row), len(program.inputs), width)
