@@ -11,6 +11,7 @@ from gauss.codegen.kernels.fixed_step import Fixed
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
+OPTIONAL = 3  # numbers of a sample: the work
 POINTERS = ("control", "points", "worst", "out")
 WORST_RECORD = ("error", "constraint_residual", "unseen", "unsolved", *ENERGY_RECORD)  # record of a motion
 
@@ -35,6 +36,8 @@ class BatchSpan(Numbers):
         Steps between samples, between checks of the accelerations, and between changes of the inputs.
     motions, changes : float
         Number of motions with inputs, and of rows of inputs of each.
+    row : float
+        Numbers of a sample: all that may be written, or those without the optional ones.
     """
 
     columns: float
@@ -49,6 +52,7 @@ class BatchSpan(Numbers):
     hold: float = 1.0
     motions: float = 0.0
     changes: float = 0.0
+    row: float = 0.0
 
 
 class FixedStepBatchLoop(BatchLoop):
@@ -61,7 +65,7 @@ class FixedStepBatchLoop(BatchLoop):
     start : Function
         Initial point → (point with its rates, constraint residual, energy sample).
     written : slice
-        Part of a point that is a sample.
+        Part of a point that is a sample; its last ``OPTIONAL`` entries are written on request.
     inputs : int
         Number of inputs, the last entries of a point: each motion has a row of them for every ``hold`` steps.
     width : int, optional
@@ -170,12 +174,14 @@ def _scatter(code: LoopCode, target, room, columns, size: int):
 def _write_rows(code: LoopCode, room, written: slice, column, row):
     """Write a sample of each motion."""
     b, size = code.b, written.stop - written.start
-    with code.each(code.width) as k:
-        place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
-        target = b.gep(code.pointer["out"], [b.mul(place, INTEGER(size))])
-        source = b.gep(code.at(room, written.start), [k])
-        for j in range(size):
-            b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
+    with b.if_else(b.icmp_signed("==", code.index("row"), INTEGER(size))) as (all_of_it, without_optional):
+        for branch, count in ((all_of_it, size), (without_optional, size - OPTIONAL)):
+            with branch, code.each(code.width) as k:
+                place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
+                target = b.gep(code.pointer["out"], [b.mul(place, INTEGER(count))])
+                source = b.gep(code.at(room, written.start), [k])
+                for j in range(count):
+                    b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
 
 
 def _raise(code: LoopCode, room, k: int, value):

@@ -14,8 +14,13 @@ from gauss.dynamics.outputs import INERTIAL, output_function, shape_of, split
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean
+from gauss.integrators import FixedStep
 from gauss.shapes import Shaped
+from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
+from gauss.simulation.batch.machine_code import fixed_step_code
 from gauss.simulation.held_inputs import RecordedInput, driven_as
+from gauss.simulation.integrators import INTEGRATORS
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import System
 
@@ -36,8 +41,6 @@ class Rollout:
         Coordinates.
     v : ndarray, shape (batch, k, n_v)
         Rates.
-    work : ndarray, shape (batch, k, 3)
-        Work of drives and of forces on bodies, energy lost in dampers, since the start [J].
     repeated : tuple of int
         Motions repeated by :func:`gauss.simulate`, because a check of the compiled steps failed, or prescribed velocities
         jump.
@@ -47,6 +50,8 @@ class Rollout:
         Motions under ``control`` that diverged or cannot continue: some of their samples are not finite.
     control : ndarray, shape (batch, rows, n_u), optional
         Inputs of each motion, each row held for an equal share of the steps.
+    work : ndarray, shape (batch, k, 3), optional
+        Work of drives and of forces on bodies, energy lost in dampers, since the start [J]; of adaptive methods.
     errors : ndarray, shape (batch,), optional
         Largest relative error of the accelerations of each motion.
     settings : dict
@@ -59,12 +64,12 @@ class Rollout:
     t: Shaped[np.ndarray, " k"]
     q: Shaped[np.ndarray, "batch k nq"]
     v: Shaped[np.ndarray, "batch k nv"]
-    work: Shaped[np.ndarray, "batch k 3"]
     repeated: tuple[int, ...]
     steps: Shaped[np.ndarray, " batch"]
     rejected: Shaped[np.ndarray, " batch"]
     diverged: tuple[int, ...] = ()
     control: Shaped[np.ndarray, "batch rows nu"] | None = None
+    work: Shaped[np.ndarray, "batch k 3"] | None = field(default=None, repr=False)
     errors: np.ndarray | None = field(default=None, repr=False, compare=False)
     settings: dict = field(default_factory=dict, repr=False)
     again: dict[int, Trajectory] = field(default_factory=dict, repr=False, compare=False)
@@ -95,9 +100,21 @@ class Rollout:
         steps, rejected = int(self.steps[k]), int(self.rejected[k])
         error = np.nan if self.errors is None else float(self.errors[k])
         stats = Stats(self.settings.get("evaluations", 1) * (steps + rejected), steps, rejected, 0, 0.0, error, METHOD)
-        parts = (part[k, :rows].copy() for part in (self.q, self.v, self.work))
-        step = self.settings.get("step") if self.settings.get("integrator") == "time_stepping" else None
-        return Trajectory(self._driven(k), self.t[:rows].copy(), *parts, stats, step=step, settings=dict(self.settings))
+        step = self.settings["step"] if self.settings.get("integrator") == TIME_STEPPING.name else None
+        parts = (part[:rows].copy() for part in (self.t, self.q[k], self.v[k], self._work_of(k)))
+        return Trajectory(self._driven(k), *parts, stats, step=step, settings=dict(self.settings))
+
+    def _work_of(self, k: int) -> np.ndarray:
+        """Work (k, 3) of one motion; that of fixed steps by the same steps again."""
+        if self.work is not None:
+            return self.work[k]
+        method = INTEGRATORS[self.settings["integrator"]]
+        assert isinstance(method, FixedStep)
+        control = None if self.control is None else self.control[k : k + 1]
+        start = np.concatenate([self.q[k, 0], self.v[k, 0]])[:, None]
+        batch = FixedStepBatch(fixed_step_code(self.system, method, control is not None), start)
+        steps, h, keep = (self.settings[name] for name in ("steps", "step", "every"))
+        return batch.run(steps, h, keep, 1, control, with_work=True)[0, :, -3:]
 
     def _driven(self, k: int) -> System:
         """System with drives by the inputs of one motion."""
@@ -140,7 +157,7 @@ class Rollout:
         (batch, samples, _), layout = self.q.shape, program.layout
         points = np.zeros((layout.size, batch, samples))
         points[0] = self.t
-        points[1 : layout.row] = np.moveaxis(np.concatenate([self.q, self.v, self.work], axis=2), 2, 0)
+        points[1 : layout.row - 3] = np.moveaxis(np.concatenate([self.q, self.v], axis=2), 2, 0)
         if self.control is not None:
             hold, every = self.settings["steps"] // self.control.shape[1], self.settings["every"]
             rows = np.maximum(every * np.arange(samples) - 1, 0) // hold

@@ -119,7 +119,7 @@ class Ensemble:
         batch = FixedStepBatch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         step = (times[1] - times[0]) / between
-        samples = batch.run(between * (len(times) - 1), step, between, threads)[:, :, : len(starts)]
+        samples = batch.run(between * (len(times) - 1), step, between, threads)
         warn_of_passages(system, batch.unseen + switched.times.unresolved(0.0, duration, step), self.integrator)
         finite = np.isfinite(samples).all(axis=(1, 2))
         doubtful = ~((batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE) & finite)

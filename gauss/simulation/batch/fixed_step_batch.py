@@ -75,8 +75,12 @@ class FixedStepBatch:
         """States (n_q + n_v, batch) so far."""
         return self.points[self.states, : self.size]
 
-    def run(self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None) -> np.ndarray:
-        """States and work (batch, k, n_q + n_v + 3) at the start and after every ``keep`` steps of length h [s].
+    def run(
+        self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None, with_work: bool = False
+    ) -> np.ndarray:
+        """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps of length h [s].
+
+        On request the work of drives, of forces on bodies and of dampers (3,) follows a state.
 
         Rows of ``control`` (batch, rows, n_u) are held for equally many steps.
         """
@@ -84,8 +88,9 @@ class FixedStepBatch:
         if control is not None:
             given, (motions, changes, _) = [control], control.shape
             held = {"hold": steps // changes, "motions": motions, "changes": changes}
-        rows = np.empty((self.columns, steps // keep + 1, self.loop.written.stop - self.loop.written.start))
-        rows[:, 0] = self.points[self.loop.written].T
+        sample = self.loop.written if with_work else self.states
+        rows = np.empty((self.columns, steps // keep + 1, sample.stop - sample.start))
+        rows[:, 0] = self.points[sample].T
         strips = self.columns // self.loop.width
         share = max(1, min(BUDGET // steps, strips // (CHUNKS_PER_THREAD * threads))) * self.loop.width
         every, stopped = steps_per_check(self.loop.evaluations), Event()
@@ -96,7 +101,8 @@ class FixedStepBatch:
                 if stopped.is_set():
                     return
                 part = {"begin": begin, "end": end, "first": first, "last": min(first + BUDGET, steps)}
-                span = BatchSpan(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **held, **part)
+                sizes = {"columns": self.columns, "rows": rows.shape[1], "row": rows.shape[2]}
+                span = BatchSpan(h=h, keep=keep, every=every, **sizes, **held, **part)
                 self.loop(span, self.points, self.worst, rows, *given)
 
         in_threads(work, range(0, self.columns, share), threads, stopped)

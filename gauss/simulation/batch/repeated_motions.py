@@ -41,7 +41,7 @@ def repeat(
             failed.append(k)
             samples[k], share[k] = np.nan, 0.0
             continue
-        samples[k], share[k] = np.concatenate([again.q, again.v, again.work], axis=1), found[-1].share
+        samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share
         trajectories[k] = again
     warn_of_many(system, share, lambda k: f"number {k}", run)
     return failed, trajectories

@@ -1,6 +1,5 @@
 """Batch of motions of one system: all steps in machine code, in the lanes of vector registers."""
 
-from collections.abc import Callable
 from numbers import Integral
 from typing import TypeVar
 
@@ -8,31 +7,24 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
-from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.codegen.tiers import AUTO, OPTIMISED
-from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import BATCHES, method_key
-from gauss.dynamics.rules import Question
-from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
-from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep, Integrator
+from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.batch_result import Rollout
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
+from gauss.simulation.batch.machine_code import fixed_step_code, machine_code
 from gauss.simulation.batch.repeated_motions import repeat
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
-from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.energy_balance import shares
-from gauss.simulation.moreau.compiled_step import compiled_batch
-from gauss.simulation.moreau.compiled_step import method_state_size as contact_state_size
 from gauss.simulation.moreau.moreau_jean import NONSMOOTH
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
@@ -151,7 +143,7 @@ def _fixed(
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
     held = control is not None
-    batch = FixedStepBatch(_machine_code(system, method, (held,), _steps_of(system, method, held)), starts)
+    batch = FixedStepBatch(fixed_step_code(system, method, held), starts)
     refuse_inconsistent(system, starts, batch.residual)
     if method.nonsmooth:
         for k in range(batch.size):
@@ -171,7 +163,7 @@ def _fixed(
     doubtful = np.flatnonzero((finite & ~is_right) | ~solved)
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
     with np.errstate(invalid="ignore"):
-        share = shares(system, batch.energies, starts, samples[:, :, : len(starts)], steps * step)
+        share = shares(system, batch.energies, starts, samples, steps * step)
     share = np.where(finite & solved, share, 0.0)
     failed, again = repeat(system, starts, samples, share, doubtful, steps * step, run, control)
     finite[doubtful] = True
@@ -183,22 +175,9 @@ def _fixed(
 
 
 def _result(system: System, t: np.ndarray, samples: np.ndarray, **fields) -> Rollout:
-    """Rollout of samples (batch, k, n_q + n_v + 3)."""
-    q, v, work = np.split(samples, [system.n_q, system.n_q + system.n_v], axis=2)
-    return Rollout(system=system, t=t, q=q, v=v, work=work, **fields)
-
-
-def _steps_of(system: System, method: FixedStep, held: bool) -> Callable[[Laws], FixedStepBatchLoop]:
-    """Maker of the machine code of a batch of fixed steps, of the laws of the loads."""
-    if not method.nonsmooth:
-        return lambda laws: fixed_batch(Program(system, laws, inputs=held), method)
-    stepper = moreau_stepper(system)
-
-    def contacts(laws: Laws) -> FixedStepBatchLoop:
-        smooth = smooth_question(Question(system, laws)).laws
-        return compiled_batch(stepper, Program(stepper.smooth, smooth, memory=contact_state_size(stepper), inputs=held))
-
-    return contacts
+    """Rollout of samples (batch, k, n_q + n_v)."""
+    q, v = np.split(samples, [system.n_q], axis=2)
+    return Rollout(system=system, t=t, q=q, v=v, **fields)
 
 
 def _checked_control(system: System, control, batch: int, steps: int) -> np.ndarray:
@@ -238,17 +217,18 @@ def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, a
         return _constant(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
     make = lambda laws: AdaptiveBatchCode(Program(system, laws, memory=method_state_size(system)), method, allowed.shares)  # noqa: E731
-    batch = AdaptiveBatch(_machine_code(system, method, (allowed.key,), make), starts, allowed)
+    batch = AdaptiveBatch(machine_code(system, method, (allowed.key,), make), starts, allowed)
     refuse_inconsistent(system, starts, batch.residual)
     switched = _switching(system, starts, t[-1])
     found = batch.run(t, step, threads, switched.times)
     doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(switched.jumps))
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     share = shares(system, found.energies, starts, found.samples[:, :, : len(starts)], t[-1])
-    _, again = repeat(system, starts, found.samples, share, doubtful, t[-1], run)
+    _, again = repeat(system, starts, found.samples[:, :, : len(starts)], share, doubtful, t[-1], run)
     settings = run | {"duration": t[-1], "evaluations": method.evaluations}
     counts = {"repeated": tuple(map(int, doubtful)), "steps": found.steps, "rejected": found.rejected}
-    return _result(system, t, found.samples, errors=found.error, settings=settings, again=again, **counts)
+    marks = {"errors": found.error, "work": found.samples[:, :, len(starts) :], "again": again}
+    return _result(system, t, found.samples[:, :, : len(starts)], settings=settings, **counts, **marks)
 
 
 def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
@@ -267,7 +247,7 @@ def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
 def _singly(system: System, starts: np.ndarray, steps: int, run: dict, settings: dict, control) -> Rollout:
     """Motions by :func:`gauss.simulate`, one after the other."""
     batch, t = starts.shape[1], run["times"]
-    samples, share = np.empty((batch, t.size, len(starts) + 3)), np.zeros(batch)
+    samples, share = np.empty((batch, t.size, len(starts))), np.zeros(batch)
     failed, again = repeat(system, starts, samples, share, np.arange(batch), settings["duration"], run, control)
     counts = {"repeated": tuple(range(batch)), "steps": np.full(batch, steps), "rejected": np.zeros(batch, int)}
     marks = {"diverged": tuple(failed), "again": again}
@@ -278,7 +258,7 @@ def _constant(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> 
     """Motions of a system without degrees of freedom."""
     batch = starts.shape[1]
     counts = {"repeated": (), "steps": np.full(batch, steps), "rejected": np.zeros(batch, int)}
-    return _result(system, t, np.zeros((batch, t.size, 3)), **counts)
+    return _result(system, t, np.zeros((batch, t.size, 0)), work=np.zeros((batch, t.size, 3)), **counts)
 
 
 def _refuse(integrator: str, why: str, **given):
@@ -294,16 +274,3 @@ def _check_counts(counts: dict):
             continue
         if not isinstance(value, Integral) or value <= 0:
             raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
-
-
-def _machine_code(system: System, method: Integrator, kind: tuple, make: Callable[[Laws], T]) -> T:
-    """Machine code of the steps, cached with the system.
-
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled.
-    """
-    laws = Laws(system)
-    BATCHES.plan(Question(system, laws, method=method))
-    return cached_on_disk(system, (_machine_code, method_key(method), kind, laws.key), lambda: make(laws))
