@@ -15,7 +15,8 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
-from gauss.simulation.batch.rollout import ADAPTIVE, FIXED
+from gauss.simulation.batch.machine_code import FIXED
+from gauss.simulation.batch.rollout import ADAPTIVE
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.energy_balance import shares

@@ -12,6 +12,7 @@ from gauss.codegen.kernels import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.simulation.step_limits import BUDGET, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
 
+NEVER = 2**52  # steps: beyond the end of any motion
 CHUNKS_PER_THREAD = 4  # of the motions: a delayed thread does not delay the others
 
 
@@ -74,6 +75,21 @@ class FixedStepBatch:
     def reached(self) -> np.ndarray:
         """States (n_q + n_v, batch) so far."""
         return self.points[self.states, : self.size]
+
+    def advance(self, done: int, n: int, h: float, threads: int, control: np.ndarray | None = None):
+        """Make n steps of length h [s] after the first ``done``, under inputs (batch, 1, n_u), without samples."""
+        given = [] if control is None else [control]
+        held = {} if control is None else {"hold": NEVER, "motions": len(control), "changes": 1}
+        strips = self.columns // self.loop.width
+        share = -(-strips // (CHUNKS_PER_THREAD * threads) if threads > 1 else -strips) * self.loop.width
+        every, none = steps_per_check(self.loop.evaluations), np.zeros((0, 0, 0))
+
+        def work(begin: int):
+            part = {"begin": begin, "end": min(begin + share, self.columns), "first": done, "last": done + n}
+            span = BatchSpan(columns=self.columns, rows=0, h=h, keep=NEVER, every=every, **held, **part)
+            self.loop(span, self.points, self.worst, none, *given)
+
+        in_threads(work, range(0, self.columns, share), threads, Event())
 
     def run(
         self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None, with_work: bool = False

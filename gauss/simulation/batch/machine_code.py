@@ -11,12 +11,20 @@ from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
-from gauss.integrators import FixedStep, Integrator
+from gauss.integrators import EXPLICIT_FIXED, FixedStep, Integrator
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.moreau.compiled_step import compiled_batch, method_state_size
+from gauss.simulation.moreau.moreau_jean import NONSMOOTH
 from gauss.system import System
 
 T = TypeVar("T")
+FIXED = {method.name: method for method in EXPLICIT_FIXED}
+STEPPED = FIXED | {method.name: method for method in NONSMOOTH}
+
+
+def contact_state_size(system: System) -> int:
+    """Numbers of the method state of time stepping."""
+    return method_state_size(moreau_stepper(system))
 
 
 def fixed_step_code(system: System, method: FixedStep, held: bool) -> FixedStepBatchLoop:

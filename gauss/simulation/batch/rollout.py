@@ -15,23 +15,20 @@ from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
-from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep
+from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.batch_result import Rollout
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
-from gauss.simulation.batch.machine_code import fixed_step_code, machine_code
+from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, machine_code
 from gauss.simulation.batch.repeated_motions import repeat
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
-from gauss.simulation.moreau.moreau_jean import NONSMOOTH
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
 from gauss.system import State, System, refuse_changed
 
-FIXED = {method.name: method for method in EXPLICIT_FIXED}
-STEPPED = FIXED | {method.name: method for method in NONSMOOTH}
 ADAPTIVE = {method.name: method for method in EXPLICIT}
 LARGE_BATCH = 1_000_000  # steps of all motions that take about as long as optimising the code of a robot arm
 T = TypeVar("T")
