@@ -141,10 +141,17 @@ MOTIONS = RuleTable(
     ),
     _refused,
 )
+TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 # Batches (ensembles) of motions of one system.
 BATCHES = RuleTable(
-    (Rule("batch", "compiled", "simulate", conditions=(compilable, few_bodies, traced_laws)),),
-    lambda ask, why: f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use simulate for each motion.",
+    (
+        Rule("batch", "compiled", "simulate", is_time_stepping, _STEP),
+        Rule("batch", "compiled", "simulate", lambda ask: not is_time_stepping(ask), (compilable, few_bodies, traced_laws)),
+    ),
+    lambda ask, why: (
+        f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use "
+        f"{TIME_STEPPING_FIRST if _is_nonsmooth(ask) else ''}simulate for each motion."
+    ),
 )
 
 

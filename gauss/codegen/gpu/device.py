@@ -78,7 +78,7 @@ class Device(Protocol):
 
         Raises
         ------
-        NotForGpu
+        DeviceError
             If it calls what a GPU does not have.
         """
 

@@ -11,16 +11,13 @@ import llvmlite.binding as llvm
 
 from gauss.codegen import object_cache
 from gauss.codegen.object_code import about
+from gauss.errors import DeviceError
 
 TRIPLE = "nvptx64-nvidia-cuda"
 PTX_VERSION = "+ptx80"  # of CUDA 12.0
 LEAST_CAPABILITY = 60  # compute capability 6.0: the first with atomic additions of doubles
 MISSING = {"malloc": "memory of unbounded size"}
 LIBRARY = re.compile(r"^declare [^@]*@\"?([\w.]+)\"?\(", re.MULTILINE)
-
-
-class NotForGpu(TypeError):
-    """A function has no code for a GPU."""
 
 
 @cache
@@ -30,7 +27,7 @@ def _machine(capability: int) -> llvm.TargetMachine:
     return llvm.Target.from_triple(TRIPLE).create_target_machine(cpu=f"sm_{capability}", features=PTX_VERSION, opt=2)
 
 
-def ptx(ir_text: str, capability: int = 90) -> str:
+def ptx(ir_text: str, capability: int) -> str:
     """PTX of a module.
 
     Parameters
@@ -42,7 +39,7 @@ def ptx(ir_text: str, capability: int = 90) -> str:
 
     Raises
     ------
-    NotForGpu
+    DeviceError
         If the module calls a library that a GPU does not have.
     """
     refuse_libraries(ir_text)
@@ -61,8 +58,10 @@ def ptx(ir_text: str, capability: int = 90) -> str:
 
 
 def refuse_libraries(ir_text: str):
-    """Raise a NotForGpu error, with the functions of libraries that a module calls."""
+    """Raise a DeviceError, with the functions of libraries that a module calls."""
     called = set(LIBRARY.findall(ir_text))
     missing = sorted({MISSING.get(name, name) for name in called if not name.startswith("llvm.")})
     if missing:
-        raise NotForGpu(f"it needs {', '.join(missing)}, which there is no code for on a GPU")
+        raise DeviceError(
+            f"the code of this scene calls {', '.join(missing)}, which a GPU does not have; leave out device=."
+        )

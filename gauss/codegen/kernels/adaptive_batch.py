@@ -81,7 +81,7 @@ class AdaptiveBatchLoop(BatchLoop):
         self.size, self.written = method.size, written
         writer = Writer()
         write_adaptive_batch(writer, method, written, machine.width())
-        super().__init__(writer, NAME, MotionQueue, len(POINTERS) - 1)
+        super().__init__(writer, NAME, MotionQueue, len(POINTERS) - 1, machine.width())
 
     def lanes(self) -> np.ndarray:
         """Array (size + len(MOTION_RECORD) + 1, width) of empty lanes."""

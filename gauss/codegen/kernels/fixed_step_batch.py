@@ -13,8 +13,9 @@ from gauss.codegen.kernels.fixed_step import Fixed
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
+OPTIONAL = 3  # numbers of a sample: the work
 NAME, POINTERS = "fixed_step_batch", ("control", "points", "worst", "out")
-WORST_RECORD = ("error", "constraint_residual", "unseen", *ENERGY_RECORD)  # record of a motion
+WORST_RECORD = ("error", "constraint_residual", "unseen", "unsolved", *ENERGY_RECORD)  # record of a motion
 
 
 @numbers
@@ -37,6 +38,8 @@ class BatchSpan(Numbers):
         Steps between samples, between checks of the accelerations, and between changes of the inputs.
     motions, changes : float
         Number of motions with inputs, and of rows of inputs of each.
+    row : float
+        Numbers of a sample: all that may be written, or those without the optional ones.
     """
 
     columns: float
@@ -51,6 +54,7 @@ class BatchSpan(Numbers):
     hold: float = 1.0
     motions: float = 0.0
     changes: float = 0.0
+    row: float = 0.0
 
 
 class FixedStepBatchLoop(BatchLoop):
@@ -63,16 +67,18 @@ class FixedStepBatchLoop(BatchLoop):
     start : Function
         Initial point → (point with its rates, constraint residual, energy sample).
     written : slice
-        Part of a point that is a sample.
+        Part of a point that is a sample; its last ``OPTIONAL`` entries are written on request.
     inputs : int
         Number of inputs, the last entries of a point: each motion has a row of them for every ``hold`` steps.
+    width : int, optional
+        Number of lanes; as many as the vector register holds when not given.
     """
 
-    def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0):
+    def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0, width: int | None = None):
         self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
-        writer = Writer()
-        write_fixed_step_batch(writer, method, start, written, inputs, machine.width())
-        super().__init__(writer, NAME, BatchSpan, len(POINTERS) - 1 + bool(inputs))
+        writer, width = Writer(), machine.width() if width is None else width
+        write_fixed_step_batch(writer, method, start, written, inputs, width)
+        super().__init__(writer, NAME, BatchSpan, len(POINTERS) - 1 + bool(inputs), width)
 
     def __call__(self, span: BatchSpan, points, worst, out, *inputs):
         """Make steps of a range of motions; releases Python's global lock.
@@ -83,9 +89,9 @@ class FixedStepBatchLoop(BatchLoop):
             Motions and steps.
         points : ndarray, shape (size, columns)
             Points of the motions, changed; before step 0 their rates may be missing.
-        worst : ndarray, shape (len(WORST), columns)
-            Largest error of the accelerations and largest constraint residual (NaN propagates), and the energy record;
-            changed.
+        worst : ndarray, shape (len(WORST_RECORD), columns)
+            Largest error of the accelerations, largest constraint residual, steps that may have passed a condition of a law,
+            unsolved equations (NaN propagates), and the energy record; changed.
         out : ndarray, shape (columns, rows, row)
             Sample k of each motion is that after ``k * keep`` steps.
         inputs : ndarray, shape (motions, changes, n_u)
@@ -130,6 +136,7 @@ def write_fixed_step_batch(
             code.copy(given, reached, size)
             _raise(code, worst, 1, code.take(reached, size))
             _raise(code, worst, 2, code.take(reached, size + 4))
+            _raise(code, worst, 3, code.take(reached, size + 3))
             due = b.or_(_is_multiple(code, done, "every"), b.icmp_signed("==", done, last))
             with b.if_then(due):
                 code.call(method.check, reached, error)
@@ -172,12 +179,14 @@ def _scatter(code: LoopCode, target, room, columns, size: int):
 def _write_rows(code: LoopCode, room, written: slice, column, row):
     """Write a sample of each motion."""
     b, size = code.b, written.stop - written.start
-    with code.each(code.width) as k:
-        place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
-        target = b.gep(code.pointer["out"], [b.mul(place, INTEGER(size))])
-        source = b.gep(code.at(room, written.start), [k])
-        for j in range(size):
-            b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
+    with b.if_else(b.icmp_signed("==", code.index("row"), INTEGER(size))) as (all_of_it, without_optional):
+        for branch, count in ((all_of_it, size), (without_optional, size - OPTIONAL)):
+            with branch, code.each(code.width) as k:
+                place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
+                target = b.gep(code.pointer["out"], [b.mul(place, INTEGER(count))])
+                source = b.gep(code.at(room, written.start), [k])
+                for j in range(count):
+                    b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
 
 
 def _raise(code: LoopCode, room, k: int, value):

@@ -50,7 +50,7 @@ class AdaptiveBatchCode:
 
     def __init__(self, program: Program, method: ExplicitPair, shares=None, device: str | None = None):
         self.evaluations, self.layout = method.evaluations, program.layout
-        self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
+        self.states, written = slice(1, 1 + self.layout.n_q + self.layout.n_v), slice(1, self.layout.row)
         functions = adaptive(program, method, batch=True, shares=shares)
 
         first = ExplicitStages(program, method, batch=True, shares=shares).first(functions.check)
@@ -65,10 +65,10 @@ class AdaptiveBatchCode:
         begin = write(start, self.layout.size, 1, 1, 1, name="start")
         if device is None:
             self.start, self.check = Kernel(begin), Kernel(functions.check)
-            self.loop = AdaptiveBatchLoop(functions, self.states)
+            self.loop = AdaptiveBatchLoop(functions, written)
         else:
             self.start, self.check = DeviceKernel(device, begin), DeviceKernel(device, functions.check)
-            self.loop = DeviceAdaptiveLoop(device, functions, self.states)
+            self.loop = DeviceAdaptiveLoop(device, functions, written)
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class AdaptiveBatchResult:
 
     Parameters
     ----------
-    samples : ndarray, shape (batch, k, n_q + n_v)
-        States.
+    samples : ndarray, shape (batch, k, n_q + n_v + 3)
+        States and work.
     error : ndarray, shape (batch,)
         Largest error of the accelerations, relative to the largest of them; infinite where a motion failed.
     steps, rejected : ndarray, shape (batch,)
@@ -141,8 +141,9 @@ class AdaptiveBatch:
         times = np.minimum(times, end)
         begun = int(np.searchsorted(times, 0.0, side="right"))
         grid = np.append(times, np.inf)
-        out = np.empty((count, len(times), len(self.starts)))
-        out[:, :begun] = self.starts.T[:, None]
+        row = self.code.layout.row
+        out = np.empty((count, len(times), row - 1))
+        out[:, :begun] = self.points[1:row].T[:, None]
         motions = np.zeros((self.size + len(MOTION_RECORD), count))
         record = dict(zip(MOTION_RECORD, motions[self.size :], strict=True))
         motions[: self.size] = self.points

@@ -14,7 +14,9 @@ SHARE_OF_MEMORY = 0.8  # of the free memory of a device: its driver needs some f
 class DeviceFixedStepBatch(FixedStepBatch):
     """Points of a batch of motions; see :class:`FixedStepBatch`."""
 
-    def run(self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None) -> np.ndarray:
+    def run(
+        self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None, with_work: bool = False
+    ) -> np.ndarray:
         """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps; ``threads`` has no meaning.
 
         Raises
@@ -24,9 +26,9 @@ class DeviceFixedStepBatch(FixedStepBatch):
         """
         loop = self.loop
         assert isinstance(loop, DeviceFixedStepLoop)
-        row = loop.written.stop - loop.written.start
-        rows = np.empty((self.columns, steps // keep + 1, row))
-        rows[:, 0] = self.points[loop.written].T
+        sample = loop.written if with_work else self.states
+        rows = np.empty((self.columns, steps // keep + 1, sample.stop - sample.start))
+        rows[:, 0] = self.points[sample].T
         changes, inputs = (1, 0) if control is None else control.shape[1:]
         of_one = 8 * (len(self.points) + len(self.worst) + rows[0].size + changes * inputs)
         part = int(SHARE_OF_MEMORY * loop.device.free_bytes() / of_one)
@@ -35,7 +37,8 @@ class DeviceFixedStepBatch(FixedStepBatch):
                 f"device {loop.device_name!r}: a motion with its samples needs {of_one / 1e6:.4g} MB, and "
                 f"{loop.device.free_bytes() / 1e6:.4g} MB are free. Take fewer samples, by every=."
             )
-        settings = {"rows": rows.shape[1], "h": h, "keep": keep, "every": steps_per_check(loop.evaluations)}
+        sizes = {"rows": rows.shape[1], "row": rows.shape[2]}
+        settings = {"h": h, "keep": keep, "every": steps_per_check(loop.evaluations)} | sizes
         for begin in range(0, self.columns, part):
             some = slice(begin, min(begin + part, self.columns))
             count = some.stop - some.start

@@ -16,7 +16,8 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
-from gauss.simulation.batch.rollout import ADAPTIVE, FIXED
+from gauss.simulation.batch.machine_code import FIXED
+from gauss.simulation.batch.rollout import ADAPTIVE
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.energy_balance import shares
@@ -113,9 +114,9 @@ class Ensemble:
             adaptive = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
             found = adaptive.run(times, self.step, threads, switched.times)
             return (
-                found.samples,
+                found.samples[:, :, : len(starts)],
                 ~(found.error <= ACCELERATION_TOLERANCE),
-                shares(system, found.energies, starts, found.samples, duration),
+                shares(system, found.energies, starts, found.samples[:, :, : len(starts)], duration),
             )
         batch = FixedStepBatch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))

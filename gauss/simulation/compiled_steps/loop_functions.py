@@ -170,15 +170,33 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
 
 def fixed_batch(program: Program, method: FixedStep, device: str | None = None) -> FixedStepBatchLoop | DeviceFixedStepLoop:
     """Machine code of a fixed-step method for a batch of motions, of this CPU or of a device."""
+    return batch_loop(program, fixed(program, method), device=device)
+
+
+def batch_loop(
+    program: Program, functions: Fixed, width: int | None = None, device: str | None = None
+) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+    """Machine code of a batch of motions; samples are coordinates, rates and work.
+
+    Parameters
+    ----------
+    program : Program
+        The system.
+    functions : Fixed
+        Functions of the step.
+    width : int, optional
+        Number of motions at a time, 1 for steps of one motion; that of the vector register when not given.
+    device : str, optional
+        Name of a device; this CPU by default.
+    """
     layout = program.layout
 
     def start(x):
         point = layout.point(x)
-        begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state)))
+        begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state), point.method_state))
         return begun, [program.residual(point.state)], program.energies(x)
 
-    states = slice(1, 1 + layout.n_q + layout.n_v)
-    begin, functions, inputs = write(start, layout.size, name="start"), fixed(program, method), len(program.inputs)
+    begin, written, inputs = write(start, layout.size, name="start"), slice(1, layout.row), len(program.inputs)
     if device is None:
-        return FixedStepBatchLoop(functions, begin, states, inputs)
-    return DeviceFixedStepLoop(device, functions, begin, states, inputs)
+        return FixedStepBatchLoop(functions, begin, written, inputs, width)
+    return DeviceFixedStepLoop(device, functions, begin, written, inputs)
