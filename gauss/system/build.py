@@ -138,7 +138,7 @@ def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
         If no chain of joints leads from the ground to some body.
     """
     reached, edges = {GROUND}, []
-    waiting = list(scene.joints.values())
+    waiting = sorted(scene.joints.values(), key=lambda joint: joint.child_frame is not None)  # these close loops
     while waiting:
         later = []
         for joint in waiting:
@@ -146,6 +146,11 @@ def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
             if all(ends):
                 continue
             if any(ends):
+                if joint.child_frame is not None:
+                    outer = joint.child if ends[0] else joint.parent
+                    raise SceneError(
+                        f"joint {joint.name!r}: child_frame is for loops, and no other chain of joints leads to {outer!r}."
+                    )
                 inner, outer = (joint.parent, joint.child) if ends[0] else (joint.child, joint.parent)
                 reached.add(outer)
                 edges.append((joint.name, outer, inner))
