@@ -102,7 +102,7 @@ class UnphysicalInertiaWarning(UserWarning):
 
 
 class StartWarning(UserWarning):
-    """A joint starts beyond its limits, or at an angle that was probably meant in degrees."""
+    """A joint starts beyond its limits, at an angle that was probably meant in degrees, or not where it was told to."""
 
 
 class InconsistentConstraintsWarning(UserWarning):

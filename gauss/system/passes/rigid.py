@@ -36,7 +36,7 @@ def _rigid_loop(subsystem: Subsystem) -> list[int] | None:
     for loop_joint in subsystem.loop_joints:
         if not _is_closed(subsystem, loop_joint, poses):
             continue
-        loop = _loop(subsystem, loop_joint)
+        loop = loop_of(subsystem, loop_joint)
         twists = np.concatenate([_twists(subsystem, index, poses) for index in loop], axis=1)
         twists[3:] /= subsystem.size or 1.0
         sizes = np.linalg.svd(twists / np.linalg.norm(twists, axis=0), compute_uv=False)
@@ -55,7 +55,7 @@ def _is_closed(subsystem: Subsystem, loop_joint: int, poses) -> bool:
     return bool(apart <= CLOSED)
 
 
-def _loop(subsystem: Subsystem, loop_joint: int) -> list[int]:
+def loop_of(subsystem: Subsystem, loop_joint: int) -> list[int]:
     """Joints of the loop that a joint closes in the tree."""
     inward = {edge.outer: edge for edge in subsystem.tree}
 
