@@ -61,15 +61,21 @@ def consistent(
     if not system.has_closures:
         return state
     columns = fixed_columns(system, kept)
-    if columns:
-        pose = assembled(system, state, columns, required)
-        found = project_rates(system, pose.state, columns)
-        if _is_met(system, found) and _keeps(system, state, found, columns):
-            return found
-        if required:
-            if not least_violation:
-                _check_start(system, found, _while_kept(kept), pose)
-            return found
+    if not columns:
+        return _moved_freely(system, state, kept, rough, least_violation, columns)
+    pose = assembled(system, state, columns, required)
+    found = project_rates(system, pose.state, columns)
+    if _is_met(system, found) and _keeps(system, state, found, columns):
+        return found
+    if not required:
+        return _moved_freely(system, state, kept, rough, least_violation, columns)
+    if not least_violation:
+        _check_start(system, found, _while_kept(kept), pose)
+    return found
+
+
+def _moved_freely(system: System, state: State, kept, rough: bool, least_violation: bool, columns) -> State:
+    """State near a guess in which every coordinate may change, those to be kept, too."""
     pose = assembled(system, state, [], rough or _is_free(system, state, columns))
     found = project_rates(system, pose.state)
     if columns and not _is_met(system, found):
@@ -81,6 +87,15 @@ def consistent(
         _check_start(system, found, "from this start", pose)
         _warn_of_changes(system, state, found, kept, rough and pose.starts > 0)
     return found
+
+
+def _while_kept(kept) -> str:
+    return f"while {', '.join(kept)} {'keeps its value' if len(kept) == 1 else 'keep their values'}"
+
+
+def _is_free(system: System, state: State, held) -> bool:
+    """Whether no coordinates are given: only then random restarts are allowed."""
+    return not held and np.array_equal(state.q, system.reference.q)
 
 
 def changed_starts(system: System, given: State, found: State, kept) -> dict[str, str]:

@@ -84,6 +84,7 @@ class Joint:
         if self.limits is not None:
             keep["limits"] = values.vector(self.limits, f"{what}: limits", "rad or m", 2)
         values.keep(self, **keep)
+        self._check_child_frame(what)
         self._check_relevant(what)
 
     def _check_relevant(self, what: str):
@@ -101,6 +102,7 @@ class Joint:
         if np.any(self.rotation) and self.rotation != (0.0, 0.0, 0.0) and self.kind not in ("ball", "free", "fixed"):
             raise SceneError(f"{what}: rotation has no meaning for a {self.kind} joint; give its axis.")
 
+    def _check_child_frame(self, what: str):
         if self.child_frame is not None and (self.frame == "world" or self.child_at is not None):
             raise SceneError(f"{what}: child_frame goes with a frame on the parent, and without child_at.")
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.backends.structure import ConstraintRows, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Drive, Force, Scene, Slipping
+from gauss.scene import GROUND, Drive, Force, Joint, Scene, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.contact_gaps import of_shapes
@@ -127,6 +127,13 @@ def _check_inertia(system: System):
             )
 
 
+def _require_in_tree(joint: Joint, outer: str):
+    """Refuse a joint between two frames that need not meet at the reference configuration."""
+    if joint.child_frame is not None:
+        words = f"child_frame is for loops, and no other chain of joints leads to {outer!r}"
+        raise SceneError(f"joint {joint.name!r}: {words}.")
+
+
 def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
     """Tree edges (joint, outer body, inner body), inner bodies first.
 
@@ -146,12 +153,8 @@ def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
             if all(ends):
                 continue
             if any(ends):
-                if joint.child_frame is not None:
-                    outer = joint.child if ends[0] else joint.parent
-                    raise SceneError(
-                        f"joint {joint.name!r}: child_frame is for loops, and no other chain of joints leads to {outer!r}."
-                    )
                 inner, outer = (joint.parent, joint.child) if ends[0] else (joint.child, joint.parent)
+                _require_in_tree(joint, outer)
                 reached.add(outer)
                 edges.append((joint.name, outer, inner))
             else:
