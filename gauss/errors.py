@@ -101,8 +101,12 @@ class NotImportedWarning(UserWarning):
     """A file has entries that were not read."""
 
 
+class UnphysicalInertiaWarning(UserWarning):
+    """A file has inertias that no body can have, which were taken as given."""
+
+
 class StartWarning(UserWarning):
-    """A joint starts beyond its limits, or at an angle that was probably meant in degrees."""
+    """A joint starts beyond its limits, at an angle that was probably meant in degrees, or not where it was told to."""
 
 
 class InconsistentConstraintsWarning(UserWarning):
