@@ -4,7 +4,7 @@ import numpy as np
 import qpsolvers
 
 from gauss.backends.accuracy import DEFAULT_TOLERANCE, KEPT, own_settings
-from gauss.bench import casadi_, coulomb, mujoco_
+from gauss.bench import casadi_, coulomb, jaxopt_, mujoco_
 from gauss.bench.clocks import AROUND
 from gauss.bench.contestants import contestants
 from gauss.bench.levels import LIMIT, LOOSEST, OF_ANYBODY, POLICIES, WALL_LIMIT, promise, settings
@@ -14,6 +14,7 @@ COMPARED = ("backend", "called through", "matrices", "the library reports", "pro
 WAYS = {  # of solvers that are not called through qpsolvers: through what, its matrices, what the library reports
     **dict.fromkeys(("qpoases", "qrqp"), ("CasADi", "sparse", "around its call")),
     **dict.fromkeys(("fatrop", "hpipm"), ("CasADi", "stages", "around its call")),
+    jaxopt_.SOLVER: ("jaxopt", "dense", "nothing"),
     **dict.fromkeys(mujoco_.SOLVERS, ("MuJoCo", "dense", "nothing")),
     **dict.fromkeys(coulomb.SOLVERS, ("gauss", "dense", "nothing")),
 }
