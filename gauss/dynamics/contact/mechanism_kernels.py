@@ -18,6 +18,7 @@ from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_forces import generalised_forces
 from gauss.dynamics.loads import Applied
+from gauss.dynamics.loop_joints import LoopJoint
 from gauss.dynamics.mechanism import loop_constraints
 from gauss.dynamics.state_terms import StateTerms
 from gauss.dynamics.store import cached_on_disk
@@ -84,6 +85,8 @@ class MechanismTerms(NamedTuple):
         their Jacobian, and their derivatives with q̈ = 0.
     G, gamma : ndarray, shape (l, n_v), (l,)
         Loop constraints G q̈ = γ.
+    B, beta : ndarray, shape (n_v, n_v), (n_v,)
+        Rates v = B v of all joints by those of the spanning tree, and accelerations of the others where these are zero.
     """
 
     M: np.ndarray
@@ -97,6 +100,8 @@ class MechanismTerms(NamedTuple):
     bias: np.ndarray
     G: np.ndarray
     gamma: np.ndarray
+    B: np.ndarray
+    beta: np.ndarray
 
 
 class MechanismKernels:
@@ -144,7 +149,6 @@ class MechanismKernels:
         J = [terms.jacobian_of(body, terms.centers[body]) for body in self.carriers]
         tau, power = self._load_forces(terms, t, q, v)
         gap, rate, K, bias = self._rows(t, q, v)
-        G, gamma = self._loops(t, q, v)
         return MechanismTerms(
             np.tril(terms.tree_mass_matrix),
             tau - terms.tree_bias_forces,
@@ -155,8 +159,8 @@ class MechanismKernels:
             rate,
             K,
             bias,
-            G,
-            gamma,
+            *self._loops(t, q, v),
+            *self._dependent(terms),
         )
 
     def _forces(self, t, q, v):
@@ -193,6 +197,16 @@ class MechanismKernels:
                 row[self.smooth.column(coupling.driver)] = -coupling.ratio
             return rows, np.zeros(len(rows))
         return loop_constraints(self.smooth, q, v, t)[1:]
+
+    def _dependent(self, terms: StateTerms):
+        """Rates of loop joints by those of the tree."""
+        n_v, in_tree = self.smooth.n_v, {edge.constraint for edge in self.smooth.structure.tree}
+        B, beta = np.eye(n_v, dtype=object), np.zeros(n_v, dtype=object)
+        for index in sorted(set(range(len(self.smooth.joints))) - in_tree):
+            loop_joint, place = LoopJoint(terms.tree, index, terms.q, terms.v), self.smooth.joints[index].v
+            B[place] = jacobian(loop_joint.rates(terms.velocities, still=True), terms.v)
+            beta[place] = loop_joint.rates(terms.biases, still=False)
+        return B, beta
 
 
 def _body(terms: StateTerms, body: int) -> np.ndarray:

@@ -239,13 +239,12 @@ class MechanismStepper:
         tree = M.diagonal() > 0.0
         H = np.zeros_like(M)
         H[np.ix_(tree, tree)] = np.linalg.inv(M[np.ix_(tree, tree)])
-        if not terms.gamma.size:
-            return H, np.zeros(len(M))
         Y = H @ terms.G.T
         S = terms.G @ Y
-        scale = 1.0 / np.sqrt(S.diagonal())
+        sizes = S.diagonal()
+        scale = 1.0 / np.sqrt(np.maximum(sizes, REDUNDANT_LOOPS * sizes.max()))
         P = scale[:, None] * np.linalg.pinv(scale[:, None] * S * scale, rcond=REDUNDANT_LOOPS, hermitian=True) * scale
-        return H - Y @ P @ Y.T, Y @ (P @ terms.gamma)
+        return terms.B @ (H - Y @ P @ Y.T) @ terms.B.T, terms.B @ (Y @ (P @ terms.gamma)) + terms.beta
 
     def _speed(self, begun: _FreeStep, v: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
