@@ -5,9 +5,6 @@ import pytest
 
 import gauss
 from gauss import Plan
-from gauss.dynamics.contact.contact_stepper import contact_stepper
-from gauss.dynamics.contact.mechanism_step import mechanism_stepper
-from gauss.errors import StateError
 from tests.support import mechanisms
 
 STEP = 1e-3  # [s]

@@ -45,26 +45,23 @@ class SparseArrays:
     """
 
     def __init__(self, arrays):
-        self.fixed, self.places, self.outputs, begin = [], [], [], 0
-        for array in arrays:
-            numbers = [as_number(entry) for entry in np.ravel(np.asarray(array, dtype=object))]
-            varying = [k for k, number in enumerate(numbers) if number is None]
-            self.fixed.append(np.array([0.0 if x is None else x for x in numbers]).reshape(np.shape(array)))
-            self.outputs += [np.ravel(array)[k] for k in varying]
-            self.places.append((np.array(varying, dtype=int), slice(begin, begin + len(varying))))
-            begin += len(varying)
+        entries = np.concatenate([np.ravel(np.asarray(array, dtype=object)) for array in arrays])
+        numbers = [as_number(entry) for entry in entries]
+        self.flat = np.array([0.0 if number is None else number for number in numbers])
+        self.entries = np.array([k for k, number in enumerate(numbers) if number is None], dtype=int)
+        self.outputs = [entries[k] for k in self.entries]
+        ends = np.cumsum([np.size(array) for array in arrays]).tolist()
+        shapes = [np.shape(array) for array in arrays]
+        self.parts = [(slice(a, b), shape) for a, b, shape in zip([0, *ends], ends, shapes, strict=False)]
 
     def __getstate__(self) -> dict:
-        return {"fixed": self.fixed, "places": self.places}
+        return {name: vars(self)[name] for name in ("flat", "entries", "parts")}
 
     def filled(self, values: np.ndarray) -> list[np.ndarray]:
         """Arrays with the values of the outputs."""
-        found = []
-        for fixed, (places, values_of) in zip(self.fixed, self.places, strict=True):
-            array = fixed.copy()
-            array.reshape(-1)[places] = values[values_of]
-            found.append(array)
-        return found
+        flat = self.flat.copy()
+        flat[self.entries] = values
+        return [flat[part].reshape(shape) for part, shape in self.parts]
 
 
 class MechanismTerms(NamedTuple):
@@ -73,7 +70,7 @@ class MechanismTerms(NamedTuple):
     Attributes
     ----------
     M : ndarray, shape (n_v, n_v)
-        Mass matrix; lower triangle.
+        Mass matrix.
     tau, power : ndarray, shape (n_v,), (3,)
         Generalised forces less the bias forces, τ − h; power of drives, of forces on bodies, and of dissipation [W].
     bodies : ndarray, shape (24, k)
@@ -150,7 +147,7 @@ class MechanismKernels:
         tau, power = self._load_forces(terms, t, q, v)
         gap, rate, K, bias = self._rows(t, q, v)
         return MechanismTerms(
-            np.tril(terms.tree_mass_matrix),
+            terms.tree_mass_matrix,
             tau - terms.tree_bias_forces,
             np.array(power, dtype=object),
             bodies,

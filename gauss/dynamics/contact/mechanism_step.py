@@ -33,7 +33,8 @@ from gauss.dynamics.contact.moreau_step import (
     is_impact,
     least_rate,
 )
-from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts
+from gauss.dynamics.contact.near_contacts import NearContacts
+from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale, centrifugal_scale
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
@@ -118,7 +119,7 @@ class MechanismStepper:
         self.n = len(carriers)
         places = {body: k for k, body in enumerate(carriers)}
         self.table.body = np.array([places.get(int(body), self.n) for body in self.table.body], dtype=np.int64)
-        self.detection = ContactDetection(self.table, system.scale.length)
+        self.detection = NearDetection(self.table, self.n + 1, system.scale.length)
         self.reach = np.zeros(self.n + 1)
         np.maximum.at(self.reach, self.table.body, self.table.length)
         self.ground = np.concatenate([np.eye(3).ravel(), np.zeros(15)])[:, None]
@@ -146,6 +147,7 @@ class MechanismStepper:
         self.other_restitution = np.array([side.whole.restitution for side in self.others])
         self.restitution = np.concatenate([self.table.restitution, self.other_restitution])
         elements = cast(list[JointDryFriction], [*scene.set_valued.values()])  # others are refused
+        self.coefficients = np.unique(self.restitution)
         self.limit = np.array([element.limit for element in elements]) / self.set_unit
         self.lossy = np.array([element.lossy for element in elements], dtype=bool)
 
@@ -180,6 +182,7 @@ class MechanismStepper:
 
     def forget(self):
         """Forget the forces of the last step: a new motion begins."""
+        self.detection.connect()
         self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(len(self.others) + self.limit.size)
 
     def step(self, state: State, h: float) -> MechanismStep:
@@ -232,7 +235,7 @@ class MechanismStepper:
 
     def _compliance(self, terms: MechanismTerms) -> tuple[np.ndarray, np.ndarray]:
         """Compliance H (n_v, n_v), and accelerations (n_v,) by the biases of loops."""
-        M = terms.M + np.tril(terms.M, -1).T
+        M = terms.M
         if self.free_columns is not None:
             N = self.free_columns
             return N @ np.linalg.inv(N.T @ M @ N) @ N.T, np.zeros(len(M))
@@ -258,7 +261,7 @@ class MechanismStepper:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         bodies = np.concatenate([begun.terms.bodies, self.ground], axis=1)
-        near, overlaps = self.detection.find(self.table.poses(bodies), bodies[9:12], reach, UNSEEN_OVERLAP)
+        near, overlaps = self.detection.find(bodies, reach, UNSEEN_OVERLAP)
         if overlaps:
             law, depth = overlaps[0]
             raise SimulationError(
@@ -309,8 +312,8 @@ class MechanismStepper:
         if not n:
             return np.zeros(0), np.zeros(begun.acceleration.size), 0.0
         after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
-        for e in np.unique(rows.restitution):
-            mine = np.flatnonzero(rows.restitution == e)
+        for e in self.coefficients:
+            mine = slice(0, m) if len(self.coefficients) == 1 else np.flatnonzero(rows.restitution == e)
             after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], float(e), h, rest, share)
         force, scale = self._start(near, rows), 1.0 + np.abs(rows.rate).max(initial=0.0)
         active = (after[:m] < 0.0) | (force[:m] > 0.0)
