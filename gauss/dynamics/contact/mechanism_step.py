@@ -35,6 +35,7 @@ from gauss.dynamics.contact.moreau_step import (
 )
 from gauss.dynamics.contact.near_contacts import NearContacts
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.paradox import Paradox, sliding, sliding_above, undetermined_sliding
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale, centrifugal_scale
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
@@ -66,6 +67,8 @@ class MechanismStep(NamedTuple):
         Mean power of drives, of forces on bodies, and of dissipation [W].
     error : float or None
         Error of the laws in units of the scene; None for the convex relaxation.
+    paradoxes : list of Paradox
+        Contacts with undetermined forces.
     """
 
     q: np.ndarray
@@ -75,6 +78,7 @@ class MechanismStep(NamedTuple):
     others: np.ndarray
     power: np.ndarray
     error: float | None
+    paradoxes: list[Paradox]
 
 
 class _FreeStep(NamedTuple):
@@ -220,7 +224,8 @@ class MechanismStepper:
         power = begun.power + np.array([work[~lossy].sum(), 0.0, -work[lossy].sum()])
         contacts, others = self._split(rows, near, force * rows.unit)
         self._keep(near, contacts, others)
-        return MechanismStep(q, v, near, contacts, others, power, error)
+        paradoxes = self._paradoxes(state, rows, begun, near, force)
+        return MechanismStep(q, v, near, contacts, others, power, error, paradoxes)
 
     def _begin(self, state: State, h: float, share: float) -> _FreeStep:
         kernels, t = self.kernels, state.t + share * h
@@ -357,6 +362,23 @@ class MechanismStepper:
         if held.size:
             names = [self._name(near, int(k)) for k in held]
             raise jammed_error(f"t = {state.t:.6g} s", names, float((-after / rows.unit)[held].max()))
+
+    def _paradoxes(self, state: State, rows: _StepRows, begun: _FreeStep, near: NearContacts, force) -> list[Paradox]:
+        """Painlevé's paradoxes of the closed contacts."""
+        if not rows.rough.size:
+            return []
+        m, length, time = rows.gap.size, self.system.scale.length, self.system.scale.time
+        slow = sliding_above(self.system, state.v) * time / length
+        across = m + np.arange(2 * rows.rough.size).reshape(-1, 2)
+        which = sliding(rows.rate[across], force[rows.rough] > 0.0, slow)
+        if not which.size:
+            return []
+        normal, across = rows.rough[which], across[which]
+        responses = rows.K[normal] @ begun.H
+        smooth, sideways = responses @ rows.K[normal].T, (responses @ rows.K[across.ravel()].T).reshape(which.size, -1, 2)
+        b = rows.K[normal] @ begun.acceleration + rows.bias[normal]
+        names = [self._name(near, int(row)) for row in normal]
+        return undetermined_sliding(names, rows.friction[which], rows.rate[across], smooth, sideways, b)
 
     def _name(self, near: NearContacts, row: int) -> str:
         """Name of the gap of a row."""
