@@ -4,6 +4,8 @@ Points are a structure of arrays, one column per motion. A vector of motions mak
 begins, so that it stays in the first-level cache; a motion does not depend on the others, nor on the number of threads.
 """
 
+from llvmlite import ir
+
 from gauss.codegen import INTEGER, Function, Writer, intrinsic, machine
 from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record
@@ -12,7 +14,7 @@ from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
 OPTIONAL = 3  # numbers of a sample: the work
-POINTERS = ("control", "points", "worst", "out")
+NAME, POINTERS = "fixed_step_batch", ("control", "points", "worst", "out")
 WORST_RECORD = ("error", "constraint_residual", "unseen", "unsolved", *ENERGY_RECORD)  # record of a motion
 
 
@@ -74,11 +76,9 @@ class FixedStepBatchLoop(BatchLoop):
 
     def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0, width: int | None = None):
         self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
-        writer, pointers = Writer(), (*POINTERS, *(["inputs"] if inputs else []))
-        width = machine.width() if width is None else width
-        code = LoopCode(writer, "fixed_step_batch", pointers, BatchSpan, width)
-        _write(code, method, start, written, inputs)
-        super().__init__(writer, "fixed_step_batch", BatchSpan, len(pointers) - 1, width)
+        writer, width = Writer(), machine.width() if width is None else width
+        write_fixed_step_batch(writer, method, start, written, inputs, width)
+        super().__init__(writer, NAME, BatchSpan, len(POINTERS) - 1 + bool(inputs), width)
 
     def __call__(self, span: BatchSpan, points, worst, out, *inputs):
         """Make steps of a range of motions; releases Python's global lock.
@@ -100,7 +100,11 @@ class FixedStepBatchLoop(BatchLoop):
         self._run.call(span, points, worst, out, *inputs, 0)
 
 
-def _write(code: LoopCode, method: Fixed, start: Function, written: slice, inputs: int):
+def write_fixed_step_batch(
+    writer: Writer, method: Fixed, start: Function, written: slice, inputs: int, width: int
+) -> ir.Function:
+    """Write the loop for a number of motions at a time: (*POINTERS, inputs if there are some, budget)."""
+    code = LoopCode(writer, NAME, (*POINTERS, *(["inputs"] if inputs else [])), BatchSpan, width)
     b, size = code.b, method.size
     given, reached = code.buffer(size + 1), code.buffer(max(len(method.step.outputs), len(start.outputs)))
     error, worst = code.buffer(len(method.check.outputs)), code.buffer(len(WORST_RECORD))
@@ -145,6 +149,7 @@ def _write(code: LoopCode, method: Fixed, start: Function, written: slice, input
         _scatter(code, worsts, worst, columns, len(WORST_RECORD))
         b.store(b.add(column, INTEGER(code.width)), motion)
     code.finish()
+    return code.function
 
 
 def _take_inputs(code: LoopCode, room, count: int, column, row):

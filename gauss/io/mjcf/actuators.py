@@ -58,3 +58,9 @@ def force_law(model, i: int) -> np.ndarray:
     gain = model.actuator_gainprm[i, :3] * ([1, 1, 1] if int(model.actuator_gaintype[i]) == AFFINE_GAIN else [1, 0, 0])
     u = control(model, i)
     return bias + gain * u if u else bias
+
+
+def controls(model) -> dict[str, int]:
+    """Place in ``ctrl`` of each actuator of one control, by its name."""
+    places = {i: int(model.actuator_ctrladr[i]) if COUNT == "nactuator" else i for i in actuators(model)}
+    return {model.actuator(i).name or f"actuator {i}": k for i, k in places.items() if n_controls(model, i) == 1}

@@ -14,6 +14,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
+from gauss.io.guard import checked_root
 from gauss.io.mjcf.actuators import actuators, is_switched_off
 from gauss.io.mjcf.drives import add_actuator
 from gauss.io.mjcf.guard import guarded
@@ -30,24 +31,30 @@ from gauss.scene.profiles import Polynomial
 LIMITS = ("start", "stops")
 
 
-def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
+def read_mjcf(
+    path, limits: str = "start", contacts: bool = False, root_folder=None, keyframe: str | int | None = None
+) -> Scene:
     """Scene of a MJCF file.
 
     A body of several joints hangs on bodies without mass in between. Coordinates count from the pose of the file, so that
     those of a joint with ``ref`` are smaller by it. An actuator is a drive, named like it, of the effort that it has when
     nobody controls it: under control 0, or the end of its ``ctrlrange`` that is nearest. Armature is a rotor on the ground
     that turns with its joint. A fixed tendon pulls its joints; a straight one is a spring, a rope, or a distance. A key
-    frame called "start" is where the scene starts.
+    frame called "start", or another that is asked for, is where the scene starts.
 
     Parameters
     ----------
     path : str or Path
-        The file; files that it names must lie in its folder.
+        The file; files that it names must lie in its folder, or in ``root_folder``.
     limits : str
         "start": limits of joints are kept where a start is assembled; "stops": joints run against them, too.
     contacts : bool
         Whether planes, spheres, capsules and boxes become shapes, and contacts where they may touch; see
         :mod:`gauss.io.mjcf.touching`.
+    root_folder : str or Path, optional
+        Folder in which meshes and included files may lie, beside that of the file.
+    keyframe : str, optional
+        Name of the key frame that the scene starts from, or its number from 0.
 
     Raises
     ------
@@ -63,7 +70,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     path = Path(path)
     if limits not in LIMITS:
         raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
-    source = guarded(path)
+    source = guarded(path, checked_root(path, root_folder))
     try:
         model = without_what_is_off(mujoco.MjModel.from_xml_path(str(path)))
     except (ValueError, RuntimeError) as error:
@@ -73,13 +80,13 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     if against:
         raise FileError(f"{path}: not modelled: {'; '.join(against)}. Remove them from the file, or model them in gauss.")
     try:
-        scene = _MjcfReader(named).scene(path.stem)
+        scene = _MjcfReader(named).scene(path.stem, keyframe)
         if limits == "stops":
             add_stops(scene, named)
         unlike = add_contacts(scene, named) if contacts else []
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
-    left = left_out(named, limits == "stops", contacts) + unlike
+    left = left_out(named, limits == "stops", contacts, keyframe) + unlike
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=2)
     return scene
@@ -92,7 +99,7 @@ class _MjcfReader:
         self.named, self.model = named, named.model
         self.bodies, self.joints, self.kinds = named.bodies, named.joints, named.kinds
 
-    def scene(self, name: str) -> Scene:
+    def scene(self, name: str, keyframe: str | int | None) -> Scene:
         """Scene of the model."""
         scene = Scene(name, gravity=tuple(self.model.opt.gravity))
         for i in range(1, self.model.nbody):
@@ -105,7 +112,7 @@ class _MjcfReader:
         for i in actuators(self.model):
             if not is_switched_off(self.model, i):
                 add_actuator(scene, self.named, i)
-        add_start(scene, self.named)
+        add_start(scene, self.named, keyframe)
         return scene
 
     def _body(self, scene: Scene, i: int):

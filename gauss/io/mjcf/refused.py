@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.io.mjcf.actuators import actuators, force_law, has_affine_force, is_switched_off, n_controls
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
-from gauss.io.mjcf.start import START
+from gauss.io.mjcf.start import START, key_of
 from gauss.io.mjcf.switches import is_off
 from gauss.io.mjcf.tendons import CROSSING, FIXED, OTHER, kind_of, span
 
@@ -73,9 +73,9 @@ def _without_counterpart(named: Named) -> Iterator[Finding]:
                 yield f"{kind} {named.name(kind, i)!r}: {why}", kind, i
 
 
-def left_out(named: Named, stops: bool = False, contacts: bool = False) -> list[str]:
+def left_out(named: Named, stops: bool = False, contacts: bool = False, keyframe: str | int | None = None) -> list[str]:
     """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
-    model, kept = named.model, _inactive(named)
+    model, kept = named.model, _inactive(named, keyframe)
     touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity).tolist()]
     limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited).tolist()]
     pairs = [named.name("pair", i) for i in range(model.npair)]
@@ -85,18 +85,18 @@ def left_out(named: Named, stops: bool = False, contacts: bool = False) -> list[
     return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts + kept if names]
 
 
-def _inactive(named: Named) -> list[tuple[str, list[str]]]:
+def _inactive(named: Named, keyframe: str | int | None) -> list[tuple[str, list[str]]]:
     """Elements that are switched off, stand still, or name other states."""
     model = named.model
     inactive = [named.name("equality", i) for i in range(model.neq) if not model.eq_active0[i]]
     off = [named.name("actuator", i) for i in actuators(model) if is_switched_off(model, i)]
     standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0).tolist()]
-    keys = [named.name("key", i) for i in range(model.nkey) if model.key(i).name != START]
+    keys = [named.name("key", i) for i in range(model.nkey) if i != key_of(named, keyframe)]
     return [
         ("equalities that are not active:", inactive),
         ("actuators of groups that are switched off:", off),
         ("what moves mocap bodies, which stand still:", standing),
-        (f"key frames (one called {START!r} would be the start):", keys),
+        (f"key frames (one called {START!r}, or that keyframe= names, would be the start):", keys),
     ]
 
 

@@ -97,7 +97,7 @@ def couple_coordinates(scene: Scene, name: str, terms: list[tuple[str, float]], 
     elif len(terms) == 2:
         scene.couple(name, first, terms[1][0], -terms[1][1] / factor, constant / factor)
     else:
-        scene.constrain(name, lambda at: sum(factor * at.coordinate(joint) for joint, factor in terms) - constant)
+        scene.linear_coupling(name, dict(terms), constant)
 
 
 def _wraps(model, i: int) -> range:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.codegen import one_tier
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
@@ -58,7 +59,7 @@ class Ensemble:
         self.family, self.step, self.tolerance = parametrised(pattern, members), step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])
         system = self.family.system
-        self.code: FixedStepBatchLoop | AdaptiveBatchCode
+        self.code: FixedStepBatchLoop | DeviceFixedStepLoop | AdaptiveBatchCode
         if integrator in FIXED:
             self.code = fixed_batch(Program(system, laws, family=self.family), FIXED[integrator])
         else:

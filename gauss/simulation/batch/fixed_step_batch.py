@@ -8,6 +8,7 @@ from threading import Event
 
 import numpy as np
 
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.simulation.step_limits import BUDGET, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
@@ -21,7 +22,7 @@ class FixedStepBatch:
 
     Parameters
     ----------
-    loop : FixedStepBatchLoop
+    loop : FixedStepBatchLoop or DeviceFixedStepLoop
         Compiled loop.
     starts : ndarray, shape (n_q + n_v, batch)
         Initial states, at t = 0.
@@ -29,7 +30,9 @@ class FixedStepBatch:
         Parameters of each motion, of a parametrised system.
     """
 
-    def __init__(self, loop: FixedStepBatchLoop, starts: np.ndarray, parameters: np.ndarray | None = None):
+    def __init__(
+        self, loop: FixedStepBatchLoop | DeviceFixedStepLoop, starts: np.ndarray, parameters: np.ndarray | None = None
+    ):
         self.loop, self.size = loop, starts.shape[1]
         filled = self._filled(starts)
         self.columns = filled.shape[1]

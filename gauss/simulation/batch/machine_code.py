@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.moreau_step import moreau_stepper
@@ -27,7 +28,9 @@ def contact_state_size(system: System) -> int:
     return method_state_size(moreau_stepper(system))
 
 
-def fixed_step_code(system: System, method: FixedStep, held: bool) -> FixedStepBatchLoop:
+def fixed_step_code(
+    system: System, method: FixedStep, held: bool, device: str | None = None
+) -> FixedStepBatchLoop | DeviceFixedStepLoop:
     """Machine code of fixed steps of a batch, cached with the system; with inputs that are held in each step, or without.
 
     Raises
@@ -36,13 +39,14 @@ def fixed_step_code(system: System, method: FixedStep, held: bool) -> FixedStepB
         If the system cannot be compiled.
     """
 
-    def make(laws: Laws) -> FixedStepBatchLoop:
+    def make(laws: Laws) -> FixedStepBatchLoop | DeviceFixedStepLoop:
         if not method.nonsmooth:
-            return fixed_batch(Program(system, laws, inputs=held), method)
+            return fixed_batch(Program(system, laws, inputs=held), method, device)
         stepper, smooth = moreau_stepper(system), smooth_question(Question(system, laws)).laws
-        return compiled_batch(stepper, Program(stepper.smooth, smooth, memory=method_state_size(stepper), inputs=held))
+        program = Program(stepper.smooth, smooth, memory=method_state_size(stepper), inputs=held)
+        return compiled_batch(stepper, program, device)
 
-    return machine_code(system, method, (held,), make)
+    return machine_code(system, method, (held, device), make)
 
 
 def machine_code(system: System, method: Integrator, kind: tuple, make: Callable[[Laws], T]) -> T:

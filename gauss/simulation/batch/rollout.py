@@ -19,6 +19,7 @@ from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.batch_result import Rollout
+from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, machine_code
@@ -50,6 +51,7 @@ def rollout(
     atol: float | tuple[float, float] | dict | None = None,
     threads: int | None = 1,
     control=None,
+    device: str | None = None,
 ) -> Rollout:
     """Simulate a batch of initial states.
 
@@ -82,6 +84,9 @@ def rollout(
     control : array_like, shape (batch, k, n_u), optional
         Values of the inputs of the scene [N m, N] for each motion, with fixed steps: k rows, each held for ``steps`` / k
         steps and cut off at the limits of the inputs. They are zero when not given.
+    device : str, optional
+        "cuda" or "cuda:1": a GPU, one motion in a thread, needs cuda-bindings and a driver of NVIDIA. "lanes": the same
+        code on this CPU, one motion after the other, to check what a GPU computes. This CPU, in SIMD lanes, by default.
 
     Returns
     -------
@@ -99,6 +104,8 @@ def rollout(
     SimulationError
         If the system cannot be compiled, with the reasons, or a motion without ``control`` diverges; with it, motions that
         diverge are marked in the result, and the others are not affected.
+    DeviceError, MissingPackageError
+        If there is no such device, no driver or no cuda-bindings, or a function has no code for a GPU.
     StateError
         If the initial states have wrong shapes, or violate the constraints.
     """
@@ -109,7 +116,7 @@ def rollout(
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
         _refuse(integrator, "takes no control=: its steps are not those of the samples; use 'rk4'", control=control)
         with one_tier(_tier(q0, ADAPTIVE_STEPS)):
-            return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores())
+            return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores(), device)
     if integrator not in STEPPED:
         raise SimulationError(
             f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, STEPPED | ADAPTIVE)}"
@@ -117,7 +124,7 @@ def rollout(
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
     with one_tier(_tier(q0, steps)):
         keep = 1 if every is None else every
-        return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control)
+        return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)
 
 
 def _tier(q0, steps) -> str:
@@ -127,7 +134,16 @@ def _tier(q0, steps) -> str:
 
 
 def _fixed(
-    system: System, q0, v0, method: FixedStep, steps: int | None, step: float | None, every: int, threads: int, control
+    system: System,
+    q0,
+    v0,
+    method: FixedStep,
+    steps: int | None,
+    step: float | None,
+    every: int,
+    threads: int,
+    control,
+    device: str | None,
 ) -> Rollout:
     """Batch with fixed steps."""
     if step is None or not np.isfinite(step) or step <= 0:
@@ -140,7 +156,8 @@ def _fixed(
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
     held = control is not None
-    batch = FixedStepBatch(fixed_step_code(system, method, held), starts)
+    kind = FixedStepBatch if device is None else DeviceFixedStepBatch
+    batch = kind(fixed_step_code(system, method, held, device), starts)
     refuse_inconsistent(system, starts, batch.residual)
     if method.nonsmooth:
         for k in range(batch.size):
@@ -200,7 +217,9 @@ def _checked_control(system: System, control, batch: int, steps: int) -> np.ndar
     return found
 
 
-def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, atol, threads: int) -> Rollout:
+def _adaptive(
+    system: System, q0, v0, method: ExplicitPair, times, step, rtol, atol, threads: int, device: str | None
+) -> Rollout:
     """Batch with adaptive steps."""
     if times is None:
         raise SimulationError(f"integrator {method.name!r} chooses its steps: give times= [s] of the samples.")
@@ -213,8 +232,10 @@ def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, a
     if not system.n_v:
         return _constant(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
-    make = lambda laws: AdaptiveBatchCode(Program(system, laws, memory=method_state_size(system)), method, allowed.shares)  # noqa: E731
-    batch = AdaptiveBatch(machine_code(system, method, (allowed.key,), make), starts, allowed)
+    make = lambda laws: AdaptiveBatchCode(  # noqa: E731
+        Program(system, laws, memory=method_state_size(system)), method, allowed.shares, device
+    )
+    batch = AdaptiveBatch(machine_code(system, method, (allowed.key, device), make), starts, allowed)
     refuse_inconsistent(system, starts, batch.residual)
     switched = _switching(system, starts, t[-1])
     found = batch.run(t, step, threads, switched.times)

@@ -8,6 +8,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import write
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop
 from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
 from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
@@ -66,9 +67,11 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
     return Fixed(layout.size, layout.row, compiled, program.projection(), check, 1, program.rates)
 
 
-def compiled_batch(stepper: MoreauStepper, program: Program) -> FixedStepBatchLoop:
+def compiled_batch(
+    stepper: MoreauStepper, program: Program, device: str | None = None
+) -> FixedStepBatchLoop | DeviceFixedStepLoop:
     """Machine code of a batch of motions: one after the other, for the contact problem is solved motion by motion."""
-    return batch_loop(program, compiled_steps(stepper, program), width=1)
+    return batch_loop(program, compiled_steps(stepper, program), width=1, device=device)
 
 
 def method_state_size(stepper: MoreauStepper) -> int:
