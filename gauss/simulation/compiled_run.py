@@ -123,10 +123,9 @@ class CompiledRun:
     def _hold(self, k: int):
         """Set the inputs of the sample k of the control law, at the present point."""
         assert self.held is not None
-        n_q, end = self.system.n_q, 1 + self.system.n_q + self.system.n_v
-        t, q, v = float(self.point[0]), self.point[1 : 1 + n_q].copy(), self.point[1 + n_q : end].copy()
-        self.inputs = self.held.at(k, t, q, v)
-        self.point[-self.inputs.size :] = self.inputs
+        n_q, point = 1 + self.layout.n_q, self.point
+        self.inputs = self.held.at(k, float(point[0]), point[1:n_q].copy(), point[n_q : n_q + self.layout.n_v].copy())
+        point[-self.inputs.size :] = self.inputs
 
     def _certified_rates(self, state: State, inputs: np.ndarray) -> Rates:
         """Rates by the certified recursion; the power of the inputs is counted."""
