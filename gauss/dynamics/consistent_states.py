@@ -133,15 +133,6 @@ def _numbers(values) -> str:
     return " ".join(f"{value:.6g}" for value in values)
 
 
-def _while_kept(kept) -> str:
-    return f"while {', '.join(kept)} {'keeps its value' if len(kept) == 1 else 'keep their values'}"
-
-
-def _is_free(system: System, state: State, held) -> bool:
-    """Whether no coordinates are given: only then random restarts are allowed."""
-    return not held and np.array_equal(state.q, system.reference.q)
-
-
 def project(system: System, state: State) -> State:
     """State after a step, projected onto the constraints: three Newton steps in position, one in velocity."""
     if not system.has_closures:
