@@ -2,8 +2,8 @@
 
 Pinocchio: ``aba`` for trees, ``constraintDynamics`` and ``lcaba`` for loops (hinges that close planar loops as points, as
 their other rows are redundant), each with the proximal parameter that agrees best; for couplings, of which neither knows,
-``crba`` and ``nonLinearEffects`` reduced by the constant null space of the couplings, and LAPACK. MuJoCo: ``mj_forward`` of the
-file that gauss writes, with constraints as stiff as it takes.
+``crba`` and ``nonLinearEffects`` reduced by the constant null space of the couplings, and LAPACK. MuJoCo: ``mj_forward`` of
+the file that gauss writes, with constraints as stiff as it takes.
 """
 
 from collections.abc import Callable
@@ -77,7 +77,11 @@ def _by_pinocchio(system: System, instant: Instant):
     else:
         for name, prepare, solve in (
             (DYNAMICS, pin.initConstraintDynamics, pin.constraintDynamics),
-            (LCABA, lambda model, data, constraints, _: pin.computeJointMinimalOrdering(model, data, constraints), pin.lcaba),
+            (
+                LCABA,
+                lambda model, data, constraints, _: pin.computeJointMinimalOrdering(model, data, constraints),
+                pin.lcaba,
+            ),
         ):
             runs = [_proximal(system, pair, at, tau, prepare, solve, mu) for mu in PROXIMAL]
             yield name, min((Peer(run, error(run())) for run in runs), key=lambda peer: peer.error)
