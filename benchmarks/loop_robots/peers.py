@@ -21,6 +21,7 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.errors import GaussError
 from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
 from gauss.io.mjcf.write import to_mjcf
+from gauss.scene import LinearCoupling
 from gauss.system import System
 
 ABA, DYNAMICS, LCABA, REDUCED, MUJOCO = "pin.aba", "pin.constraintDynamics", "pin.lcaba", "pin.crba + LAPACK", "mj_forward"
@@ -109,7 +110,11 @@ def _reduced(system: System, pair: Twin, at, tau) -> Callable:
     """Call of M and h, reduced by the couplings."""
     model, data = pair.model, pair.model.createData()
     rows = [{coupling.driven: 1.0, coupling.driver: -coupling.ratio} for coupling in system.scene.couplings.values()]
-    rows += [dict(zip(one.coupled, one.coefficients, strict=True)) for one in system.scene.relations.values()]
+    rows += [
+        dict(zip(one.coupled, one.coefficients, strict=True))
+        for one in system.scene.relations.values()
+        if isinstance(one, LinearCoupling)
+    ]
     K = np.zeros((len(rows), system.n_v))
     for row, terms in zip(K, rows, strict=True):
         for joint, coefficient in terms.items():
