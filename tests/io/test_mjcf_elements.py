@@ -154,7 +154,10 @@ def test_limits_of_a_sum_are_read_where_stops_are(tmp_path):
     scene = quietly(path, limits="stops")
     assert list(scene.contacts) == ["t taut", "t at its shortest"]
     system = gauss.compile_scene(scene)
-    motion = kinematics(system, system.state(q=dict(h=0.4, s=0.0, k=0.1)))
+    q = np.zeros(3)
+    for joint, value in (("h", 0.4), ("k", 0.1)):
+        q[system.joint(joint).q] = value
+    motion = kinematics(system, system.state(q))
     gaps = [contact.gaps(motion)[0] for contact in scene.contacts.values()]
     assert gaps == pytest.approx([0.5, 1.0])  # of a length of 0
 
