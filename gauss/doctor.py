@@ -17,7 +17,7 @@ from gauss.io import load
 from gauss.simulation import simulate
 from gauss.versions import DISTRIBUTION, version_of
 
-CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
+CORE = ("numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
 SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "qpalm", "quadprog", "scs")
 EXTRAS = {
     "view": ("matplotlib", "viser"),
@@ -89,7 +89,7 @@ def _tried(name: str, check: Callable[[], Finding]) -> Finding:
 
 
 def _environment() -> list[Finding]:
-    _, machine, packages = header(*CORE)
+    _, machine, packages, *_ = header(*CORE)
     lanes = f"{width()} doubles in a vector register"
     return [Finding("environment", packages), Finding("machine", f"{machine.removeprefix('machine: ')}; {lanes}")]
 

@@ -7,7 +7,6 @@ object code (:mod:`gauss.codegen.machine`), and instead of the objects that the 
 has. An entry is read under the seal of :mod:`gauss.codegen.object_cache`, like the machine code itself.
 """
 
-import copyreg
 import hashlib
 import io
 import pickle
@@ -15,14 +14,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, TypeVar
 
-import numpy as np
-
 from gauss.codegen import machine, object_cache
 from gauss.codegen.content_digest import content_digest
 from gauss.codegen.package_digest import package_digest
 
 T = TypeVar("T")
-FLOAT = np.dtype(float)
 
 
 def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None) -> T:
@@ -79,9 +75,6 @@ class _NotCachedError(Exception):
 
 
 class _Pickler(pickle.Pickler):
-    # arrays are read with numpy's own type of doubles, by whose address machine code knows it; pickle makes a copy of it
-    dispatch_table = copyreg.dispatch_table | {type(FLOAT): lambda dtype: (np.dtype, (dtype.str,))}
-
     def __init__(self, file, content: tuple):
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         self.places = {id(thing): k for k, thing in enumerate(content)}

@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Interface, PythonWrapper, batch_code, entry_code, fastcall, write
+from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
+from gauss.codegen.gpu.device_function import DeviceFunction
+from gauss.codegen.gpu.rows import RowsOnDevice
 from gauss.dynamics.acceleration_derivatives import acceleration_derivatives, inverse_dynamics_derivatives
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
@@ -123,7 +125,9 @@ TERMS = {
 }
 
 
-def state_function(system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None) -> Callable:
+def state_function(
+    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None, device: str | None = None
+) -> Callable:
     """Compiled function of a state, or of several at once; see :meth:`gauss.System.function`.
 
     Raises
@@ -147,7 +151,9 @@ def state_function(system: System, names: Sequence[str], reference: str = REFERE
         refuse_changed(system)
     laws = _traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""
     key = state_function, requests, columns, laws
-    return cached(system, key, lambda: _compiled(system, requests, columns, key))
+    if device is None:
+        return cached(system, key, lambda: _compiled(system, requests, columns, key))
+    return cached(system, (*key, device), lambda: _on_device(system, requests, columns, key, device))
 
 
 def evaluate(system: System, names, given: dict, t, reference: str, independent) -> dict:
@@ -222,12 +228,20 @@ def _traced_loads(system: System) -> Laws:
     return laws
 
 
-def _compiled(system: System, requests, columns, key) -> Callable:
+class _Traced(NamedTuple):
+    """Trace of requests, arguments and results of the function, and its name."""
+
+    trace: Callable[[], Function]
+    interface: Interface
+    name: str
+
+
+def _function(system: System, requests, columns) -> _Traced:
+    """What a function of requests is compiled from."""
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
     limits = (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))
     interface = Interface(sizes, "t", limits, _shapes(system, requests, columns))
-    name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
 
     def values(*given):
         arguments = dict(zip(names, given[:-1], strict=True))
@@ -237,7 +251,22 @@ def _compiled(system: System, requests, columns, key) -> Callable:
         results = [part for result in found for part in (result if isinstance(result, tuple) else (result,))]
         return *results, _errors(terms, given)
 
-    trace = lambda: write(values, *interface.sizes, 1, name="state")  # noqa: E731
+    name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
+    return _Traced(lambda: write(values, *interface.sizes, 1, name="state"), interface, name)
+
+
+def _on_device(system: System, requests, columns, key, device: str) -> Callable:
+    """Function of requests over rows on a device; its reasons to refuse a row are those of the function on this CPU."""
+    function = _function(system, requests, columns)
+    make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
+    rows = cached_on_disk(system, (RowsOnDevice, *key, device), make)
+    own = cached(system, key, lambda: _compiled(system, requests, columns, key))
+    return DeviceFunction(rows, function.interface, own, function.name)
+
+
+def _compiled(system: System, requests, columns, key) -> Callable:
+    trace, interface, name = _function(system, requests, columns)
+    sizes, limits = interface.vectors, interface.limits
     entry = cached_on_disk(system, (entry_code, *key), lambda: entry_code(trace(), interface))
     batch = lambda: cached_on_disk(system, (batch_code, *key), lambda: batch_code(trace(), interface)).entry()  # noqa: E731
 

@@ -132,7 +132,7 @@ def _read_toml(path: Path):
 
 
 def _read_urdf(path: Path, options, name: str) -> Scene:
-    options = _known(str(path), options, ("root", "mimic", *EXTRAS))
+    options = _known(str(path), options, ("root", "mimic", "inertia", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
     with gc_pause():
         return replace(_robots().read_robot(path, options, extras), source=name)

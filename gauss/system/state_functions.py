@@ -176,18 +176,24 @@ class StateFunctions:
         """
         return self.function("inverse_dynamics_derivatives")
 
-    def function(self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None) -> Callable:
+    def function(
+        self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None, device: str | None = None
+    ) -> Callable:
         """Compiled function of a state; several names give one function of all, which computes common operations once.
 
         Parameters
         ----------
         *names : str
             Names of these functions, "inverse_dynamics" or "loop_constraints"; those of frames with the frame, as in
-            "jacobian:hand".
+            "jacobian:hand". "forward_dynamics" alone.
         reference : str
             Axes and point of Jacobians: "local_world_aligned", "world" or "local".
         independent : sequence of str, optional
             Joints, or rates such as "U.angle1", as many as degrees of freedom: terms projected on the constraints.
+        device : str, optional
+            "cuda" or "cuda:1": a GPU, a state in a thread; "lanes": the same code on this CPU. The function takes batches
+            of this process, and returns such; of arrays on the GPU (torch, CuPy, JAX) it reads and returns others, without
+            a copy.
 
         Returns
         -------
@@ -202,7 +208,7 @@ class StateFunctions:
         StateError
             If there is no such frame or joint, or the coordinates cannot be independent.
         """
-        return self.mechanics.function(self, names, reference, independent)  # type: ignore[attr-defined]  # of System
+        return self.mechanics.function(self, names, reference, independent, device)  # type: ignore[attr-defined]  # of System
 
     def evaluate(
         self,

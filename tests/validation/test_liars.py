@@ -3,20 +3,22 @@
 ``python -m tests.validation.test_liars 10000`` tells as many lies, and counts what became of them.
 """
 
+import contextlib
 import sys
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import gauss
 from gauss.backends import Answer, make
 from gauss.backends.certificate import TOLERANCE
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.factorisation import factored
-from gauss.backends.programme import Outcome, Programmed
+from gauss.backends.programme import FORMS, Outcome, Programmed
 from gauss.bench.problems import make_problem
 from gauss.system import random_state
 from tests.support import mechanisms
@@ -359,6 +361,38 @@ def test_workspaces_that_are_written_again_change_no_solution(cases):
     solution = gauss.solve(compulsion, Telling(answer))
     answer.a[:], answer.multipliers[:] = np.nan, np.nan
     assert np.isfinite(solution.a).all() and np.isfinite(solution.multipliers).all()
+
+
+def written_over(holder, seen: set[int]):
+    """Write to every array that can be reached from an object, as far as that is possible."""
+    if id(holder) in seen:
+        return
+    seen.add(id(holder))
+    if isinstance(holder, np.ndarray):
+        with contextlib.suppress(ValueError):
+            holder[...] = 7
+    elif is_dataclass(holder) or sparse.issparse(holder):
+        written_over(list(vars(holder).values()), seen)
+    elif isinstance(holder, list | tuple | dict):
+        for part in holder.values() if isinstance(holder, dict) else holder:
+            written_over(part, seen)
+
+
+def writing(given):
+    written_over(given, set())
+    raise RuntimeError("done")
+
+
+@pytest.mark.parametrize("backend", [Telling(writing), *(Programmed(Solving(writing), form) for form in FORMS)])
+@pytest.mark.parametrize("scene", ["four_bar", "box_on_plane_4"])
+def test_what_a_backend_writes_to_spoils_nothing(scene, backend):
+    """Neither the system, for later calls, nor the compulsion that the answer is certified for, nor what is kept."""
+    system = gauss.compile_scene(gauss.load(scene))
+    compulsion, later = (gauss.assemble(system, system.initial_state()) for _ in range(2))
+    right = gauss.solve(later)
+    assert "done" in str(gauss.solve(compulsion, backend).status)
+    for found in (gauss.solve(compulsion), gauss.solve(gauss.assemble(system, system.initial_state()))):
+        assert str(found.status) == "solved" and np.array_equal(found.qdd, right.qdd) and np.array_equal(found.a, right.a)
 
 
 if __name__ == "__main__":

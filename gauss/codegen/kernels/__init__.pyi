@@ -19,6 +19,7 @@ from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, Fixe
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
+from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
 from gauss.codegen.kernels.taylor import TaylorStep
 from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
 
@@ -47,6 +48,8 @@ __all__ = [
     "Loop",
     "FixedStepBatchLoop",
     "RecordedCalls",
+    "RecordedSections",
+    "SectionCode",
     "Newton",
     "FirstAccepted",
     "Pivots",

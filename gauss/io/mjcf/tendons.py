@@ -69,6 +69,9 @@ def _add_armature(scene: Scene, name: str, path: TendonPath, inertia: float):
         joint, factor = next(iter(path.terms.items()))
         scene.couple(f"armature of {name}", shaft, joint, factor)
         return
+    if path.is_fixed:
+        scene.linear_coupling(f"armature of {name}", path.terms | {shaft: -1.0}, 0.0)
+        return
     scene.constrain(f"armature of {name}", lambda at: path.length(at) - path.rest - at.coordinate(shaft))
 
 
@@ -109,4 +112,4 @@ def couple_coordinates(scene: Scene, name: str, terms: list[tuple[str, float]], 
     elif len(terms) == 2:
         scene.couple(name, first, terms[1][0], -terms[1][1] / factor, constant / factor)
     else:
-        scene.constrain(name, lambda at: sum(factor * at.coordinate(joint) for joint, factor in terms) - constant)
+        scene.linear_coupling(name, dict(terms), constant)

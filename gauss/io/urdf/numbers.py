@@ -30,6 +30,7 @@ COUNTS = {  # how many numbers an attribute holds, by element
     "capsule": {"radius": 1, "length": 1},
     "mesh": {"scale": 3},
     "color": {"rgba": 4},
+    "ratio": {"value": 1},
 }
 REQUIRED = {"mass", "inertia", "axis", "sphere", "box", "cylinder", "capsule"}  # elements that need all of these attributes
 EXACT = {"origin", "mass", "inertia", "mimic"}  # elements in which another attribute is a misspelt one
@@ -37,6 +38,7 @@ EXACT = {"origin", "mass", "inertia", "mimic"}  # elements in which another attr
 KEPT_BACK = {"limit", "dynamics", "mimic", "calibration", "safety_controller", "collision"}
 IDLE = {"lower": "0", "upper": "0", "effort": "0", "velocity": "0"}
 PARTS = {"link": ("inertial", "visual", "collision"), "joint": tuple(COUNTS), "material": ("color",)}
+PLUS = ("loop", "coupling")  # of URDF+, read here
 LIMITED = ("revolute", "prismatic")  # joints that the parser wants limits of
 
 
@@ -59,6 +61,7 @@ def for_parser(source: Source) -> str:
             written[:] = [child for child in written if child.tag not in KEPT_BACK]
         if written.tag == "joint" and written.get("type") in LIMITED:
             written.append(Element("limit", IDLE))
+    root[:] = [element for element in root if element.tag not in PLUS]
     return ElementTree.tostring(root, encoding="unicode")
 
 
