@@ -131,7 +131,7 @@ class CompiledRun:
         """Rates by the certified recursion; the power of the inputs is counted."""
         if self.input_forces is None:
             return self.certified.rates(self.system, state)
-        load = self.input_forces.forces(inputs)
+        load = self.input_forces.forces(inputs, state)
         found = self.certified.rates(self.system, state, load)
         return found._replace(power=found.power + np.array([load @ state.v, 0.0, 0.0]))
 
