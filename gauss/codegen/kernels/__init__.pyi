@@ -23,8 +23,10 @@ from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
+from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
 from gauss.codegen.kernels.taylor import TaylorStep
 from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
 
@@ -53,6 +55,9 @@ __all__ = [
     "Loop",
     "FixedStepBatchLoop",
     "RecordedCalls",
+    "RecordedSections",
+    "SectionCode",
+    "NearPairs",
     "Newton",
     "FirstAccepted",
     "Pivots",
