@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.dynamics.laws.switching_times import NO_TIMES
+from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.errors import LinkageError, SimulationError, SwitchingWarning, user_level
 from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.chain import Chain
-from gauss.linkages.crank_motion import motor_times, solved
+from gauss.linkages.crank_motion import CrankMotion, motor_times, solved
 from gauss.linkages.crank_ranges import closing_ranges, follow, near
 from gauss.linkages.elements import CrankMotor
 from gauss.linkages.kernels import reduced_kernel
@@ -154,17 +154,14 @@ def run(
     def rates(t, y):
         return [y[1], equation.acceleration(y[0], y[1], motor(t, y[0], y[1]))]
 
-    opaque = not isinstance(motor, CrankMotor)
-    times = motor_times(motor, start, duration, breaks) if opaque else NO_TIMES
-    for text in times.limitations:
-        warnings.warn(f"{chain.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
-    largest = np.inf if step is None else float(step)
+    options = {"rtol": rtol, "atol": absolute, "largest": np.inf if step is None else float(step)}
+    switches = NO_TIMES if isinstance(motor, CrankMotor) else motor_times(motor, start, duration, breaks)
     try:
-        found = solved(rates, start, samples, duration, times, rtol=rtol, atol=absolute, largest=largest)
+        found = solved(rates, start, samples, duration, switches, **options)
     except SimulationError as error:
         raise SimulationError(f"{chain.name}: {error}") from error
-    if opaque and found.longest > SPARSE_STEP * duration:
-        warn_of_opaque(chain.name, "the motor", "step=")
+    if not isinstance(motor, CrankMotor):
+        _warn_of_motor(chain, switches, found, duration)
     angles, speeds = found.y.T.copy()
     torques = np.array([motor(*state) for state in zip(found.t, angles, speeds, strict=True)], dtype=float)
     accelerations = [equation.acceleration(*state) for state in zip(angles, speeds, torques, strict=True)]
@@ -173,6 +170,14 @@ def run(
         found.interruption.trajectory = made  # type: ignore[attr-defined]  # kept on the interruption for the caller
         raise found.interruption
     return made
+
+
+def _warn_of_motor(chain: Chain, switches: Timetable, found: CrankMotion, duration: float) -> None:
+    """Warn of features of the law of a motor that are not resolved, and of one that was evaluated at few points."""
+    for text in switches.limitations:
+        warnings.warn(f"{chain.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
+    if found.longest > SPARSE_STEP * duration:
+        warn_of_opaque(chain.name, "the motor", "step=")
 
 
 def _check_settings(duration: float, rtol: float, atol: float | None, step: float | None, added_inertia: float) -> None:
