@@ -11,12 +11,11 @@ END = 1.0
 def _reached(pace) -> float:
     """Time at which a run is stopped, or the end; ``pace`` is the progress in a window of evaluations, from a time."""
     monitor, t = _StallMonitor(0.0, END), 0.0
-    monitor.calls = -1
-    while t < END:
-        monitor.calls += STALL_WINDOW - 1  # the evaluations between
-        if monitor.stalls(t):
-            break
+    for _ in range(100_000):
         t += pace(t)
+        monitor.calls += STALL_WINDOW - 1  # the other evaluations of the window
+        if t >= END or monitor.stalls(t):
+            break
     return min(t, END)
 
 
