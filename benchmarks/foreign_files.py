@@ -6,8 +6,8 @@ Run it with:
 
 Each folder holds a copy of a public source, as a wheel of the Python package index unpacked (gymnasium, gymnasium-robotics,
 dm_control, brax, robosuite) or a checkout (google-deepmind/mujoco, gazebosim/gz-sim, gazebosim/sdformat). It is the root
-folder of its files. Files that MuJoCo itself refuses, that hold flexible bodies or plugins, or where nothing moves are counted
-apart. Accelerations are compared at random states without contacts, limits and friction.
+folder of its files. Files that MuJoCo itself refuses, that hold flexible bodies or plugins, or where nothing moves, are
+counted apart. Accelerations are compared at random states without contacts, limits and friction.
 """
 
 import argparse

@@ -12,8 +12,8 @@ from gauss.bench.markdown import table
 
 COMPARED = ("backend", "called through", "matrices", "the library reports", "promised", "settings")
 NOTES = {
-    "ecos": "ECOS measures its residuals on the cone programme that it gets, the epigraph of the objective; it is held to those "
-    "of the problem itself.",
+    "ecos": "ECOS measures its residuals on the cone programme that it gets, the epigraph of the objective; it is held to "
+    "those of the problem itself.",
     "highs": "HiGHS regularises every problem by default, which its claim of stationarity does not count.",
     "jaxopt_osqp": "jaxopt's OSQP and qpax compile in the first call for a problem, which is their cold call.",
 }

@@ -183,23 +183,9 @@ def takes_pair_kernels(ask: Question) -> list[str]:
         return found
     if not system.Phi.any() or system.dynamics is None:
         found.append("it was built without machine code")
-    n_v, closing = system.n_v, _loop_joints(system)
+    n_v = system.n_v
     found += [f"{n_v} rates beside contacts are more than {WIDEST_MECHANISM}"] if n_v > WIDEST_MECHANISM else []
-    found += [f"{load!r} acts on joints that close loops" for load in _acting_on(scene, closing)]
     return found + (["a constraint depends on the time"] if system.relations.asks_time else [])
-
-
-def _loop_joints(system: System) -> set[str]:
-    """Names of the joints outside the spanning tree."""
-    in_tree = {edge.constraint for edge in system.structure.tree}
-    return {joint.name for k, joint in enumerate(system.joints) if k not in in_tree}
-
-
-def _acting_on(scene, joints: set[str]) -> list[str]:
-    """Loads, stops and friction of some joints."""
-    elements = {**scene.loads, **scene.contacts, **scene.set_valued, **scene.inputs}
-    acted = {name: str(getattr(one, "joint", "")) for name, one in elements.items()}
-    return [name for name, joint in acted.items() if joints & {joint, joint.rpartition(".")[0]}]
 
 
 def are_free_in_contact(system: System) -> bool:

@@ -17,6 +17,7 @@ from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
 from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
@@ -50,6 +51,7 @@ __all__ = [
     "RecordedCalls",
     "RecordedSections",
     "SectionCode",
+    "NearPairs",
     "Newton",
     "FirstAccepted",
     "Pivots",

@@ -33,7 +33,9 @@ from gauss.dynamics.contact.moreau_step import (
     is_impact,
     least_rate,
 )
-from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts
+from gauss.dynamics.contact.near_contacts import NearContacts
+from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.paradox import Paradox, sliding, sliding_above, undetermined_sliding
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale, centrifugal_scale
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
@@ -65,6 +67,8 @@ class MechanismStep(NamedTuple):
         Mean power of drives, of forces on bodies, and of dissipation [W].
     error : float or None
         Error of the laws in units of the scene; None for the convex relaxation.
+    paradoxes : list of Paradox
+        Contacts with undetermined forces.
     """
 
     q: np.ndarray
@@ -74,6 +78,7 @@ class MechanismStep(NamedTuple):
     others: np.ndarray
     power: np.ndarray
     error: float | None
+    paradoxes: list[Paradox]
 
 
 class _FreeStep(NamedTuple):
@@ -118,7 +123,7 @@ class MechanismStepper:
         self.n = len(carriers)
         places = {body: k for k, body in enumerate(carriers)}
         self.table.body = np.array([places.get(int(body), self.n) for body in self.table.body], dtype=np.int64)
-        self.detection = ContactDetection(self.table, system.scale.length)
+        self.detection = NearDetection(self.table, self.n + 1, system.scale.length)
         self.reach = np.zeros(self.n + 1)
         np.maximum.at(self.reach, self.table.body, self.table.length)
         self.ground = np.concatenate([np.eye(3).ravel(), np.zeros(15)])[:, None]
@@ -146,6 +151,7 @@ class MechanismStepper:
         self.other_restitution = np.array([side.whole.restitution for side in self.others])
         self.restitution = np.concatenate([self.table.restitution, self.other_restitution])
         elements = cast(list[JointDryFriction], [*scene.set_valued.values()])  # others are refused
+        self.coefficients = np.unique(self.restitution)
         self.limit = np.array([element.limit for element in elements]) / self.set_unit
         self.lossy = np.array([element.lossy for element in elements], dtype=bool)
 
@@ -180,6 +186,7 @@ class MechanismStepper:
 
     def forget(self):
         """Forget the forces of the last step: a new motion begins."""
+        self.detection.connect()
         self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(len(self.others) + self.limit.size)
 
     def step(self, state: State, h: float) -> MechanismStep:
@@ -217,7 +224,8 @@ class MechanismStepper:
         power = begun.power + np.array([work[~lossy].sum(), 0.0, -work[lossy].sum()])
         contacts, others = self._split(rows, near, force * rows.unit)
         self._keep(near, contacts, others)
-        return MechanismStep(q, v, near, contacts, others, power, error)
+        paradoxes = self._paradoxes(state, rows, begun, near, force)
+        return MechanismStep(q, v, near, contacts, others, power, error, paradoxes)
 
     def _begin(self, state: State, h: float, share: float) -> _FreeStep:
         kernels, t = self.kernels, state.t + share * h
@@ -232,20 +240,19 @@ class MechanismStepper:
 
     def _compliance(self, terms: MechanismTerms) -> tuple[np.ndarray, np.ndarray]:
         """Compliance H (n_v, n_v), and accelerations (n_v,) by the biases of loops."""
-        M = terms.M + np.tril(terms.M, -1).T
+        M = terms.M
         if self.free_columns is not None:
             N = self.free_columns
             return N @ np.linalg.inv(N.T @ M @ N) @ N.T, np.zeros(len(M))
         tree = M.diagonal() > 0.0
         H = np.zeros_like(M)
         H[np.ix_(tree, tree)] = np.linalg.inv(M[np.ix_(tree, tree)])
-        if not terms.gamma.size:
-            return H, np.zeros(len(M))
         Y = H @ terms.G.T
         S = terms.G @ Y
-        scale = 1.0 / np.sqrt(S.diagonal())
+        sizes = S.diagonal()
+        scale = 1.0 / np.sqrt(np.maximum(sizes, REDUNDANT_LOOPS * sizes.max()))
         P = scale[:, None] * np.linalg.pinv(scale[:, None] * S * scale, rcond=REDUNDANT_LOOPS, hermitian=True) * scale
-        return H - Y @ P @ Y.T, Y @ (P @ terms.gamma)
+        return terms.B @ (H - Y @ P @ Y.T) @ terms.B.T, terms.B @ (Y @ (P @ terms.gamma)) + terms.beta
 
     def _speed(self, begun: _FreeStep, v: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
@@ -259,7 +266,7 @@ class MechanismStepper:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         bodies = np.concatenate([begun.terms.bodies, self.ground], axis=1)
-        near, overlaps = self.detection.find(self.table.poses(bodies), bodies[9:12], reach, UNSEEN_OVERLAP)
+        near, overlaps = self.detection.find(bodies, reach, UNSEEN_OVERLAP)
         if overlaps:
             law, depth = overlaps[0]
             raise SimulationError(
@@ -310,8 +317,8 @@ class MechanismStepper:
         if not n:
             return np.zeros(0), np.zeros(begun.acceleration.size), 0.0
         after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
-        for e in np.unique(rows.restitution):
-            mine = np.flatnonzero(rows.restitution == e)
+        for e in self.coefficients:
+            mine = slice(0, m) if len(self.coefficients) == 1 else np.flatnonzero(rows.restitution == e)
             after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], float(e), h, rest, share)
         force, scale = self._start(near, rows), 1.0 + np.abs(rows.rate).max(initial=0.0)
         active = (after[:m] < 0.0) | (force[:m] > 0.0)
@@ -355,6 +362,23 @@ class MechanismStepper:
         if held.size:
             names = [self._name(near, int(k)) for k in held]
             raise jammed_error(f"t = {state.t:.6g} s", names, float((-after / rows.unit)[held].max()))
+
+    def _paradoxes(self, state: State, rows: _StepRows, begun: _FreeStep, near: NearContacts, force) -> list[Paradox]:
+        """Painlevé's paradoxes of the closed contacts."""
+        if not rows.rough.size:
+            return []
+        m, length, time = rows.gap.size, self.system.scale.length, self.system.scale.time
+        slow = sliding_above(self.system, state.v) * time / length
+        across = m + np.arange(2 * rows.rough.size).reshape(-1, 2)
+        which = sliding(rows.rate[across], force[rows.rough] > 0.0, slow)
+        if not which.size:
+            return []
+        normal, across = rows.rough[which], across[which]
+        responses = rows.K[normal] @ begun.H
+        smooth, sideways = responses @ rows.K[normal].T, (responses @ rows.K[across.ravel()].T).reshape(which.size, -1, 2)
+        b = rows.K[normal] @ begun.acceleration + rows.bias[normal]
+        names = [self._name(near, int(row)) for row in normal]
+        return undetermined_sliding(names, rows.friction[which], rows.rate[across], smooth, sideways, b)
 
     def _name(self, near: NearContacts, row: int) -> str:
         """Name of the gap of a row."""

@@ -28,7 +28,7 @@ from gauss.dynamics.contact.paradox import (
     Paradox,
     sliding,
     sliding_above,
-    undetermined,
+    undetermined_sliding,
     with_sliding_friction,
 )
 from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
@@ -329,11 +329,10 @@ class MoreauStepper:
             return []
         normal = np.searchsorted(rows, laws.under[which])
         across = np.searchsorted(rows, laws.across[which])
-        against = -rates[which] / np.hypot(*rates[which].T)[:, None]
         smooth, sideways = A[np.ix_(normal, normal)], A[normal][:, across]
-        K = with_sliding_friction(smooth, sideways[:, :, 0], sideways[:, :, 1], laws.friction[which], *against.T)
         b = (touch.J @ free.acceleration + touch.bias)[laws.under[which]]
-        return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
+        names = [self.names[i] for i in laws.under[which]]
+        return undetermined_sliding(names, laws.friction[which], rates[which], smooth, sideways, b)
 
 
 def advance_positions(system: System, state: State, h, share) -> State:
