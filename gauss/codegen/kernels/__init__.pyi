@@ -17,6 +17,7 @@ from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
@@ -49,6 +50,8 @@ __all__ = [
     "FixedStepBatchLoop",
     "RecordedCalls",
     "NearPairs",
+    "CompiledMechanismStep",
+    "StepFunctions",
     "Newton",
     "FirstAccepted",
     "Pivots",
