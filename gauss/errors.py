@@ -57,6 +57,10 @@ class BackendError(GaussError, ValueError):
     """A backend does not exist, is not installed, or does not take this problem."""
 
 
+class DeviceError(GaussError, RuntimeError):
+    """A device does not exist, its driver is missing, or it cannot run a function."""
+
+
 class SimulationError(GaussError, RuntimeError):
     """A simulation cannot go on; ``trajectory`` holds what was computed so far.
 
@@ -97,8 +101,12 @@ class NotImportedWarning(UserWarning):
     """A file has entries that were not read."""
 
 
+class UnphysicalInertiaWarning(UserWarning):
+    """A file has inertias that no body can have, which were taken as given."""
+
+
 class StartWarning(UserWarning):
-    """A joint starts beyond its limits, or at an angle that was probably meant in degrees."""
+    """A joint starts beyond its limits, at an angle that was probably meant in degrees, or not where it was told to."""
 
 
 class InconsistentConstraintsWarning(UserWarning):

@@ -28,7 +28,6 @@ from benchmarks.latency.scenes import scenes
 from gauss.bench.machine import header
 from gauss.codegen.machine import width
 from gauss.io.urdf.robots import robot
-from gauss.versions import version_of
 
 ROOT = Path(__file__).parent.parent.parent
 TIMEOUT = 300  # s of wall time for one process
@@ -59,7 +58,7 @@ def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
             {"scene": name, "answer": "process", "cache": "", "round": number, "first": _process(script)}
             for name, script in ({} if only else SCALE).items()
         ]
-    conditions = [*header("numpy", "llvmlite", "pin"), f"gauss {version_of('gauss-dynamics', 'from its sources')}"]
+    conditions = header("numpy", "llvmlite", "pin")
     return rows, [*conditions, f"vectors of {width()} doubles"]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.consistent_states import NEWTON_STEPS, RESIDUAL_TOLERANCE
+from gauss.dynamics.assembly_search import NEWTON_STEPS, RESIDUAL_TOLERANCE
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.projection import (

@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.dynamics.assemble import position_residual
+from gauss.dynamics.assembly_search import RESIDUAL_TOLERANCE, SPREAD, AssembledPose, assembled
 from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import (
     fixed_columns,
     limits,
+    newton_step,
     position_residual_of,
     project_positions,
     project_rates,
@@ -20,14 +22,12 @@ from gauss.dynamics.projection import (
     velocity_residual_of,
     within_limits,
 )
-from gauss.errors import AssemblyError, InconsistentConstraintsWarning
-from gauss.system import State, System, retract
+from gauss.errors import AssemblyError, InconsistentConstraintsWarning, StartWarning, user_level
+from gauss.system import State, System
 
-RESIDUAL_TOLERANCE = 1e-10  # residual relative to the scales of the rows of a consistent state
+SHOWN = 4  # constraints or joints that a message names before it counts
+STATIONARY = 0.1  # share of a residual that no small motion of the joints takes away
 TYPED_DIGITS_RESIDUAL = 1e-6  # the same of redundant constraints with numbers of 7 digits
-NEWTON_STEPS = 60
-RESTARTS = 6
-SPREAD = 2.0  # rad and lengths of the scene: largest distance of a restart from the guess
 
 
 def consistent(
@@ -61,21 +61,31 @@ def consistent(
     if not system.has_closures:
         return state
     columns = fixed_columns(system, kept)
-    if columns:
-        found = project_rates(system, _assembled(system, state, columns, required), columns)
-        if _is_met(system, found) and _keeps(system, state, found, columns):
-            return found
-        if required:
-            if not least_violation:
-                _check_start(system, found, _while_kept(kept))
-            return found
-    found = project_rates(system, _assembled(system, state, [], rough or _is_free(system, state, columns)))
-    if columns and not _is_met(system, found):
-        other = project_rates(system, _assembled(system, state, columns, True), columns)
-        if _is_met(system, other):
-            return other
+    if not columns:
+        return _moved_freely(system, state, kept, rough, least_violation, columns)
+    pose = assembled(system, state, columns, required)
+    found = project_rates(system, pose.state, columns)
+    if _is_met(system, found) and _keeps(system, state, found, columns):
+        return found
+    if not required:
+        return _moved_freely(system, state, kept, rough, least_violation, columns)
     if not least_violation:
-        _check_start(system, found, "from this start")
+        _check_start(system, found, _while_kept(kept), pose)
+    return found
+
+
+def _moved_freely(system: System, state: State, kept, rough: bool, least_violation: bool, columns) -> State:
+    """State near a guess in which every coordinate may change, those to be kept, too."""
+    pose = assembled(system, state, [], rough or _is_free(system, state, columns))
+    found = project_rates(system, pose.state)
+    if columns and not _is_met(system, found):
+        other_pose = assembled(system, state, columns, True)
+        other = project_rates(system, other_pose.state, columns)
+        if _is_met(system, other):
+            pose, found = other_pose, other
+    if not least_violation:
+        _check_start(system, found, "from this start", pose)
+        _warn_of_changes(system, state, found, kept, rough and pose.starts > 0)
     return found
 
 
@@ -86,6 +96,41 @@ def _while_kept(kept) -> str:
 def _is_free(system: System, state: State, held) -> bool:
     """Whether no coordinates are given: only then random restarts are allowed."""
     return not held and np.array_equal(state.q, system.reference.q)
+
+
+def changed_starts(system: System, given: State, found: State, kept) -> dict[str, str]:
+    """Joints, or single rates of joints, whose coordinates or rates are no longer the given ones, with both in words."""
+    changed, scale = {}, system.scale
+    for name in kept:
+        columns = fixed_columns(system, [name])
+        pairs = [(scalar_coordinates(system, state)[columns], state.v[columns]) for state in (given, found)]
+        (q, v), (q_found, v_found) = pairs
+        units = scale.coordinates[columns]
+        off = (np.abs(q - q_found) / units).max(initial=0.0), (np.abs(v - v_found) / units).max(initial=0.0)
+        if off[0] > TYPED_DIGITS_RESIDUAL:
+            changed[name] = f"{name!r} from {_numbers(q)} to {_numbers(q_found)}"
+        elif off[1] > TYPED_DIGITS_RESIDUAL * scale.fastest(given.v):
+            changed[name] = f"the rate of {name!r} from {_numbers(v)} to {_numbers(v_found)}"
+    return changed
+
+
+def _warn_of_changes(system: System, given: State, found: State, kept, is_elsewhere: bool):
+    """Warn of starts that were changed, and of a pose that no path from the given one leads to."""
+    changed = changed_starts(system, given, found, kept)
+    if changed:
+        words = ", ".join(list(changed.values())[:SHOWN]) + (
+            f" and {len(changed) - SHOWN} more" if len(changed) > SHOWN else ""
+        )
+        message = f"the constraints cannot be met with the given start: it was changed, {words}."
+    elif is_elsewhere:
+        message = "the constraints cannot be met near the given coordinates: the start is another assembled pose."
+    else:
+        return
+    warnings.warn(message, StartWarning, stacklevel=user_level())
+
+
+def _numbers(values) -> str:
+    return " ".join(f"{value:.6g}" for value in values)
 
 
 def project(system: System, state: State) -> State:
@@ -111,26 +156,6 @@ def violations(system: System, state: State) -> dict[str, str]:
     return {name: words for name, (_, words) in sorted(found.items(), key=lambda item: -item[1][0])}
 
 
-def _assembled(system: System, state: State, held, restart: bool) -> State:
-    """Pose by projection of the guess; by random restarts at growing distances where that fails."""
-    best = project_positions(system, state, NEWTON_STEPS, held)
-    smallest = relative(system, position_residual_of(system, best))
-    if not restart or smallest <= RESIDUAL_TOLERANCE:
-        return best
-    rng, free = np.random.default_rng(0), np.ones(system.n_v)
-    free[list(held)] = 0.0
-    for k in range(RESTARTS):
-        away = free * rng.uniform(-1.0, 1.0, system.n_v) * SPREAD * (k + 1) / RESTARTS
-        moved = within_limits(system, replace(state, q=retract(system, state.q, away * system.scale.coordinates)))
-        found = project_positions(system, moved, NEWTON_STEPS, held)
-        size = relative(system, position_residual_of(system, found))
-        if size < smallest:
-            best, smallest = found, size
-        if smallest <= RESIDUAL_TOLERANCE:
-            break
-    return best
-
-
 def _is_met(system: System, state: State) -> bool:
     return not violations(system, state)
 
@@ -147,13 +172,13 @@ def _keeps(system: System, start: State, kept: State, held) -> bool:
     return max([moved, *turned]) <= RESIDUAL_TOLERANCE and slowed <= RESIDUAL_TOLERANCE * scale.fastest(start.v)
 
 
-def _check_start(system: System, state: State, where: str):
+def _check_start(system: System, state: State, where: str, pose: AssembledPose):
     """Refuse a state that violates its constraints; warn if the residual is that of numbers with few digits."""
     found = violations(system, state)
     if not found:
         return
-    words = "; ".join(f"{name!r} {amount}" for name, amount in list(found.items())[:4])
-    more = f" and {len(found) - 4} more" if len(found) > 4 else ""
+    words = "; ".join(f"{name!r} {amount}" for name, amount in list(found.items())[:SHOWN])
+    more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
     phi = relative(system, position_residual_of(system, state))
     if (
         max(phi, relative_velocity_residual(system, velocity_residual_of(system, kinematics(system, state)), state.v))
@@ -171,8 +196,22 @@ def _check_start(system: System, state: State, where: str):
     at_limit = _at_limits(system, state)
     if at_limit:
         message += f"At a limit: {', '.join(at_limit)}. "
+    message += _against(system, pose)
     message += "Check the lengths and frames of its loop, or start nearer to an assembled pose."
     raise AssemblyError(message, state, found)
+
+
+def _against(system: System, pose: AssembledPose) -> str:
+    """What stands against the assembly: starts that were tried in vain, directions in which the loops cannot move."""
+    words = f"So it is from {pose.starts} other starts, up to {SPREAD:g} rad away. " if pose.starts else ""
+    if pose.is_met:
+        return words
+    phi = position_residual_of(system, pose.state)
+    step = newton_step(system, pose.state, phi, (), *limits(system))
+    left = relative(system, phi + velocity_residual_of(system, kinematics(system, replace(pose.state, v=step))))
+    if left > STATIONARY * pose.residual:
+        words += f"No motion of the joints reduces {left / pose.residual:.0%} of the residual: the chain does not reach. "
+    return words
 
 
 def _at_limits(system: System, state: State) -> list[str]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.consistent_states import consistent, violations
+from gauss.dynamics.consistent_states import changed_starts, consistent, violations
 from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -30,7 +30,8 @@ def scene_start(system: System) -> State:
 
     def make() -> tuple[State, bool]:
         found.append(find())
-        return found[0], not violations(system, found[0])
+        given = within_limits(system, system.start())
+        return found[0], not (violations(system, found[0]) or changed_starts(system, given, found[0], system.scene.starts))
 
     state, is_met = cached_on_disk(system, (scene_start,), make)
     if not (found or is_met):

@@ -13,8 +13,9 @@ events              compiled        unilateral constraints, joint friction, limi
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
+compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
-Python loop         call graph      many kinematic loops
+Python loop         call graph      many kinematic loops with opaque laws
 Python loop         tree recursion  large trees with opaque laws
 Python loop         compiled        opaque laws, and systems too large for a compiled step
 library             certified       all other scenes, by integrators of other libraries
@@ -116,7 +117,7 @@ _STEP = own_backend, smooth(compilable), smooth(few_bodies), *_FEW_CONTACTS, smo
 _PAIR_KERNELS = own_backend, no_held_inputs, smooth(traced_laws), takes_pair_kernels
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
-_TREE_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
+_KERNEL_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
 
 MOTIONS = RuleTable(
     (
@@ -129,7 +130,8 @@ MOTIONS = RuleTable(
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
         Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _LOOP),
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _LOOP),
-        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _TREE_LOOP),
+        Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
+        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _KERNEL_LOOP),
         Rule("samples", "compiled", "certified", _both(_held, _by_accelerations)),
         Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
@@ -139,10 +141,17 @@ MOTIONS = RuleTable(
     ),
     _refused,
 )
+TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 # Batches (ensembles) of motions of one system.
 BATCHES = RuleTable(
-    (Rule("batch", "compiled", "simulate", conditions=(compilable, few_bodies, traced_laws)),),
-    lambda ask, why: f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use simulate for each motion.",
+    (
+        Rule("batch", "compiled", "simulate", is_time_stepping, _STEP),
+        Rule("batch", "compiled", "simulate", lambda ask: not is_time_stepping(ask), (compilable, few_bodies, traced_laws)),
+    ),
+    lambda ask, why: (
+        f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use "
+        f"{TIME_STEPPING_FIRST if _is_nonsmooth(ask) else ''}simulate for each motion."
+    ),
 )
 
 

@@ -32,10 +32,10 @@ def project_positions(system: System, state: State, steps: int, held=()) -> Stat
         size = relative(system, phi)
         if size <= RESIDUAL_ROUNDOFF or share < LEAST_DAMPING:
             break
-        step = _step(system, state, phi, held, lowest, highest)
+        step = newton_step(system, state, phi, held, lowest, highest)
         share = 1.0
         while share >= LEAST_DAMPING:
-            trial = _clipped(system, replace(state, q=retract(system, state.q, share * step)), lowest, highest)
+            trial = clipped(system, replace(state, q=retract(system, state.q, share * step)), lowest, highest)
             trial_phi = position_residual_of(system, trial)
             if relative(system, trial_phi) < size:
                 state, phi = trial, trial_phi
@@ -90,7 +90,7 @@ def limits(system: System) -> tuple[np.ndarray, np.ndarray]:
     return lowest, highest
 
 
-def _step(system: System, state: State, phi, held, lowest, highest) -> np.ndarray:
+def newton_step(system: System, state: State, phi, held, lowest, highest) -> np.ndarray:
     """Gauss–Newton step on the position residual that crosses no active limit."""
     motion = kinematics(system, state)
     compulsion = assemble_motion(motion, Applied(motion, ()))
@@ -113,7 +113,8 @@ def scalar_coordinates(system: System, state: State) -> np.ndarray:
     return plain
 
 
-def _clipped(system: System, state: State, lowest, highest) -> State:
+def clipped(system: System, state: State, lowest, highest) -> State:
+    """State with every coordinate clipped to its limits (n_v,)."""
     if not (np.isfinite(lowest).any() or np.isfinite(highest).any()):
         return state
     q = state.q.copy()
@@ -125,7 +126,7 @@ def _clipped(system: System, state: State, lowest, highest) -> State:
 
 def within_limits(system: System, state: State) -> State:
     """State with every coordinate clipped to the limits of its joint."""
-    return _clipped(system, state, *limits(system))
+    return clipped(system, state, *limits(system))
 
 
 def position_residual_of(system: System, state: State) -> np.ndarray:

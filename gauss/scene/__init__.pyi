@@ -17,7 +17,7 @@ from gauss.scene.relation import Constraint, Relation
 from gauss.scene.rolling import KnifeEdge, Rolling
 from gauss.scene.scene import GROUND, Scene
 from gauss.scene.set_valued import JointDryFriction, JointFriction, LimitedDrive, SetValued, Slipping
-from gauss.scene.transmissions import Cam, Transmission
+from gauss.scene.transmissions import Cam, LinearCoupling, Transmission
 from gauss.scene.unilateral import ClosedGap, OneSidedConstraint, Rope, Stop, Unilateral
 
 __all__ = [
@@ -57,6 +57,7 @@ __all__ = [
     "JointSpring",
     "KnifeEdge",
     "LimitedDrive",
+    "LinearCoupling",
     "LossyGear",
     "OnCurve",
     "OnLine",

@@ -1,6 +1,7 @@
 """Rigid bodies, by mass, centre of mass and inertia tensor, and named frames on them."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,9 @@ class Body:
         A rotation is (roll, pitch, yaw) [rad], a quaternion (w, x, y, z) or a matrix.
     on : str
         Body whose frame ``position`` and ``rotation`` refer to.
+    inertia_as_given : bool
+        Whether moments that no body can have are taken: that violate the triangle inequality, or stand without mass. The
+        accelerations of a model with such data are those of its equations, not of a mechanism.
 
     Raises
     ------
@@ -50,6 +54,7 @@ class Body:
     position: tuple = (0.0, 0.0, 0.0)
     rotation: tuple = (0.0, 0.0, 0.0)
     on: str = "ground"
+    inertia_as_given: bool = False
 
     def __post_init__(self):
         """Check every value and keep plain tuples."""
@@ -63,7 +68,11 @@ class Body:
             "inertia": _inertia(self.inertia, f"{what}: inertia"),
         }
         values.keep(self, **keep)
-        _check_physical(what, self.mass, principal_axes(_tensor(self.inertia))[0])
+        if type(self.inertia_as_given) is not bool:
+            raise SceneError(f"{what}: inertia_as_given must be true or false, got {self.inertia_as_given!r}.")
+        found = unphysical(self.mass, self.inertia)
+        if found is not None and (found.impossible or not self.inertia_as_given):
+            raise SceneError(f"{what}: {found.words}")
 
     def principal(self) -> tuple[np.ndarray, np.ndarray]:
         """Principal central inertias J (3,) [kg m²] and the rotation R_bz of their axes in the body frame."""
@@ -127,15 +136,40 @@ def _tensor(entries: tuple) -> np.ndarray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _check_physical(what: str, mass: float, J: np.ndarray):
+class Unphysical(NamedTuple):
+    """Why no body has some mass and inertia.
+
+    Attributes
+    ----------
+    kind : str
+        "negative", "triangle" or "no mass".
+    words : str
+        In words, with the remedy.
+    """
+
+    kind: str
+    words: str
+
+    @property
+    def impossible(self) -> bool:
+        """Whether it cannot be taken as given either."""
+        return self.kind == "negative"
+
+
+def unphysical(mass: float, inertia: tuple) -> Unphysical | None:
+    """Why no body has this mass [kg] and inertia [kg m²], as of :class:`Body`; None if one may."""
+    J = principal_axes(_tensor(inertia))[0]
     small, middle, large = np.sort(J)
     if small < -TRIANGLE_TOLERANCE * abs(large) or large < 0:
-        raise SceneError(f"{what}: inertia has the negative principal moment {small:.6g} kg m²; all must be ≥ 0.")
+        words = f"inertia has the negative principal moment {small:.6g} kg m²; all must be ≥ 0."
+        return Unphysical("negative", words)
     planar_link = small == 0 and middle == 0
     if small + middle < large * (1 - TRIANGLE_TOLERANCE) and not planar_link:
-        raise SceneError(
-            f"{what}: principal moments {J} kg m² violate the triangle inequality (each at most the sum of the other two); "
+        words = (
+            f"principal moments {J} kg m² violate the triangle inequality (each at most the sum of the other two); "
             "check that the inertia is about the centre of mass and its units are kg m²."
         )
+        return Unphysical("triangle", words)
     if mass == 0 and large > 0:
-        raise SceneError(f"{what}: inertia {J} kg m² without mass; give a mass > 0, or zero inertia.")
+        return Unphysical("no mass", f"inertia {J} kg m² without mass; give a mass > 0, or zero inertia.")
+    return None

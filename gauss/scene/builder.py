@@ -1,5 +1,6 @@
 """Builder methods of a scene for bilateral constraints beyond the joints; :class:`SceneBuilder` is what they share."""
 
+from collections.abc import Mapping
 from typing import TypeVar
 
 from gauss import scene as elements
@@ -102,6 +103,10 @@ class ConstraintBuilder(SceneBuilder):
     def cam(self, name: str, cam, follower, profile) -> "elements.Cam":
         """Let a follower's coordinate be a function of the cam's; see :class:`gauss.scene.Cam`."""
         return self.add(elements.Cam(name, name_of(cam), name_of(follower), profile))
+
+    def linear_coupling(self, name: str, terms: Mapping[str, float], constant: float = 0.0) -> "elements.LinearCoupling":
+        """Keep a sum of joint coordinates, coefficients by joint, at a constant; see :class:`gauss.scene.LinearCoupling`."""
+        return self.add(elements.LinearCoupling(name, tuple(map(name_of, terms)), tuple(terms.values()), constant))
 
     def transmission(self, name: str, driven, driver, ratio) -> "elements.Transmission":
         """Gear two joints by a ratio that varies; see :class:`gauss.scene.Transmission`."""

@@ -39,6 +39,10 @@ class Joint:
         Advance of a screw [m/rad].
     frame : str
         "world", or the name of a body.
+    child_frame : str, optional
+        For a joint that closes a loop: ``at`` and the axes are given in two frames by the same numbers, in ``frame`` on the
+        parent and in this one on the child (named frames, or the bodies themselves). The loop need not be closed at the
+        reference configuration.
     child_at : array_like, shape (3,), optional
         Joint point once more, in the frame of the child [m]: checked against ``at``, and refused when the two
         differ at the reference configuration.
@@ -56,6 +60,7 @@ class Joint:
     rotation: tuple = (0.0, 0.0, 0.0)
     pitch: float = 0.0
     frame: str = "world"
+    child_frame: str | None = None
     child_at: tuple | None = None
     limits: tuple | None = None
 
@@ -79,6 +84,7 @@ class Joint:
         if self.limits is not None:
             keep["limits"] = values.vector(self.limits, f"{what}: limits", "rad or m", 2)
         values.keep(self, **keep)
+        self._check_child_frame(what)
         self._check_relevant(what)
 
     def _check_relevant(self, what: str):
@@ -95,6 +101,10 @@ class Joint:
             raise SceneError(f"{what}: a screw needs a pitch [m/rad] other than 0; use a revolute joint without advance.")
         if np.any(self.rotation) and self.rotation != (0.0, 0.0, 0.0) and self.kind not in ("ball", "free", "fixed"):
             raise SceneError(f"{what}: rotation has no meaning for a {self.kind} joint; give its axis.")
+
+    def _check_child_frame(self, what: str):
+        if self.child_frame is not None and (self.frame == "world" or self.child_at is not None):
+            raise SceneError(f"{what}: child_frame goes with a frame on the parent, and without child_at.")
 
     def _check_second_axis(self, what: str):
         if self.second_axis is None:

@@ -266,7 +266,10 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
         self._require_new(joint.name, "joint", self.joints | self.couplings | self._constraints)
         self._require_body(joint.parent, f"{what}: parent")
         self._require_body(joint.child, f"{what}: child")
-        if joint.frame != "world":
+        if joint.child_frame is not None:
+            self._require_carried(joint.frame, joint.parent, f"{what}: frame")
+            self._require_carried(joint.child_frame, joint.child, f"{what}: child_frame")
+        elif joint.frame != "world":
             self._require_body(joint.frame, f"{what}: frame")
         self.joints[joint.name] = joint
 
@@ -281,7 +284,9 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
         for field_name in relation.frames:
             self._require_place(getattr(relation, field_name), f"{relation.what}: {field_name}")
         for field_name in relation.joints:
-            self._require_coordinate(getattr(relation, field_name), f"{relation.what}: {field_name}")
+            named = getattr(relation, field_name)
+            for name in (named,) if isinstance(named, str) else named:
+                self._require_coordinate(name, f"{relation.what}: {field_name}")
         for field_name in relation.shapes:
             self._require_shape(getattr(relation, field_name), f"{relation.what}: {field_name}")
         if isinstance(relation, Unilateral):
@@ -353,7 +358,10 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
 
     def _place_input(self, given: Input):
         self._require_new(given.name, "input", self.inputs | self.loads | self._constraints)
-        self._require_coordinate(given.joint, f"input {given.name!r}")
+        for joint in given.acts_on:
+            self._require_coordinate(joint, f"input {given.name!r}")
+        for force in given.forces:
+            self._require_body(force.body, f"input {given.name!r}: force {force.name!r}")
         self.inputs[given.name] = given
 
     def _place_output(self, output: Output):
@@ -397,6 +405,13 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
     def _require_shape(self, name: str, what: str):
         if name not in self.shapes:
             raise SceneError(f"{what}: no shape {name!r}. {did_you_mean(name, self.shapes)}")
+
+    def _require_carried(self, name: str, body: str, what: str):
+        """Refuse a frame that another body carries."""
+        self._require_place(name, what)
+        carrier = self.frames[name].body if name in self.frames else name
+        if carrier != body:
+            raise SceneError(f"{what}: {name!r} is on {carrier!r}, not on {body!r}.")
 
     def _require_body(self, name: str, what: str):
         if name != GROUND and name not in self.bodies:

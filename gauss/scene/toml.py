@@ -24,6 +24,7 @@ CLASSES = {
     "on_plane": "OnPlane",
     "on_line": "OnLine",
     "angle": "Angle",
+    "linear_coupling": "LinearCoupling",
     "gear": "Gear",
     "rack": "Rack",
     "rolling": "Rolling",

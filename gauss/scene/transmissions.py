@@ -1,4 +1,4 @@
-"""Constraints between joint coordinates: cams q₂ = f(q₁), and gearing of variable ratio q̇₂ = i(q) q̇₁."""
+"""Constraints between joint coordinates: cams q₂ = f(q₁), sums Σ cᵢ qᵢ = c, and gearing of variable ratio q̇₂ = i(q) q̇₁."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -39,6 +39,52 @@ class Cam(Relation):
     def positions(self, at) -> list:
         """Follower − profile."""
         return [at.coordinate(self.follower) - values.evaluate(self.profile, at.coordinate(self.cam))]
+
+
+@dataclass(frozen=True)
+class LinearCoupling(Relation):
+    """Sum of joint coordinates that is constant, Σ cᵢ qᵢ = c: a belt over several joints, a differential. One row.
+
+    Parameters
+    ----------
+    name : str
+        Name of the coupling.
+    coupled : tuple of str
+        Joints of one freedom, or single rates of joints, at least two.
+    coefficients : tuple of float
+        cᵢ, one for each, none of them 0.
+    constant : float
+        c [rad or m, of a coefficient of 1].
+    """
+
+    coupled: tuple[str, ...]
+    coefficients: tuple[float, ...]
+    constant: float = 0.0
+
+    joints: ClassVar[tuple[str, ...]] = ("coupled",)
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"linear coupling {values.text(self.name, 'name of a linear coupling')!r}"
+        if isinstance(self.coupled, str) or not all(isinstance(joint, str) for joint in self.coupled):
+            raise SceneError(f"{what}: coupled must be names of joints, got {self.coupled!r}.")
+        values.keep(self, coupled=tuple(self.coupled))
+        if len(set(self.coupled)) != len(self.coupled) or len(self.coupled) < 2:
+            raise SceneError(f"{what}: expected two or more different joints, got {', '.join(self.coupled) or 'none'}.")
+        given = values.vector(self.coefficients, f"{what}: coefficients", "1", len(self.coupled))
+        if not all(given):
+            raise SceneError(f"{what}: coefficients must not be 0, got {given}; leave the joint out.")
+        values.keep(self, coefficients=given, constant=values.number(self.constant, f"{what}: constant", "rad or m"))
+
+    @property
+    def what(self) -> str:
+        """Its name in messages."""
+        return f"linear coupling {self.name!r}"
+
+    def positions(self, at) -> list:
+        """Sum less the constant."""
+        terms = zip(self.coefficients, self.coupled, strict=True)
+        return [sum((c * at.coordinate(joint) for c, joint in terms), 0.0) - self.constant]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss.codegen import jacobian
 from gauss.dynamics.assemble import position_residual
-from gauss.dynamics.consistent_states import NEWTON_STEPS
+from gauss.dynamics.assembly_search import NEWTON_STEPS
 from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.traced_laws import Laws

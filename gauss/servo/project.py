@@ -12,7 +12,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from gauss.dynamics.consistent_states import NEWTON_STEPS, project
+from gauss.dynamics.assembly_search import NEWTON_STEPS
+from gauss.dynamics.consistent_states import project
 from gauss.errors import StateError
 from gauss.servo.kernels import tree_rows
 from gauss.servo.plan import RelationPlan

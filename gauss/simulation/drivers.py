@@ -75,6 +75,10 @@ def _program(plan: Plan) -> type[Program]:
         from gauss.dynamics.tree_program import TreeProgram
 
         return TreeProgram
+    if plan.dynamics == "call graph":
+        from gauss.dynamics.call_graph_program import CallGraphProgram
+
+        return CallGraphProgram
     return Program
 
 

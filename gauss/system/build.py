@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.backends.structure import ConstraintRows, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Drive, Force, OneSidedConstraint, Scene, Slipping
+from gauss.scene import GROUND, Drive, Force, Joint, OneSidedConstraint, Scene, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.contact_gaps import sides
@@ -133,6 +133,13 @@ def _check_inertia(system: System):
             )
 
 
+def _require_in_tree(joint: Joint, outer: str):
+    """Refuse a joint between two frames that need not meet at the reference configuration."""
+    if joint.child_frame is not None:
+        words = f"child_frame is for loops, and no other chain of joints leads to {outer!r}"
+        raise SceneError(f"joint {joint.name!r}: {words}.")
+
+
 def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
     """Tree edges (joint, outer body, inner body), inner bodies first.
 
@@ -144,7 +151,7 @@ def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
         If no chain of joints leads from the ground to some body.
     """
     reached, edges = {GROUND}, []
-    waiting = list(scene.joints.values())
+    waiting = sorted(scene.joints.values(), key=lambda joint: joint.child_frame is not None)  # these close loops
     while waiting:
         later = []
         for joint in waiting:
@@ -153,6 +160,7 @@ def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
                 continue
             if any(ends):
                 inner, outer = (joint.parent, joint.child) if ends[0] else (joint.child, joint.parent)
+                _require_in_tree(joint, outer)
                 reached.add(outer)
                 edges.append((joint.name, outer, inner))
             else:

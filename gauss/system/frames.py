@@ -61,6 +61,10 @@ def joint_frames(scene: Scene, joint: Joint) -> tuple[Pose, Pose]:
         If the joint point is given on both bodies and the two do not meet at the reference configuration.
     """
     given = (joint.axes(), np.array(joint.at))
+    parent, child = invert(central(scene, joint.parent)), invert(central(scene, joint.child))
+    if joint.child_frame is not None:
+        on_parent, on_child = (compose(on_body(scene, name), given) for name in (joint.frame, joint.child_frame))
+        return compose(parent, on_parent), compose(child, on_child)
     origin = GROUND if joint.frame == "world" else joint.frame
     on_parent = compose(relative(scene, joint.parent, origin), given)
     on_child = compose(relative(scene, joint.child, origin), given)
@@ -71,5 +75,10 @@ def joint_frames(scene: Scene, joint: Joint) -> tuple[Pose, Pose]:
                 f"joint {joint.name!r}: its points on {joint.parent!r} and {joint.child!r} are {gap:.6g} m apart at the "
                 f"reference configuration; expected child_at = {on_child[1].tolist()}, or move one of the bodies."
             )
-    parent, child = invert(central(scene, joint.parent)), invert(central(scene, joint.child))
     return compose(parent, on_parent), compose(child, on_child)
+
+
+def on_body(scene: Scene, name: str) -> Pose:
+    """Pose of a named frame in the frame of the body that carries it; the identity for a body itself."""
+    frame = scene.frames.get(name)
+    return IDENTITY if frame is None else (rotation_matrix(frame.rotation), np.array(frame.position))

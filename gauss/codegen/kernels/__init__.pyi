@@ -21,6 +21,7 @@ from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunc
 from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
+from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
 from gauss.codegen.kernels.taylor import TaylorStep
 from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
 
@@ -49,6 +50,8 @@ __all__ = [
     "Loop",
     "FixedStepBatchLoop",
     "RecordedCalls",
+    "RecordedSections",
+    "SectionCode",
     "NearPairs",
     "CompiledMechanismStep",
     "StepFunctions",

@@ -5,7 +5,7 @@ from functools import singledispatch
 import numpy as np
 
 from gauss.errors import FileError
-from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, JointSpring, Prescribed, Spring
+from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, JointSpring, LinearCoupling, Prescribed, Spring
 from gauss.scene.values import rotation_matrix
 from gauss.system.frames import relative
 
@@ -39,6 +39,14 @@ def _(coupling: Coupling, document):
     driven, driver = (document.coordinate(joint, what) for joint in (coupling.driven, coupling.driver))
     polynomial = [coupling.offset, coupling.ratio, 0.0, 0.0, 0.0]
     _equality(document, "joint", name=coupling.name, joint1=driven, joint2=driver, polycoef=polynomial)
+
+
+@write.register
+def _(coupling: LinearCoupling, document):
+    tendon = document.add(document.section("tendon"), "fixed", "tendon", name=coupling.name)
+    for joint, coefficient in zip(coupling.coupled, coupling.coefficients, strict=True):
+        document.add(tendon, "joint", "", joint=document.coordinate(joint, coupling.what), coef=coefficient)
+    _equality(document, "tendon", name=coupling.name, tendon1=coupling.name, polycoef=[coupling.constant, 0, 0, 0, 0])
 
 
 @write.register

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.dynamics.kinematics import Kinematics
-from gauss.scene import GROUND, Drive, Joint, JointSpring, Prescribed, Scene
+from gauss.scene import GROUND, Drive, Joint, JointSpring, LinearCoupling, Prescribed, Scene
 from gauss.system import System
 from gauss.system.frames import Pose, compose, invert
 
@@ -74,12 +74,24 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Join
 
     Of the joints of a loop one is cut that MuJoCo can close and that carries no load, the last of these in the scene.
     """
-    busy = {load.joint for load in scene.loads.values() if isinstance(load, Drive | JointSpring)}
-    busy |= {joint for coupling in scene.couplings.values() for joint in (coupling.driven, coupling.driver)}
-    busy |= {relation.joint for relation in scene.relations.values() if isinstance(relation, Prescribed)}
-    joints = sorted(scene.joints.values(), key=lambda joint: joint.kind in CLOSABLE and joint.name not in busy)
+    busy = _busy(scene)
+    joints = sorted(
+        scene.joints.values(),
+        key=lambda joint: (joint.child_frame is not None, joint.kind in CLOSABLE and joint.name not in busy),
+    )
     kept = _spanning(scene, joints)
     return _from_the_ground(scene, kept), [joint for joint in scene.joints.values() if joint.name not in kept]
+
+
+def _busy(scene: Scene) -> set[str]:
+    """Joints that carry a load or a constraint."""
+    busy = {load.joint for load in scene.loads.values() if isinstance(load, Drive | JointSpring)}
+    busy |= {joint for coupling in scene.couplings.values() for joint in (coupling.driven, coupling.driver)}
+    busy |= {
+        joint for relation in scene.relations.values() if isinstance(relation, LinearCoupling) for joint in relation.coupled
+    }
+    busy |= {relation.joint for relation in scene.relations.values() if isinstance(relation, Prescribed)}
+    return busy
 
 
 def _spanning(scene: Scene, joints: list[Joint]) -> set[str]:

@@ -1,29 +1,37 @@
-"""URDF robots through Pinocchio's parser.
+"""URDF robots through Pinocchio's parser, with the loops and couplings of URDF+ and of a YAML file beside them.
 
 Links that fixed joints weld together become one body, named after the link that its joint moves; the others stay as named
 frames. Limits, damping, friction and collision geometry are read where they are asked for (gauss.io.urdf.extras). Not read:
 visual geometry, transmissions, plugin tags.
 """
 
+import warnings
+from collections.abc import Collection
+
 import numpy as np
 import pinocchio as pin
 
 from gauss import rotations
-from gauss.errors import FileError, SceneError, did_you_mean
+from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_you_mean
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
+from gauss.io.urdf.joint_file import joint_file
 from gauss.io.urdf.numbers import for_parser, value, values
+from gauss.io.urdf.plus import add_loops_and_couplings
 from gauss.io.urdf.unknown import refuse_couplings
 from gauss.scene import GROUND, Scene
+from gauss.scene.body import unphysical
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 ROOTS = ("fixed", "free")
+INERTIAS = ("physical", "as given")
 # Radius of gyration [m] of a point mass: exporters subtract m c² from moments about a joint, which leaves ± 2⁻⁵³ m c² of
 # nothing, and nobody measures inertia to less than (10 nm)².
 SPECK = 1e-8
+MANY = 4  # names that a warning gives before it counts
 
 
-def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
+def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "physical") -> Scene:
     """Scene of a URDF file.
 
     Parameters
@@ -35,12 +43,22 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
         carries a joint of type ``floating`` floats already; to let it float twice is refused.
     mimic : bool
         Whether mimic joints follow the joints that they mimic (as couplings), or move by themselves.
+    inertia : str
+        "physical": inertia without mass, and moments that violate the triangle inequality, are refused; "as given": they
+        are taken, with a warning.
 
     Raises
     ------
     FileError
         If it cannot be parsed, or holds something that gauss does not model; the message names it.
+
+    Warns
+    -----
+    UnphysicalInertiaWarning
+        Of inertias that no body can have, and that were taken as given.
     """
+    if inertia not in INERTIAS:
+        raise FileError(f"{path}: inertia must be one of {', '.join(map(repr, INERTIAS))}, got {inertia!r}.")
     if root not in ROOTS:
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
     source = guarded(path)
@@ -49,6 +67,8 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
     if not source.root.get("name"):
         raise FileError(f"{path}: the parser takes no robot without a name; write <robot name=…>.")
     refuse_couplings(source)
+    beside = joint_file(source.path)
+    source = beside.replaced(source)
     text = for_parser(source)
     try:
         model = pin.buildModelFromXML(text, *base_of(root))
@@ -59,11 +79,14 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
     try:
         _require_axes(source)
         _require_one_float(model)
-        scene = _scene(model)
+        scene = _scene(model, beside.balls, inertia == "as given")
         if mimic:
             _couple(scene, source)
     except SceneError as error:
         raise FileError(f"{place_of(source, str(error))}: {error}") from error
+    add_loops_and_couplings(scene, source)
+    beside.add_to(scene, source)
+    _warn_of_inertia(scene, source)
     return scene
 
 
@@ -86,7 +109,8 @@ def _links(model) -> list:
     return [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
 
 
-def _scene(model) -> Scene:
+def _scene(model, balls: Collection[str] = (), as_given: bool = False) -> Scene:
+    """Scene of Pinocchio's model; ``balls`` are hinges of it that stand for ball joints."""
     scene = Scene(model.name or "robot")
     names = body_names(model)
     for index in range(1, model.njoints):
@@ -96,8 +120,14 @@ def _scene(model) -> Scene:
             "rotation": _matrix(placement.rotation),
             "on": names[model.parents[index]],
         }
-        scene.body(names[index], inertia.mass, _tensor(inertia), inertia.lever, **pose)
+        tensor = _tensor(inertia)
+        wrong = unphysical(inertia.mass, tuple(map(tuple, tensor.tolist())))
+        if wrong is not None and not as_given and not wrong.impossible:
+            raise SceneError(f"body {names[index]!r}: {wrong.words} inertia='as given' takes it as it stands.")
+        scene.body(names[index], inertia.mass, tensor, inertia.lever, inertia_as_given=wrong is not None, **pose)
         kind, options = _kind(model.joints[index], model.names[index])
+        if model.names[index] in balls:
+            kind, options = "ball", {}
         scene.joint(model.names[index], kind, names[model.parents[index]], names[index], frame=names[index], **options)
     for frame in _links(model):
         name = _link_name(frame.name)
@@ -105,6 +135,14 @@ def _scene(model) -> Scene:
             pose = frame.placement
             scene.frame(name, names[frame.parentJoint], pose.translation, _matrix(pose.rotation))
     return scene
+
+
+def _warn_of_inertia(scene: Scene, source: Source):
+    taken = [body.name for body in scene.bodies.values() if body.inertia_as_given]
+    if taken:
+        shown = ", ".join(map(repr, taken[:MANY])) + (f" and {len(taken) - MANY} more" if len(taken) > MANY else "")
+        words = "taken as given, though no body has them (the triangle inequality, or inertia without mass)"
+        warnings.warn(f"{source.path}: inertias of {shown} are {words}.", UnphysicalInertiaWarning, stacklevel=5)
 
 
 def _require_axes(source: Source):

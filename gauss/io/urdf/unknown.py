@@ -14,7 +14,8 @@ from gauss.io.guard import Source
 
 # Children that URDF knows, and those of common tools that do not move a mechanism by themselves.
 KNOWN = {
-    "robot": {"link", "joint", "material", "transmission", "gazebo", "sensor", "ros2_control", "version", "group"},
+    "robot": {"link", "joint", "material", "transmission", "gazebo", "sensor", "ros2_control", "version", "group"}
+    | {"loop", "coupling"},
     "link": {"inertial", "visual", "collision", "contact", "sensor", "surface", "self_filter", "material"}
     | {"collision_checking", "self_collision_checking"},
     "joint": {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller"}

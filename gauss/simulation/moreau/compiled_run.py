@@ -18,7 +18,7 @@ from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.handover import finished
 from gauss.simulation.held_inputs import driven_as
-from gauss.simulation.moreau.compiled_step import compiled_steps
+from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_size
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
 from gauss.simulation.problem import Problem
@@ -73,7 +73,7 @@ class CompiledMoreauRun(CompiledFixedRun):
         return driven_as(self.whole.system, laws)
 
     def _initial_method_state(self) -> tuple[np.ndarray, int]:
-        size = self.stepper.lossy.size + 1
+        size = method_state_size(self.stepper)
         return np.zeros(size), size
 
     def _functions(self) -> Fixed:

@@ -3,13 +3,14 @@
 from gauss.system.passes.cut import cut
 from gauss.system.passes.islands import islands
 from gauss.system.passes.plane import plane
+from gauss.system.passes.plane_loops import plane_loops
 from gauss.system.passes.repeated import repeated
 from gauss.system.passes.rigid import rigid
 from gauss.system.passes.sphere import sphere
 from gauss.system.passes.trains import trains
 from gauss.system.passes.weld import weld
 
-__all__ = ["PASSES", "cut", "islands", "plane", "repeated", "rigid", "sphere", "trains", "weld"]
+__all__ = ["PASSES", "cut", "islands", "plane", "plane_loops", "repeated", "rigid", "sphere", "trains", "weld"]
 
 # Sentence of explain(), and the pass, in the order in which they run.
 PASSES = {
@@ -19,6 +20,7 @@ PASSES = {
     "mechanisms in a plane are laid into it": plane,
     "spherical mechanisms have all joints in their centre": sphere,
     "loops are cut at the cheapest joints": cut,
+    "loops in a plane are closed by two rows": plane_loops,
     "joints that repeat others bring no rows": repeated,
     "gear and belt trains are one reduced inertia": trains,
 }

@@ -50,10 +50,10 @@ def _normals(subsystem: Subsystem) -> dict[int, np.ndarray] | None:
     seed = next((joint for joint in subsystem.joints if joint.pair.kind in ("revolute", "planar")), None)
     if seed is None or any(joint.pair.kind not in TRIVIAL_ROWS for joint in subsystem.joints):
         return None
-    return propagated(subsystem.joints, (seed.parent, seed.R_parent[:, 2]), _normal_beyond, PARALLEL_NORMALS)
+    return propagated(subsystem.joints, (seed.parent, seed.R_parent[:, 2]), normal_beyond, PARALLEL_NORMALS)
 
 
-def _normal_beyond(joint: PlacedJoint, body: int, normal: np.ndarray) -> np.ndarray | None:
+def normal_beyond(joint: PlacedJoint, body: int, normal: np.ndarray) -> np.ndarray | None:
     """Normal in the other body of a joint; None if the joint moves out of the plane."""
     here, there = (joint.R_parent, joint.R_child) if body == joint.parent else (joint.R_child, joint.R_parent)
     across = _across(joint.pair.kind, here.T @ normal)

@@ -1,7 +1,8 @@
 """Rigid loops, such as a triangle of rods, become rigid bodies.
 
 A loop whose joints admit no relative velocity at the reference configuration, where it is assembled, cannot move: rigidity
-at first order implies rigidity. A loop that can move at first order is left as it is.
+at first order implies rigidity. A loop that can move at first order is left as it is, and so is one that is not assembled
+at the reference configuration.
 """
 
 import numpy as np
@@ -11,6 +12,7 @@ from gauss.system import frames
 from gauss.system.passes.weld import follow, welded
 from gauss.system.subsystem import GROUND, Subsystem
 
+CLOSED = 1e-6  # rad, and relative to the size of the subsystem: frames of a closed loop with 7 digits
 RIGID_LOOP = 1e-9  # smallest singular value of the unit twists of a rigid loop, relative to the largest
 
 
@@ -32,7 +34,9 @@ def _rigid_loop(subsystem: Subsystem) -> list[int] | None:
     """Joints of a loop that cannot move."""
     poses = _reference(subsystem)
     for loop_joint in subsystem.loop_joints:
-        loop = _loop(subsystem, loop_joint)
+        if not _is_closed(subsystem, loop_joint, poses):
+            continue
+        loop = loop_of(subsystem, loop_joint)
         twists = np.concatenate([_twists(subsystem, index, poses) for index in loop], axis=1)
         twists[3:] /= subsystem.size or 1.0
         sizes = np.linalg.svd(twists / np.linalg.norm(twists, axis=0), compute_uv=False)
@@ -41,7 +45,17 @@ def _rigid_loop(subsystem: Subsystem) -> list[int] | None:
     return None
 
 
-def _loop(subsystem: Subsystem, loop_joint: int) -> list[int]:
+def _is_closed(subsystem: Subsystem, loop_joint: int, poses) -> bool:
+    """Whether a loop is closed at the reference configuration."""
+    joint = subsystem.joints[loop_joint]
+    across = joint.pair.pose(np.array(joint.pair.reference))
+    R_parent, p_parent = frames.compose(frames.compose(poses[joint.parent], (joint.R_parent, joint.p_parent)), across)
+    R_child, p_child = frames.compose(poses[joint.child], (joint.R_child, joint.p_child))
+    apart = max(np.abs(R_parent - R_child).max(), np.abs(p_parent - p_child).max() / (subsystem.size or 1.0))
+    return bool(apart <= CLOSED)
+
+
+def loop_of(subsystem: Subsystem, loop_joint: int) -> list[int]:
     """Joints of the loop that a joint closes in the tree."""
     inward = {edge.outer: edge for edge in subsystem.tree}
 
