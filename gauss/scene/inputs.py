@@ -74,12 +74,7 @@ class Input:
         values.keep(self, limits=(low, high))
 
     def _check_what_it_acts_on(self, what: str):
-        if isinstance(self.joint, str):
-            values.text(self.joint, f"{what}: joint")
-        else:
-            pairs = self.joint.items() if isinstance(self.joint, Mapping) else self.joint
-            factors = [(values.text(joint, f"{what}: joint"), factor) for joint, factor in pairs]
-            values.keep(self, joint=tuple((joint, values.number(x, f"{what}: joint", "1")) for joint, x in factors))
+        self._keep_joints(what)
         if not isinstance(self.forces, tuple | list) or not all(isinstance(force, Force) for force in self.forces):
             raise SceneError(f"{what}: forces: expected Force elements, got {self.forces!r}.")
         values.keep(self, forces=tuple(self.forces))
@@ -87,6 +82,18 @@ class Input:
             raise SceneError(f"{what}: name a joint that it acts on, or give forces.")
         if self.effort is not None and (not callable(self.effort) or values.arguments(self.effort) != 3):
             raise SceneError(f"{what}: effort: expected a function of (u, t, motion), got {self.effort!r}.")
+
+    def _keep_joints(self, what: str):
+        """Keep the joints as pairs of a name and a factor; a single name as it is."""
+        if isinstance(self.joint, str):
+            values.text(self.joint, f"{what}: joint")
+            return
+        pairs = self.joint.items() if isinstance(self.joint, Mapping) else self.joint
+        try:
+            found = [(values.text(joint, f"{what}: joint"), factor) for joint, factor in pairs]
+        except (TypeError, ValueError):
+            raise SceneError(f"{what}: joint: expected a name, or {{name: factor}}, got {self.joint!r}.") from None
+        values.keep(self, joint=tuple((joint, values.number(factor, f"{what}: joint", "1")) for joint, factor in found))
 
     @property
     def acts_on(self) -> dict[str, float]:
