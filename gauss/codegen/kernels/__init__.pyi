@@ -23,6 +23,7 @@ from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
@@ -58,6 +59,8 @@ __all__ = [
     "RecordedSections",
     "SectionCode",
     "NearPairs",
+    "CompiledMechanismStep",
+    "StepFunctions",
     "Newton",
     "FirstAccepted",
     "Pivots",
