@@ -55,20 +55,28 @@ def _sides(joint) -> tuple[int, int]:
     return joint.parent, joint.child
 
 
+def _carried(subsystem: Subsystem, number: dict[int, int], relations: list[BoundRelation]) -> dict[int, PlacedFrame]:
+    """Frames of an island by the body that each carries; of bodies fixed to the ground those that its relations name."""
+    named = {body for relation in relations for body in relation.bodies}
+    frames = {
+        body: frame
+        for body, frame in subsystem.carried.items()
+        if body in named or (frame.body in number and frame.body != GROUND)
+    }
+    return {body: PlacedFrame(number[frame.body], frame.R, frame.p) for body, frame in frames.items()}
+
+
 def _island(subsystem: Subsystem, bodies: list[int]) -> Subsystem:
     number = {body: i for i, body in enumerate(bodies)} | {GROUND: GROUND}
     joints = [j for j in subsystem.joints if j.parent in number and j.child in number]
     joints = [replace(j, parent=number[j.parent], child=number[j.child]) for j in joints]
     relations = [relation for relation in subsystem.relations if set(_bodies(subsystem, relation)) & set(bodies)]
-    fixed = {body for relation in relations for body in relation.bodies if subsystem.carried[body].body == GROUND}
-    frames = {body: f for body, f in subsystem.carried.items() if f.body in bodies or body in fixed}
-    carried = {body: PlacedFrame(number[f.body], f.R, f.p) for body, f in frames.items()}
     smaller = replace(
         subsystem,
         relations=tuple(relations),
         names=tuple(subsystem.names[body] for body in bodies),
         Phi=subsystem.Phi.reshape(-1, 6)[bodies].ravel(),
-        carried=carried,
+        carried=_carried(subsystem, number, relations),
     )
     smaller = kept_joints(smaller, joints)
     return replace(smaller, tree=spanning_tree(smaller.joints))
