@@ -59,8 +59,8 @@ from gauss.analysis import (
 from gauss.analysis.assembly_modes import assembly_modes
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
-from gauss.analysis.equilibrium import Equilibrium, equilibria, equilibrium
-from gauss.analysis.linear_model import LinearModel, Modes, linearise
+from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
+from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
 from gauss.analysis.recommendation import advise
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
@@ -84,9 +84,9 @@ from gauss.view.viewer import show
 __version__: str
 
 __all__ = [
-    "Equilibrium",
+    "StaticEquilibrium",
     "LinearModel",
-    "Modes",
+    "LinearModes",
     "equilibria",
     "equilibrium",
     "linearise",

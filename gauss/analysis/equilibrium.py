@@ -1,6 +1,6 @@
-"""Equilibria: states at rest in which no coordinate accelerates, and forces that hold the coordinates that are kept.
+"""Equilibria: states at rest in which no coordinate accelerates, and forces on the coordinates that are kept.
 
-Newton's method on q̈(ξ, τ) = 0 for displacements ξ along the constraints and holding forces τ, with the exact derivatives of
+Newton's method on q̈(ξ, τ) = 0 for displacements ξ along the constraints and forces τ, with the exact derivatives of
 the accelerations; steps are halved until the accelerations decrease, and projected onto the constraints. Whether an
 equilibrium is stable is told by the eigenvalues of its linear model.
 """
@@ -32,7 +32,7 @@ SAME = 1e-6  # distance of two equilibria in units, below which they are one
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class StaticEquilibrium:
     """State of rest.
 
     Parameters
@@ -41,7 +41,7 @@ class Equilibrium:
         The state.
     energy : float
         Potential energy of gravity and springs [J].
-    holding : dict
+    forces : dict
         Generalised forces that hold the kept coordinates, by name [N m, N].
     model : LinearModel
         Linear model about it.
@@ -49,7 +49,7 @@ class Equilibrium:
 
     state: State
     energy: float
-    holding: dict[str, float]
+    forces: dict[str, float]
     model: LinearModel
 
     @property
@@ -59,8 +59,8 @@ class Equilibrium:
 
 
 @named_arguments
-def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), loads=None) -> Equilibrium:
-    """Equilibrium near a start.
+def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), loads=None) -> StaticEquilibrium:
+    """StaticEquilibrium near a start.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), 
 
     Returns
     -------
-    Equilibrium
-        State, energy, holding forces, linear model.
+    StaticEquilibrium
+        State, energy, forces on the kept coordinates, linear model.
 
     Raises
     ------
@@ -94,11 +94,13 @@ def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), 
     system = _compiled(system, "equilibrium")
     start = system.initial_state() if start is None else start
     require(start, (State,), "equilibrium: start")
-    return _settled(system, start, fixed_columns(system, keep), _load(system, loads))
+    return _found(system, start, fixed_columns(system, keep), _load(system, loads))
 
 
 @named_arguments
-def equilibria(system: System | Scene, *, starts: int = 32, seed: int = 0, keep=(), loads=None) -> tuple[Equilibrium, ...]:
+def equilibria(
+    system: System | Scene, *, starts: int = 32, seed: int = 0, keep=(), loads=None
+) -> tuple[StaticEquilibrium, ...]:
     """All equilibria that searches from the start of the scene and from random starts find, the lowest energy first.
 
     Parameters
@@ -114,7 +116,7 @@ def equilibria(system: System | Scene, *, starts: int = 32, seed: int = 0, keep=
 
     Returns
     -------
-    tuple of Equilibrium
+    tuple of StaticEquilibrium
         Different ones; where equilibria are not isolated, some of each family.
 
     Raises
@@ -123,11 +125,11 @@ def equilibria(system: System | Scene, *, starts: int = 32, seed: int = 0, keep=
         If none is found.
     """
     system, rng = _compiled(system, "equilibria"), np.random.default_rng(seed)
-    held, load, found = fixed_columns(system, keep), _load(system, loads), list[Equilibrium]()
+    held, load, found = fixed_columns(system, keep), _load(system, loads), list[StaticEquilibrium]()
     base, why = system.initial_state(), None
     for k in range(starts + 1):
         try:
-            one = _settled(system, _random(system, base, rng, held, keep) if k else base, held, load)
+            one = _found(system, _random(system, base, rng, held, keep) if k else base, held, load)
         except GaussError as error:
             why = error
             continue
@@ -164,9 +166,9 @@ def _load(system: System, loads) -> np.ndarray:
     return found
 
 
-def _settled(system: System, start: State, held: list[int], load: np.ndarray) -> Equilibrium:
-    """Equilibrium by Newton's method from a start."""
-    state, holding = replace(start, v=np.zeros(system.n_v)), np.zeros(len(held))
+def _found(system: System, start: State, held: list[int], load: np.ndarray) -> StaticEquilibrium:
+    """StaticEquilibrium by Newton's method from a start."""
+    state, forces = replace(start, v=np.zeros(system.n_v)), np.zeros(len(held))
     total = load.copy()
     unit = system.scale.rates / system.scale.time
     own = system.accelerations(state, total)
@@ -181,9 +183,9 @@ def _settled(system: System, start: State, held: list[int], load: np.ndarray) ->
         step = -sizes * np.linalg.lstsq(change * sizes, own / unit, rcond=1e-12)[0]
         longest = np.abs(step[: N.shape[1]] / sizes[: N.shape[1]]).max(initial=0.0)
         share = min(1.0, LONGEST / longest) if longest else 1.0
-        state, own, holding, moved = _line_search(system, state, own, step, share, N, (held, load, holding))
+        state, own, forces, moved = _line_search(system, state, own, step, share, N, (held, load, forces))
         total = load.copy()
-        total[held] += holding
+        total[held] += forces
         if not moved and not kicks:
             break
         if not moved:  # Newton's method is caught where the slope is singular: go where the forces pull
@@ -199,27 +201,29 @@ def _settled(system: System, start: State, held: list[int], load: np.ndarray) ->
         )
     names = [system.coordinates[k] for k in held]
     energy = as_number(potential_energy(kinematics(system, state)))
-    return Equilibrium(state, energy, dict(zip(names, holding.tolist(), strict=True)), linearise(system, state, load=total))
+    return StaticEquilibrium(
+        state, energy, dict(zip(names, forces.tolist(), strict=True)), linearise(system, state, load=total)
+    )
 
 
-def _line_search(system: System, state: State, own, step, share: float, N, holder):
+def _line_search(system: System, state: State, own, step, share: float, N, kept):
     """First share of a step, halved again and again, that decreases the accelerations."""
-    (held, load, holding), k = holder, N.shape[1]
+    (held, load, forces), k = kept, N.shape[1]
     unit = system.scale.rates / system.scale.time
     size = np.linalg.norm(own / unit)
     while share >= LEAST_SHARE:
         q = retract(system, state.q, N @ (share * step[:k]))
         tried = project_positions(system, replace(state, q=q), POSITION_STEPS, tuple(held))
-        forces, total = holding + share * step[k:], load.copy()
-        total[held] += forces
+        more, total = forces + share * step[k:], load.copy()
+        total[held] += more
         try:
             found = system.accelerations(tried, total)
         except GaussError:  # the step led to a place where accelerations are not determined
             found = np.full(system.n_v, np.inf)
         if np.linalg.norm(found / unit) < size:
-            return tried, found, forces, True
+            return tried, found, more, True
         share /= 2.0
-    return state, own, holding, False
+    return state, own, forces, False
 
 
 def _lengths(system: System, N: np.ndarray) -> np.ndarray:
@@ -227,7 +231,7 @@ def _lengths(system: System, N: np.ndarray) -> np.ndarray:
     return 1.0 / np.maximum(np.abs(N / system.scale.coordinates[:, None]).max(axis=0, initial=0.0), 1e-300)
 
 
-def _are_same(system: System, one: Equilibrium, other: Equilibrium) -> bool:
+def _are_same(system: System, one: StaticEquilibrium, other: StaticEquilibrium) -> bool:
     """Whether two equilibria have the same poses, or belong to one family, along which neither energy nor slopes change."""
     poses = [kinematics(system, found.state) for found in (one, other)]
     far = [np.abs(a - b).max(initial=0.0) for a, b in zip(poses[0].R, poses[1].R, strict=True)]

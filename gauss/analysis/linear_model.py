@@ -2,7 +2,7 @@
 
 With the tangents of :mod:`gauss.analysis.tangents` and the derivatives of the accelerations of
 :mod:`gauss.analysis.derivatives`, no constraint is approximated: a loop with any redundant rows has as many states as it has
-freedoms, twice. Modes are eigenvectors of A (Schiehlen and Eberhard, Applied Dynamics, 2014, ch. 7).
+freedoms, twice. LinearModes are eigenvectors of A (Schiehlen and Eberhard, Applied Dynamics, 2014, ch. 7).
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ MARGINAL = 1e-7  # real parts below this share of the largest eigenvalue count a
 
 
 @dataclass(frozen=True)
-class Modes:
+class LinearModes:
     """Eigenmodes of a linear model, slowest first; one of each pair of conjugate ones.
 
     Parameters
@@ -111,7 +111,7 @@ class LinearModel:
         largest = found.real.max(initial=-np.inf)
         return "marginal" if abs(largest) <= MARGINAL * size else "stable" if largest < 0.0 else "unstable"
 
-    def modes(self) -> Modes:
+    def modes(self) -> LinearModes:
         """Eigenmodes."""
         found, vectors = np.linalg.eig(self.A)
         order = [k for k in np.argsort(np.abs(found), kind="stable") if found[k].imag >= 0.0]
@@ -119,7 +119,7 @@ class LinearModel:
         shares = shapes / self.system.scale.coordinates
         peaks = shares[np.arange(len(shares)), np.abs(shares).argmax(axis=1)] if shares.size else np.ones(len(shares))
         scaled = shapes / np.where(peaks == 0.0, 1.0, peaks)[:, None]
-        return Modes(found[order], scaled, tuple(self.system.coordinates))
+        return LinearModes(found[order], scaled, tuple(self.system.coordinates))
 
     def state_space(self):
         """The model as a ``control.StateSpace`` of python-control, with the names.

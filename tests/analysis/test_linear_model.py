@@ -124,7 +124,7 @@ def test_a_pole_is_balanced_by_the_regulator_of_its_linear_model():
 def test_a_regulated_arm_has_the_forces_that_hold_it():
     system = gauss.compile_scene(gauss.load("double_pendulum"))
     kept = gauss.equilibrium(system, keep=["A"])
-    load = np.array([kept.holding["A"], 0.0])
+    load = np.array([kept.forces["A"], 0.0])
     assert np.abs(system.inverse_dynamics(kept.state.q, np.zeros(2), np.zeros(2)) - load).max() <= 1e-9
     assert kept.state.q[0] == system.initial_state().q[0]
 
