@@ -14,7 +14,6 @@ from gauss.analysis.derivatives import derivatives
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
-from gauss.codegen import as_number
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.energies import potential_energy
@@ -200,10 +199,9 @@ def _found(system: System, start: State, held: list[int], load: np.ndarray) -> S
             f"accelerates by {own[worst]:.3g} rad/s² or m/s². Start elsewhere, or ask gauss.equilibria for random starts."
         )
     names = [system.coordinates[k] for k in held]
-    energy = as_number(potential_energy(kinematics(system, state)))
-    return StaticEquilibrium(
-        state, energy, dict(zip(names, forces.tolist(), strict=True)), linearise(system, state, load=total)
-    )
+    energy = np.asarray(potential_energy(kinematics(system, state)), dtype=float).item()
+    forces_by_name = dict(zip(names, forces.tolist(), strict=True))
+    return StaticEquilibrium(state, energy, forces_by_name, linearise(system, state, load=total))
 
 
 def _line_search(system: System, state: State, own, step, share: float, N, kept):
