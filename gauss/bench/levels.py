@@ -10,12 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends import BACKENDS
 from gauss.backends.accuracy import SMALLEST_TOLERANCE, tolerances
 from gauss.bench.clocks import WALL_PER_CPU
 
 LEVELS = {"low": 1e-3, "mid": 1e-6, "high": 1e-9, "tightest": 1e-12}  # absolute tolerances of residuals and gap
 MAIN_LEVEL = "high"  # of tables, charts and sentences about one level, and of quick comparisons
-OWN = "own"  # level of methods that have no tolerance
+OWN = "own"  # level of methods that have no tolerance, those of gauss
+AUTO = "auto"  # gauss's own choice, with its rescue
+OURS = (AUTO, *BACKENDS)
 LIMIT = 1.0  # [s] of one solve, by gauss.bench.clocks; later answers do not count, whatever limits a solver takes
 # Limit of wall time [s] that libraries get for one solve: so large that on a busy machine the CPU time ends it first.
 WALL_LIMIT = WALL_PER_CPU * LIMIT
