@@ -5,13 +5,14 @@ duality gap, relative ones of zero. Nothing is tuned for any solver. One table, 
 beside these tolerances, and which residuals its claim of success promises.
 """
 
+import hashlib
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.backends import BACKENDS
-from gauss.backends.accuracy import SMALLEST_TOLERANCE, tolerances
+from gauss.backends.accuracy import SMALLEST_TOLERANCE, own_settings, tolerances
 from gauss.bench.clocks import WALL_PER_CPU
 
 LEVELS = {"low": 1e-3, "mid": 1e-6, "high": 1e-9, "tightest": 1e-12}  # absolute tolerances of residuals and gap
@@ -143,6 +144,13 @@ def promise(solver: str, level: str) -> Promise:
         return Promise(LOOSEST, LOOSEST, np.inf)
     tolerance = max(LEVELS[level], SMALLEST_TOLERANCE.get(solver, 0.0))
     return Promise(tolerance, tolerance, tolerance if policy.has_gap else np.inf, policy.is_relative)
+
+
+def digest_of_settings() -> str:
+    """Digest of all settings of all solvers: those of the comparison, and those with which gauss calls them for a user."""
+    compared = {(solver, level): sorted(settings(solver, level).items()) for solver in POLICIES for level in LEVELS}
+    own = {solver: sorted(own_settings(solver).items()) for solver in POLICIES}
+    return hashlib.sha256(repr((compared, own)).encode()).hexdigest()[:12]
 
 
 def as_qpbenchmark_sets(solver: str, level: str) -> dict:
