@@ -43,7 +43,7 @@ from gauss.bench.levels import LEVELS, LIMIT, as_qpbenchmark_sets
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, share, table
 from gauss.bench.qp import PACKAGES, compare
-from gauss.bench.summary import is_kept, mean_time
+from gauss.bench.summary import asked, is_kept, mean_time
 from gauss.bench.table import header_of, read_table, write_table
 from gauss.bench.worker import ONE_THREAD
 
@@ -75,7 +75,7 @@ def main():
     levels = given.level or ["high"]
     for level in levels:
         measured = compare(given.work, backends=solvers, levels=[level], instances=small)
-    rows = pairs(read_table(measured.path), theirs)
+    rows = pairs(asked(read_table(measured.path)), theirs)
     now = verdicts(in_published_form(given.folder / "data", given.work, solvers, [one.name for one in small]))
     as_published = {(row["backend"], row["level"], row["problem"]): row["kept"] for row in now}
     for ours, _ in rows:
