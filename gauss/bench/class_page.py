@@ -107,8 +107,8 @@ def _by_level(rows, names: list[str]) -> list[str]:
     return [
         "## By level",
         "",
-        f"Tolerances: {words}. Asked at each: {count_of(len(common), 'problem')}. Right, kept; claimed, beyond where that is "
-        "not none. Then shifted geometric means of times in ms.",
+        f"Tolerances: {words}. Asked at each: {count_of(len(common), 'problem')}. Right, kept; claimed, beyond where that "
+        "is not none. Then shifted geometric means of times in ms.",
         "",
         *table(["solver", *levels, *(f"{level} [ms]" for level in levels)], found),
         "",
