@@ -175,8 +175,13 @@ def attempts(
         for count, setting in enumerate(settings(method, duration), start=1):
             found = attempt(system, duration, method, setting, against, time_limit, backend)
             yield found
-            if found.seconds > time_limit * (1.0 if backend is None or count >= FEWEST else SLOW):
+            if found.seconds > time_limit * _of_limit(backend, count):
                 break
+
+
+def _of_limit(backend: str | None, count: int) -> float:
+    """Times of the limit that the run of a setting may take: more for the first ones of a backend."""
+    return 1.0 if backend is None or count >= FEWEST else SLOW
 
 
 def _require_charted(methods: Iterable[str]):
