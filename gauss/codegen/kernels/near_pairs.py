@@ -37,7 +37,7 @@ class _NearPairsWriter:
         arguments = [INTEGER, POINTER, INTEGER, POINTER, INTEGER]
         self.kernel = ir.FunctionType(ir.VoidType(), arguments).as_pointer()
 
-    def write(self):
+    def write(self) -> ir.Function:
         r = self.r
         self.count[0], self.count[1], self.count[2] = 0, 0, 0
         with r.each(self.parts) as k:
@@ -51,7 +51,7 @@ class _NearPairsWriter:
                     self._examine(p, first, second)
                 with r.when(~is_made):
                     self.count[2] = number + 1
-        r.done()
+        return r.done()
 
     def _move(self, k: Value):
         """Pose and velocities of a part, and the half edges of its box along the axes."""
@@ -125,6 +125,11 @@ class _NearPairsWriter:
         b.call(b.inttoptr(address.value, self.kernel), [one, given.pointer, one, found.pointer, one])
 
 
+def write_near(place: Function, module: ir.Module) -> ir.Function:
+    """Emit ``near``; see :class:`NearPairs`."""
+    return _NearPairsWriter(place, module).write()
+
+
 class NearPairs:
     """Python interface.
 
@@ -136,7 +141,7 @@ class NearPairs:
 
     def __init__(self, place: Function):
         module = ir.Module(name="gauss")
-        _NearPairsWriter(place, module).write()
+        write_near(place, module)
         self.code = machine.load(str(module))
         self._bind()
 

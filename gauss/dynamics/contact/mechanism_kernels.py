@@ -27,6 +27,7 @@ from gauss.scene import ClosedGap, Contact
 from gauss.system import State, System, coordinate_rates, retract, sides
 from gauss.system.relations import place_residuals
 
+GROUND_BODY = np.concatenate([np.eye(3).ravel(), np.zeros(15)])
 BODY = 24  # rotation (9), centre (3), angular velocity, velocity of the centre (6), rates of both where q̈ = 0 (6)
 
 
@@ -73,9 +74,9 @@ class MechanismTerms(NamedTuple):
         Mass matrix.
     tau, power : ndarray, shape (n_v,), (3,)
         Generalised forces less the bias forces, τ − h; power of drives, of forces on bodies, and of dissipation [W].
-    bodies : ndarray, shape (24, k)
-        Poses, velocities and their rates with q̈ = 0 of the bodies that carry shapes.
-    J : ndarray, shape (k, 6, n_v)
+    bodies : ndarray, shape (24, k + 1)
+        Poses, velocities and their rates with q̈ = 0 of the bodies that carry shapes, and of the ground.
+    J : ndarray, shape (k + 1, 6, n_v)
         Their Jacobians, (angular velocity, velocity of the centre of mass) in world axes.
     gap, rate, K, bias : ndarray, shape (g,), (r,), (r, n_v), (r,)
         Gap functions of unilateral constraints that are no contacts of shapes; rates of these and of set-valued elements,
@@ -141,9 +142,9 @@ class MechanismKernels:
 
     def _terms(self, t, q, v) -> MechanismTerms:
         terms = StateTerms(self.smooth, q, v, t)
-        parts = [_body(terms, body) for body in self.carriers]
+        parts = [*(_body(terms, body) for body in self.carriers), GROUND_BODY]
         bodies = np.array(parts, dtype=object).reshape(len(parts), BODY).T
-        J = [terms.jacobian_of(body, terms.centers[body]) for body in self.carriers]
+        J = [terms.jacobian_of(body, terms.centers[body]) for body in self.carriers] + [np.zeros((6, self.smooth.n_v))]
         tau, power = self._load_forces(terms, t, q, v)
         gap, rate, K, bias = self._rows(t, q, v)
         return MechanismTerms(

@@ -12,8 +12,10 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from gauss.codegen.kernels.mechanism_step import FINISHED, IMPACT
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
+from gauss.dynamics.contact.compiled_mechanism_step import CompiledStepMemory
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.free_body_step import ATTEMPTS, REACH_MARGIN
@@ -57,11 +59,11 @@ class MechanismStep(NamedTuple):
     ----------
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates at its end.
-    contacts : NearContacts
-        Near contacts.
-    force : ndarray, shape (m, 3)
+    contacts : NearContacts or None
+        Near contacts; None of a step by machine code.
+    force : ndarray, shape (m, 3), or None
         Mean forces with impulses along their normals and tangents [N].
-    others : ndarray, shape (g + s,)
+    others : ndarray, shape (g + s,), or None
         Those of other unilateral constraints, and of set-valued elements [N, N m].
     power : ndarray, shape (3,)
         Mean power of drives, of forces on bodies, and of dissipation [W].
@@ -73,9 +75,9 @@ class MechanismStep(NamedTuple):
 
     q: np.ndarray
     v: np.ndarray
-    contacts: NearContacts
-    force: np.ndarray
-    others: np.ndarray
+    contacts: NearContacts | None
+    force: np.ndarray | None
+    others: np.ndarray | None
     power: np.ndarray
     error: float | None
     paradoxes: list[Paradox]
@@ -126,13 +128,13 @@ class MechanismStepper:
         self.detection = NearDetection(self.table, self.n + 1, system.scale.length)
         self.reach = np.zeros(self.n + 1)
         np.maximum.at(self.reach, self.table.body, self.table.length)
-        self.ground = np.concatenate([np.eye(3).ravel(), np.zeros(15)])[:, None]
         self._index_others()
         coupled = is_coupled_tree(self.smooth)
         self.free_columns = _null_space(self.smooth) if coupled else None
         self.shares = (0.0,) if self.smooth.closes or self.restitution.any() else (MIDPOINT, 0.0)
         self.acceleration_error = 0.0
-        self.known: tuple[np.ndarray, np.ndarray, np.ndarray]
+        single = self.free_columns is not None and (np.count_nonzero(self.free_columns, axis=1) <= 1).all()
+        self.memory = CompiledStepMemory(self) if single else None
         self.forget()
 
     def _index_others(self):
@@ -188,6 +190,20 @@ class MechanismStepper:
         """Forget the forces of the last step: a new motion begins."""
         self.detection.connect()
         self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(len(self.others) + self.limit.size)
+        if self.memory is not None:
+            self.memory.connect()
+
+    @property
+    def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces of the last step: keys of its contacts in order, forces (m, 3) of these, and of other constraints."""
+        return self._known if self.memory is None else self.memory.known
+
+    @known.setter
+    def known(self, found: tuple[np.ndarray, np.ndarray, np.ndarray]):
+        if self.memory is None:
+            self._known = found
+        else:
+            self.memory.known = found
 
     def step(self, state: State, h: float) -> MechanismStep:
         """Step of length h; the forces of the last step are the initial guess.
@@ -198,6 +214,43 @@ class MechanismStepper:
             If shapes overlap unseen by their gap functions, or no forces are found.
         """
         rest = self.system.scale.time * resting(self.system, state.v)
+        return self._compiled_step(state, h, rest) or self._python_step(state, h, rest)
+
+    def _compiled_step(self, state: State, h: float, rest: float) -> MechanismStep | None:
+        """The step by machine code; None where it is not finished."""
+        memory = self.memory
+        if memory is None:
+            return None
+        scale = self.system.scale
+        settings = {
+            "t": state.t,
+            "h": h,
+            "rest": rest,
+            "slow": sliding_above(self.system, state.v) * scale.time / scale.length,
+            "margin": REACH_MARGIN,
+            "missed": MISSED_CLOSING_RATE,
+            "jammed": JAMMED_RESPONSE,
+            "contact_unit": self.contact_unit,
+        }
+        for share in self.shares:
+            status = memory.step(state, settings | {"share": share})
+            if status != IMPACT:
+                break
+        if status != FINISHED:
+            return None
+        *power, error, doubtful = memory.at["results"]
+        paradoxes = self._examined(state, h, rest) if doubtful else []
+        q, v = memory.at["end_q"].copy(), memory.at["end_v"].copy()
+        return MechanismStep(q, v, None, None, None, np.array(power), error, paradoxes)
+
+    def _examined(self, state: State, h: float, rest: float) -> list[Paradox]:
+        """Painlevé's paradoxes of a step by machine code."""
+        known = self.known
+        found = self._python_step(state, h, rest).paradoxes
+        self.known = known
+        return found
+
+    def _python_step(self, state: State, h: float, rest: float) -> MechanismStep:
         for share in self.shares:
             begun = self._begin(state, h, share)
             speed = max(self._speed(begun, state.v), self._speed(begun, state.v + h * begun.acceleration))
@@ -224,6 +277,8 @@ class MechanismStepper:
         power = begun.power + np.array([work[~lossy].sum(), 0.0, -work[lossy].sum()])
         contacts, others = self._split(rows, near, force * rows.unit)
         self._keep(near, contacts, others)
+        if self.memory is not None:
+            self.memory.connect()
         paradoxes = self._paradoxes(state, rows, begun, near, force)
         return MechanismStep(q, v, near, contacts, others, power, error, paradoxes)
 
@@ -258,15 +313,14 @@ class MechanismStepper:
         """Largest speed of a point of a shape [m/s]."""
         if not self.n:
             return 0.0
-        twists = begun.terms.J @ v
+        twists = begun.terms.J[: self.n] @ v
         turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in (twists[:, :3], twists[:, 3:]))
         return float((moving + turning * self.reach[: self.n]).max())
 
     def _near(self, state: State, begun: _FreeStep, speed: float, h: float, share: float) -> NearContacts:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
-        bodies = np.concatenate([begun.terms.bodies, self.ground], axis=1)
-        near, overlaps = self.detection.find(bodies, reach, UNSEEN_OVERLAP)
+        near, overlaps = self.detection.find(begun.terms.bodies, reach, UNSEEN_OVERLAP)
         if overlaps:
             law, depth = overlaps[0]
             raise SimulationError(
@@ -280,11 +334,9 @@ class MechanismStepper:
         return near
 
     def _rows(self, terms: MechanismTerms, near: NearContacts) -> _StepRows:
-        n_v, g, m = self.smooth.n_v, len(self.others), near.gap.size
-        J = np.concatenate([terms.J, np.zeros((1, 6, n_v))])
-        contacts = (near.J[..., :6] @ J[near.bodies]).sum(axis=1)
-        twists = np.concatenate([terms.bodies[12:18].T, np.zeros((1, 6))])
-        rates = (near.J[..., :6] @ twists[near.bodies][..., None]).sum(axis=1)[..., 0]
+        g, m = len(self.others), near.gap.size
+        contacts = (near.J[..., :6] @ terms.J[near.bodies]).sum(axis=1)
+        rates = (near.J[..., :6] @ terms.bodies[12:18].T[near.bodies][..., None]).sum(axis=1)[..., 0]
         rough = np.flatnonzero(self.table.friction[near.law])
         unit = np.full(m, self.contact_unit)
         units = np.concatenate([unit, self.other_unit, np.full(2 * rough.size, self.contact_unit), self.set_unit])
@@ -409,17 +461,19 @@ class MechanismStepper:
 
     def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Forces over a step from a state, as of :meth:`forces_of`."""
-        return self.forces_of(self.step(state, h))
+        return self.forces_of(self._python_step(state, h, self.system.scale.time * resting(self.system, state.v)))
 
     def forces_of(self, step: MechanismStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""
         normal, friction = np.zeros(self.gap_count), np.zeros((self.gap_count, 3))
-        near, own = step.contacts, np.setdiff1d(np.arange(self.gap_count), self.other_places)
-        normal[self.other_places] = step.others[: len(self.others)]
+        near, force, others = step.contacts, step.force, step.others
+        assert near is not None and force is not None and others is not None  # a step by Python
+        own = np.setdiff1d(np.arange(self.gap_count), self.other_places)
+        normal[self.other_places] = others[: len(self.others)]
         if near.gap.size:
             places = own[self.table.gap_places(near.key)]
-            normal[places] = step.force[:, 0]
-            across = (step.force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1)
+            normal[places] = force[:, 0]
+            across = (force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1)
             friction[places] = across * self.table.sides(near.key)[:, None]
         return normal, friction
 

@@ -354,10 +354,10 @@ def _both(one, other):
     return math.where(one, math.where(other, 1.0, 0.0), 0.0)
 
 
-def least_rate(width, rate, restitution: float, h, rest, share):
+def least_rate(width, rate, restitution: Scalar, h, rest, share):
     """Least rate of a gap after a step; penetration is removed over a whole step at least, without oscillation."""
     shut = math.where(width > 0.0, -width / ((1.0 - share) * h), -width / h)
-    if not restitution:
+    if isinstance(restitution, float) and not restitution:
         return shut
     hit = _both(width + h * rate <= 0.0, rate < -rest)
     return math.where(hit > share, -restitution * rate, shut)

@@ -145,7 +145,8 @@ def _agrees(law, traced: Function, motion: Kinematics) -> bool:
     states = [replace(system.reference, t=float(t)) for t in PROBES * system.scale.time]
     if arguments(law) > 1:
         step = ASIDE * system.scale.coordinates * np.random.default_rng(0).uniform(-1.0, 1.0, system.n_v)
-        states.append(replace(states[1], q=retract(system, system.reference.q, step)))
+        q, v = retract(system, system.reference.q, step), step / system.scale.time
+        states.append(replace(states[1], q=q, v=v))
     for state in states:
         try:
             pairs.append(_values(law, traced, motion, state))
