@@ -212,3 +212,12 @@ def test_penetration_at_the_start_is_refused():
     scene = arm("deep arm", height=0.3)
     with pytest.raises(StateError, match="inside of 'touch'"):
         moved(scene, STEP, plan=KERNELS)
+
+
+def test_samples_beside_the_steps_are_those_of_the_written_out_step():
+    system, times = gauss.compile_scene(driven()), np.linspace(0.0, 0.1, 27)
+    one, other = (moved(system, 0.1, plan=plan, times=times) for plan in (WRITTEN_OUT, KERNELS))
+    np.testing.assert_array_equal(one.t, other.t)
+    np.testing.assert_allclose(one.q, other.q, atol=SAME_STEPS)
+    again = moved(system, 0.1, plan=KERNELS, times=times)
+    np.testing.assert_array_equal(again.q, other.q)
