@@ -30,8 +30,13 @@ END = "<!-- end of what is made from the tables of results -->"
 
 def main():
     """Write the section."""
+    rewrite(Path(__file__).parent / "README.md", section(), BEGIN, END)
+
+
+def section() -> str:
+    """The section, its marks included."""
     lines = [*_suite(), *_published(), *_by_qpbenchmark(), *_claims(), *_lies(), "", *_classes()]
-    rewrite(Path(__file__).parent / "README.md", "\n".join([BEGIN, "", *lines, "", END]), BEGIN, END)
+    return "\n".join([BEGIN, "", *lines, "", END])
 
 
 def _suite() -> Iterator[str]:

@@ -222,7 +222,12 @@ def chart(
         typer.Option(help="A curve with this backend for the first of the integrators, or each given; may be repeated."),
     ] = None,
     time_limit: Annotated[
-        float, typer.Option("--time-limit", "--patience", help="Settings get finer until a run takes so long [s].")
+        float,
+        typer.Option(
+            "--time-limit",
+            "--patience",
+            help="Settings get finer until a run takes so long [s]; three with each backend at least.",
+        ),
     ] = 0.5,
     output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),
     root: Root = "fixed",

@@ -13,10 +13,9 @@ from math import inf
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.builder import SceneBuilder, name_of
-from gauss.scene.joint import Joint
 from gauss.scene.loads import Drive, Force
 
-# What an output measures → the kind of element that it is measured of, and the number of its values; 0: that of the joint.
+# What an output measures → the kind of element that it is measured of, and the number of its values; 0: that of the element.
 SENSORS = {
     "coordinate": ("joint", 0),
     "rate": ("joint", 0),
@@ -27,6 +26,9 @@ SENSORS = {
     "acceleration": ("frame", 3),
     "accelerometer": ("frame", 3),
     "gyroscope": ("frame", 3),
+    "joint_force": ("joint", 3),
+    "joint_moment": ("joint", 3),
+    "contact_force": ("contact", 0),
 }
 
 
@@ -71,12 +73,7 @@ class Input:
         values.keep(self, limits=(low, high))
 
     def _check_what_it_acts_on(self, what: str):
-        if isinstance(self.joint, str):
-            values.text(self.joint, f"{what}: joint")
-        else:
-            pairs = self.joint.items() if isinstance(self.joint, Mapping) else self.joint
-            factors = [(values.text(joint, f"{what}: joint"), factor) for joint, factor in pairs]
-            values.keep(self, joint=tuple((joint, values.number(x, f"{what}: joint", "1")) for joint, x in factors))
+        self._keep_joints(what)
         if not isinstance(self.forces, tuple | list) or not all(isinstance(force, Force) for force in self.forces):
             raise SceneError(f"{what}: forces: expected Force elements, got {self.forces!r}.")
         values.keep(self, forces=tuple(self.forces))
@@ -84,6 +81,18 @@ class Input:
             raise SceneError(f"{what}: name a joint that it acts on, or give forces.")
         if self.effort is not None and (not callable(self.effort) or values.arguments(self.effort) != 3):
             raise SceneError(f"{what}: effort: expected a function of (u, t, motion), got {self.effort!r}.")
+
+    def _keep_joints(self, what: str):
+        """Keep the joints as pairs of a name and a factor; a single name as it is."""
+        if isinstance(self.joint, str):
+            values.text(self.joint, f"{what}: joint")
+            return
+        pairs = self.joint.items() if isinstance(self.joint, Mapping) else self.joint
+        try:
+            found = [(values.text(joint, f"{what}: joint"), factor) for joint, factor in pairs]
+        except (TypeError, ValueError):
+            raise SceneError(f"{what}: joint: expected a name, or {{name: factor}}, got {self.joint!r}.") from None
+        values.keep(self, joint=tuple((joint, values.number(factor, f"{what}: joint", "1")) for joint, factor in found))
 
     @property
     def acts_on(self) -> dict[str, float]:
@@ -114,9 +123,11 @@ class Output:
     kind : str
         "coordinate" [rad, m] or "rate" [rad/s, m/s] of a joint; of a point of a body or frame, in world axes, "position"
         (3,) [m], "rotation" (3, 3) row by row, "velocity" (3,) [m/s], "angular_velocity" (3,) [rad/s] or "acceleration" (3,)
-        [m/s²]; in its own axes, "accelerometer" (3,), acceleration less gravity [m/s²], or "gyroscope" (3,) [rad/s].
+        [m/s²]; in its own axes, "accelerometer" (3,), acceleration less gravity [m/s²], or "gyroscope" (3,) [rad/s]. Of the
+        parent on the child of a joint, in world axes, "joint_force" (3,) [N] and "joint_moment" (3,) about the joint point
+        [N m]. "contact_force" [N, N m], one value for each gap of a contact, stop or rope.
     of : str
-        Joint, or body or frame.
+        Joint; body or frame; contact, stop or rope.
     at : array_like, shape (3,)
         Point in the body or frame [m].
     """
@@ -134,12 +145,14 @@ class Output:
         values.text(self.of, f"{what}: of")
         values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
 
-    def size(self, joints: Mapping[str, Joint]) -> int:
-        """Number of its values, given the joints of the scene."""
-        fixed = SENSORS[self.kind][1]
+    def size(self, scene) -> int:
+        """Number of its values in a scene."""
+        measured, fixed = SENSORS[self.kind]
         if fixed:
             return fixed
-        pair = joints[self.of].pair
+        if measured == "contact":
+            return len(scene.contacts[self.of].sides(scene))
+        pair = scene.joints[self.of].pair
         return pair.n_q if self.kind == "coordinate" else pair.n_v
 
 
@@ -177,5 +190,5 @@ class InputBuilder(SceneBuilder):
         return self.add(Input(name, name_of(joint), limits, effort, forces))
 
     def output(self, name: str, kind: str, of, at=(0.0, 0.0, 0.0)) -> Output:
-        """Measure a joint, body or frame; see :class:`gauss.scene.Output` for the kinds."""
+        """Measure a joint, body, frame or contact; see :class:`gauss.scene.Output` for the kinds."""
         return self.add(Output(name, kind, name_of(of), at))

@@ -47,6 +47,7 @@ ELEMENTS = {
     "free, damped": (FREE.format('damping="2"', ""), ""),
     "free, with armature": (FREE.format('armature="0.7"', ""), ""),
     "ball on the ground, with armature": (BALL.format(f'armature="0.7" {SOFT}'), ""),
+    "ball with armature": (FREE.format("", 'armature="0.3"'), ""),
     "gravcomp": (arm(a=' gravcomp="1"', b=' gravcomp="0.3"'), ""),
     "a medium": (arm(), "", WIND),
     "a medium around ellipsoids": (arm(g=' fluidshape="ellipsoid"', c=' fluidshape="ellipsoid"'), "", WIND),
@@ -78,7 +79,11 @@ ELEMENTS = {
     "two at one joint": acting('<motor name="m" joint="h"/><position name="n" joint="h" kp="2"/>'),
     "a switch": (*acting('<motor name="m" joint="h"/>'), '<option><flag actuation="disable"/></option>'),
 }
+WELD = '<equality><weld body1="a" body2="w" {}/></equality>'
+POINT = '<body name="w" pos="1 0 1"><freejoint/><geom size="0.1" pos="0.1 0 0"/></body>'
 HELD = {
+    "weld at another pose": (arm() + POINT, WELD.format('relpose="0.7 0.1 0.3 0.8 0.6 0 0" anchor="0.1 0.2 0"')),
+    "weld without torque": (arm() + POINT, WELD.format('torquescale="0"')),
     "path": (arm(), PATH.format("", "") + '<equality><tendon tendon1="t" polycoef="0.05 0 0 0 0"/></equality>'),
     "path by a sum": (
         arm(),
@@ -112,6 +117,13 @@ def test_elements_accelerate_as_in_mujoco(tmp_path, name):
 def test_held_tendons_accelerate_as_in_mujoco(tmp_path, name):
     path = _file(tmp_path, *HELD[name])
     assert deviation(path, quietly(path)) < CLOSED
+
+
+def test_friction_of_balls_and_free_joints_is_read(tmp_path):
+    loss = 'frictionloss="0.4"'
+    scene = quietly(_file(tmp_path, FREE.replace('quat="0.8 0.6 0 0"', "").format(loss, loss)))
+    assert [element.limit for element in scene.set_valued.values()] == [0.4] * 9
+    assert {element.joint for element in scene.set_valued.values()} >= {"F.x", "F.wz", "B.wx"}
 
 
 def test_names_of_actuators_are_those_of_inputs(tmp_path):

@@ -3,7 +3,7 @@
 import pytest
 
 import gauss
-from gauss.errors import FileError
+from gauss.errors import FileError, NotImportedWarning
 
 
 def _file(folder, bodies, rest="", head=""):
@@ -34,11 +34,10 @@ UNSUPPORTED = {  # bodies, the rest of the file, what the message says, and the 
         "'m'.*force is not affine",
         7,
     ),
-    "sticky ball": (BALL.format('frictionloss="1"'), "", "frictionloss of ball joint 'B'", 3),
-    "armature of a ball on a moving body": (
-        f'<body><joint/><geom size="0.1" pos="0.1 0 0"/>{BALL.format("armature=" + repr("1"))}</body>'.replace("'1'", '"1"'),
+    "a turned free joint with friction": (
+        '<body name="a" euler="10 0 0"><joint name="F" type="free" frictionloss="1"/><geom size="0.1"/></body>',
         "",
-        "armature of ball joint 'B'",
+        "frictionloss.* of free joint 'F'",
         3,
     ),
     "a filter that is never without control": (
@@ -53,6 +52,19 @@ UNSUPPORTED = {  # bodies, the rest of the file, what the message says, and the 
         "'m'.*limits the sum of its actuators",
         5,
     ),
+    "a tendon of a joint that is limited": (
+        HINGE.format('actuatorfrcrange="-1 1"'),
+        '<tendon><fixed name="t"><joint joint="h" coef="2"/></fixed></tendon>'
+        '<actuator><motor name="m" tendon="t"/></actuator>',
+        "'m'.*a joint that it moves limits the sum",
+        5,
+    ),
+    "a crank": (
+        HINGE.format(""),
+        '<actuator><general name="m" cranksite="s" slidersite="s" cranklength="1"/></actuator>',
+        "'m'.*only actuators",
+        5,
+    ),
     "a servo of a ball": (
         BALL.format(""),
         '<actuator><position name="m" joint="B" kp="2"/></actuator>',
@@ -60,21 +72,9 @@ UNSUPPORTED = {  # bodies, the rest of the file, what the message says, and the 
         5,
     ),
     "a curved spring": (HINGE.format('stiffness="1 2 0"'), "", "stiffness of joint 'h' beyond a constant", 3),
-    "open weld": (
-        TWO,
-        '<equality><weld name="e" body1="a" body2="b" relpose="1 0 0 1 0 0 0"/></equality>',
-        "'e'.*not that of",
-        5,
-    ),
     "a force that follows the motion": (
         HINGE.format(""),
         '<actuator><position name="m" site="s" refsite="s" gear="1 0 0 0 0 0"/></actuator>',
-        "'m'.*only actuators",
-        5,
-    ),
-    "a body": (
-        HINGE.format(""),
-        '<actuator><adhesion name="m" body="a" ctrlrange="0 1"/></actuator>',
         "'m'.*only actuators",
         5,
     ),
@@ -91,11 +91,19 @@ def test_what_is_not_modelled_is_refused_by_name_and_line(tmp_path, name):
 def test_lines_of_included_files_are_told(tmp_path):
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "tip.xml").write_text(
-        '<mujocoinclude>\n\n<body name="t"><joint type="ball" frictionloss="1"/><geom size="1"/></body></mujocoinclude>'
+        '<mujocoinclude>\n\n<body name="t"><joint stiffness="1 2"/><geom size="1"/></body></mujocoinclude>'
     )
     path = _file(tmp_path, '<body name="a"><joint/><geom size="1"/><include file="sub/tip.xml"/></body>')
-    with pytest.raises(FileError, match=r"frictionloss of ball joint .*tip.xml:3\)"):
+    with pytest.raises(FileError, match=r"stiffness of joint .*tip.xml:3\)"):
         gauss.load(path)
+
+
+def test_adhesion_needs_contacts(tmp_path):
+    path = _file(tmp_path, HINGE.format(""), '<actuator><adhesion name="m" body="a" ctrlrange="0 1"/></actuator>')
+    with pytest.warns(NotImportedWarning, match="adhesion, which needs contacts, of actuators m"):
+        gauss.load(path)
+    with pytest.raises(FileError, match="not modelled: actuator 'm'"):
+        gauss.load(path, contacts=True)
 
 
 def test_files_below_a_root_folder_are_read(tmp_path):

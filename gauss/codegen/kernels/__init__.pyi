@@ -10,7 +10,13 @@ from gauss.codegen.kernels.column_pivoting import Pivots
 from gauss.codegen.kernels.compiled_loop import Loop, address
 from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
-from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record, updated_energy_record
+from gauss.codegen.kernels.energy_record import (
+    ENERGY_RECORD,
+    ENERGY_SAMPLE,
+    initial_energy_record,
+    recorded_energies,
+    updated_energy_record,
+)
 from gauss.codegen.kernels.explicit import ExplicitTrial, Interpolation, stride
 from gauss.codegen.kernels.first_accepted import FirstAccepted
 from gauss.codegen.kernels.fixed_point import FixedPoint
@@ -77,6 +83,7 @@ __all__ = [
     "Vector",
     "WORST_RECORD",
     "initial_energy_record",
+    "recorded_energies",
     "stride",
     "updated_energy_record",
 ]

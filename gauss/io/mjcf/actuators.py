@@ -31,6 +31,11 @@ def is_switched_off(model, i: int) -> bool:
     return group in GROUPS and bool(int(model.opt.disableactuator) >> group & 1)
 
 
+def adheres(model, i: int) -> bool:
+    """Whether it presses a body against those that it touches: without contacts it does nothing."""
+    return int(model.actuator_trntype[i]) == int(mujoco.mjtTrn.mjTRN_BODY)
+
+
 def n_controls(model, i: int) -> int:
     """How many controls an actuator has."""
     return int(model.actuator_ctrlnum[i]) if COUNT == "nactuator" else 1

@@ -70,18 +70,15 @@ def add_actuator(scene: Scene, named: Named, i: int):
     _add_load(scene, named, i, name, force)
     if not force.gain.any():
         return
-    acts_on, forces, u_0 = force.acted.acts_on, force.acted.forces, force.control
+    acts_on, forces, u_0, gain = force.acted.acts_on, force.acted.forces, force.control, float(force.gain[0])
+    effort = None
     if force.ranges or force.gain[1:].any() or u_0:
         effort = lambda u, t, motion: force.of(u, motion) - force.of(u_0, motion)  # noqa: E731
-    elif len(acts_on) == 1 and next(iter(acts_on.values())) * force.gain[0] == 1.0 and not forces:
-        effort = None
+    elif forces and gain != 1.0:
+        effort = lambda u, t, motion: gain * u  # noqa: E731
     else:
-        effort = None
-        gain = float(force.gain[0])
         acts_on = {joint: factor * gain for joint, factor in acts_on.items()}
-        if forces and gain != 1.0:
-            acts_on, effort = force.acted.acts_on, lambda u, t, motion: gain * u
-    joint = next(iter(acts_on)) if len(acts_on) == 1 and effort is None and set(acts_on.values()) == {1.0} else acts_on
+    joint = next(iter(acts_on)) if list(acts_on.values()) == [1.0] else acts_on
     scene.input(name, joint, control_range(model, i), effort, forces)
 
 

@@ -92,7 +92,7 @@ def _on_ellipsoid(model, g: int) -> Law:
         p, h = virtual_mass * v, virtual_inertia * omega
         speed, (numerator, denominator) = _norm(v), ((faces * v) @ (faces * v), (faces**2 * v) @ (faces**2 * v))
         shown = pi * np.sqrt(math.maximum(denominator, LEAST**2) / math.maximum(numerator, LEAST))
-        lean = numerator / math.maximum(speed * denominator, LEAST)
+        lean = numerator / math.maximum(speed * denominator, LEAST**2)
         circulation = c.kutta * rho * lean * shown * cross(faces**2 * v, v)
         drag = 3.0 * pi * mean * mu + rho * speed * (shown * c.blunt + c.slender * (greatest_face - shown))
         lift = c.magnus * rho * volume * cross(omega, v) + cross(circulation, v)

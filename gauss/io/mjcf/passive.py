@@ -11,15 +11,18 @@ import numpy as np
 
 from gauss import math, rotations
 from gauss.io.mjcf.names import SCALAR, Named
-from gauss.scene import Body, Scene
+from gauss.scene import GROUND, Body, Scene
 
 TINY = 1e-30  # square of the sine of half an angle, below which its root is not taken: the angle is zero but for rounding
 
 
 def add_passive(scene: Scene, named: Named, j: int):
-    """Spring and damper of a ball or free joint."""
+    """Spring, damper and dry friction of a ball or free joint."""
     model, name, kind = named.model, named.joints[j], named.kinds[j]
     dof, place = model.jnt_dofadr[j], model.jnt_qposadr[j]
+    if model.dof_frictionloss[dof] and kind not in SCALAR:
+        for rate in scene.joints[name].pair.rates:
+            scene.joint_friction(f"{name}.{rate}", float(model.dof_frictionloss[dof]))
     stiffness, damping = float(model.jnt_stiffness[j]), float(model.dof_damping[dof])
     if kind in SCALAR or not (stiffness or damping):
         return
@@ -71,6 +74,18 @@ def with_armature(named: Named, body: Body, i: int) -> Body:
     moments = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
     pose: dict[str, Any] = {"position": body.position, "rotation": body.rotation, "on": body.on}
     return Body(body.name, mass, tuple(map(float, moments)), tuple(com), **pose)
+
+
+def add_ball_armature(scene: Scene, named: Named, j: int):
+    """A rotor on the ground that turns with the angular velocity of a ball joint, of whose rates the armature is inertia."""
+    model, name = named.model, named.joints[j]
+    inertia = float(model.dof_armature[model.jnt_dofadr[j]])
+    if not inertia or armature_of(named, int(model.jnt_bodyid[j])):
+        return
+    rotor, shaft = f"rotor of {name}", f"shaft of {name}"
+    scene.body(rotor, 1.0, (inertia,) * 3)
+    scene.ball(shaft, GROUND, rotor)
+    scene.constrain(f"armature of {name}", velocity=lambda at: at.rate(shaft) - at.rate(name))
 
 
 def add_compensation(scene: Scene, named: Named, i: int):

@@ -15,13 +15,13 @@ import numpy as np
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
 from gauss.io.guard import checked_root
-from gauss.io.mjcf.actuators import actuators, is_switched_off
+from gauss.io.mjcf.actuators import actuators, adheres, is_switched_off
 from gauss.io.mjcf.drives import add_actuator
 from gauss.io.mjcf.guard import guarded
 from gauss.io.mjcf.medium import add_medium
 from gauss.io.mjcf.names import SITE, Named
-from gauss.io.mjcf.passive import add_compensation, add_passive, with_armature
-from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, left_out, refused
+from gauss.io.mjcf.passive import add_ball_armature, add_compensation, add_passive, with_armature
+from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, WELD, is_closed, left_out, refused
 from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
 from gauss.io.mjcf.tendon_path import TendonPath
@@ -80,7 +80,7 @@ def read_mjcf(
     except (ValueError, RuntimeError) as error:
         raise FileError(f"{path}: MuJoCo refuses it: {error}") from error
     named = Named(model, source)
-    against = refused(named)
+    against = refused(named, contacts)
     if against:
         raise FileError(f"{path}: not modelled: {'; '.join(against)}. Remove them from the file, or model them in gauss.")
     try:
@@ -116,7 +116,7 @@ class _MjcfReader:
             if self.model.eq_active0[i]:
                 self._equality(scene, i)
         for i in actuators(self.model):
-            if not is_switched_off(self.model, i):
+            if not is_switched_off(self.model, i) and not adheres(self.model, i):
                 add_actuator(scene, self.named, i)
         add_start(scene, self.named, keyframe)
         return scene
@@ -159,6 +159,7 @@ class _MjcfReader:
         if kind == "ball":
             scene.joint(name, kind, parent, child, **options)
             add_passive(scene, self.named, j)
+            add_ball_armature(scene, self.named, j)
             return
         if model.jnt_limited[j]:
             options["limits"] = bounds(*(model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]).tolist())
@@ -190,6 +191,8 @@ class _MjcfReader:
             self._of_joints(scene, name, one, other, data)
         elif kind == TENDON:
             self._of_tendons(scene, name, one, other, data)
+        elif kind == WELD and (not data[10] or not is_closed(self.named, i)):
+            self._weld(scene, name, i, one, other, data)
         elif int(model.eq_objtype[i]) == SITE:
             self._of_sites(scene, name, kind, one, other)
         elif kind == CONNECT:
@@ -215,6 +218,29 @@ class _MjcfReader:
         else:
             couple_tendons(scene, name, path, TendonPath(self.named, other), data[:5].tolist())
 
+    def _weld(self, scene: Scene, name: str, i: int, one: int, other: int, data):
+        """A weld at another pose than that of the file, or of points alone: p₁ = p₂, R₁ R = R₂."""
+        ends = [(body, np.zeros(3), np.eye(3)) for body in (self.bodies[one], self.bodies[other])]
+        if int(self.model.eq_objtype[i]) == SITE:
+            ends = [(self.bodies[int(self.model.site_bodyid[s])], *_site_pose(self.model, s)) for s in (one, other)]
+            data = np.array([*np.zeros(6), 1.0, 0.0, 0.0, 0.0, data[10]])
+        (first, p_1, R_1), (second, p_2, R_2) = ends
+        at, other_at = p_1 + R_1 @ data[3:6], p_2 + R_2 @ data[:3]
+        if not data[10]:  # no torque
+            scene.coincident(name, first, second, tuple(at), tuple(other_at))
+            return
+        axes = R_1 @ _matrix(data[6:10]) @ R_2.T
+
+        def residual(view):
+            turned = (view.rotation(first) @ axes).T @ view.rotation(second)
+            sines = turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]
+            scale = 0.5 * (
+                1.0 + turned[0, 0] + turned[1, 1] + turned[2, 2]
+            )  # 1 + cos: not zero for half a turn, as a sine is
+            return [*(view.position(second, other_at) - view.position(first, at)), *(sine / scale for sine in sines)]
+
+        scene.constrain(name, residual)
+
     def _of_sites(self, scene: Scene, name: str, kind: int, one: int, other: int):
         bodies = [self.bodies[int(self.model.site_bodyid[site])] for site in (one, other)]
         points = [tuple(self.model.site_pos[site]) for site in (one, other)]
@@ -222,6 +248,11 @@ class _MjcfReader:
             scene.coincident(name, *bodies, *points)
         else:
             scene.fixed(name, bodies[0], bodies[1], points[0], frame=bodies[0])
+
+
+def _site_pose(model, site: int) -> tuple[np.ndarray, np.ndarray]:
+    """Point and axes of a site in its body."""
+    return np.array(model.site_pos[site]), _matrix(model.site_quat[site])
 
 
 def _matrix(quaternion) -> np.ndarray:

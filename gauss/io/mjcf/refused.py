@@ -7,6 +7,7 @@ import numpy as np
 
 from gauss.io.mjcf.actuators import (
     actuators,
+    adheres,
     bias_of,
     control,
     gain_of,
@@ -16,7 +17,6 @@ from gauss.io.mjcf.actuators import (
     n_controls,
 )
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
-from gauss.io.mjcf.passive import armature_of
 from gauss.io.mjcf.start import START, key_of
 from gauss.io.mjcf.tendon_path import TendonPath
 from gauss.io.mjcf.transmissions import JOINT as ON_JOINT
@@ -38,11 +38,11 @@ Finding = tuple[str, str, int]  # what is refused, kind and number of the elemen
 WELD_TOLERANCE = 1e-9  # rad, and of the extent of the model: poses of a weld that are those of the file
 
 
-def refused(named: Named) -> list[str]:
+def refused(named: Named, contacts: bool = False) -> list[str]:
     """Everything that moves the mechanism and has no counterpart."""
     model, found = named.model, []
     found += [f"flexible body {i}" for i in range(model.nflex)]
-    parts = [*_of_joints(named), *_curved(named), *_without_counterpart(named)]
+    parts = [*_of_joints(named), *_curved(named), *_without_counterpart(named, contacts)]
     return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
 
 
@@ -64,7 +64,7 @@ def _curved(named: Named) -> Iterator[Finding]:
             yield f"damping of joint {named.joints[i]!r} beyond a constant one", "joint", i
 
 
-def _without_counterpart(named: Named) -> Iterator[Finding]:
+def _without_counterpart(named: Named, contacts: bool) -> Iterator[Finding]:
     model = named.model
     for kind, count, against in (
         ("tendon", model.ntendon, _against_tendon),
@@ -73,39 +73,58 @@ def _without_counterpart(named: Named) -> Iterator[Finding]:
     ):
         for i in range(count):
             why = against(named, i)
-            if why:
+            if why and not (kind == "actuator" and not contacts and adheres(model, i)):
                 yield f"{kind} {named.name(kind, i)!r}: {why}", kind, i
 
 
 def left_out(named: Named, stops: bool = False, contacts: bool = False, keyframe: str | int | None = None) -> list[str]:
     """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
-    model, kept = named.model, _inactive(named, keyframe)
+    parts = _untouched(named, contacts) + _unlimited(named, stops) + _inactive(named, keyframe) + _uncontrolled(named)
+    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
+
+
+def _untouched(named: Named, contacts: bool) -> list[tuple[str, list[str]]]:
+    """Contacts, and what is on surfaces."""
+    model = named.model
+    if contacts:
+        return [("surface velocity and adhesion of geoms", _sticky(named))]
     touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity).tolist()]
-    limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited).tolist()]
-    turning = [named.joints[i] for i in np.flatnonzero(model.jnt_limited).tolist() if named.kinds[i] not in SCALAR]
+    return [("contacts of geoms", touching), ("contacts of pairs", [named.name("pair", i) for i in range(model.npair)])]
+
+
+def _unlimited(named: Named, stops: bool) -> list[tuple[str, list[str]]]:
+    """Limits of joints and tendons."""
+    model = named.model
+    limited = np.flatnonzero(model.jnt_limited).tolist()
+    if stops:
+        return [("limits of ball joints", [named.joints[i] for i in limited if named.kinds[i] not in SCALAR])]
     tied = [named.name("tendon", i) for i in np.flatnonzero(model.tendon_limited).tolist() if TendonPath(named, i).is_fixed]
-    pairs = [named.name("pair", i) for i in range(model.npair)]
-    parts = [] if contacts else [("contacts of geoms", touching), ("contacts of pairs", pairs)]
-    parts += [("surface velocity and adhesion of geoms", _sticky(named))] if contacts else []
-    parts += [] if stops else [("limits, kept for the assembly of a start only, of joints", limited)]
-    parts += [("limits of ball joints", turning)] if stops else [("limits of tendons", tied)]
-    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts + kept if names]
+    joints = [named.joints[i] for i in limited]
+    return [("limits, kept for the assembly of a start only, of joints", joints), ("limits of tendons", tied)]
 
 
 def _inactive(named: Named, keyframe: str | int | None) -> list[tuple[str, list[str]]]:
     """Elements that are switched off, stand still, or name other states."""
     model = named.model
     inactive = [named.name("equality", i) for i in range(model.neq) if not model.eq_active0[i]]
-    off = [named.name("actuator", i) for i in actuators(model) if is_switched_off(model, i)]
-    slow = [named.name("actuator", i) for i in actuators(model) if has_state(model, i) and not is_switched_off(model, i)]
     standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0).tolist()]
     keys = [named.name("key", i) for i in range(model.nkey) if i != key_of(named, keyframe)]
     return [
         ("equalities that are not active:", inactive),
-        ("actuators that are switched off:", off),
-        ("controls of actuators with states of their own, which are 0:", slow),
         ("what moves mocap bodies, which stand still:", standing),
         (f"key frames (one called {START!r}, or that keyframe= names, would be the start):", keys),
+    ]
+
+
+def _uncontrolled(named: Named) -> list[tuple[str, list[str]]]:
+    """Actuators that do nothing, or that nobody can control."""
+    model = named.model
+    name = lambda i: named.name("actuator", i)  # noqa: E731
+    acting = [i for i in actuators(model) if not is_switched_off(model, i)]
+    return [
+        ("actuators that are switched off:", [name(i) for i in actuators(model) if is_switched_off(model, i)]),
+        ("adhesion, which needs contacts, of actuators", [name(i) for i in acting if adheres(model, i)]),
+        ("controls of actuators with states of their own, which are 0:", [name(i) for i in acting if has_state(model, i)]),
     ]
 
 
@@ -117,11 +136,11 @@ def _sticky(named: Named) -> list[str]:
 
 def _of_joint(named: Named, i: int) -> list[str]:
     """What a ball or free joint has that only a hinge or slide may have."""
-    model, dof = named.model, named.model.jnt_dofadr[i]
-    if named.kinds[i] in SCALAR:
+    model, dof, body = named.model, named.model.jnt_dofadr[i], int(named.model.jnt_bodyid[i])
+    if named.kinds[i] != "free":
         return []
-    found = ["frictionloss"] if model.dof_frictionloss[dof] else []
-    return found + (["armature"] if model.dof_armature[dof] and not armature_of(named, int(model.jnt_bodyid[i])) else [])
+    turned = bool(np.any(model.body_quat[body, 1:]))
+    return ["frictionloss, in axes that are not those of the world,"] if model.dof_frictionloss[dof] and turned else []
 
 
 def _against_tendon(named: Named, i: int) -> str:
@@ -147,10 +166,10 @@ def _against_equality(named: Named, i: int) -> str:
         return "only connect, weld, joint and tendon are read"
     if int(model.eq_objtype[i]) not in (BODY, SITE):
         return "it binds neither bodies nor sites"
-    return "" if kind == CONNECT or _is_closed(named, i) else "the welded pose is not that of the file"
+    return ""
 
 
-def _is_closed(named: Named, i: int) -> bool:
+def is_closed(named: Named, i: int) -> bool:
     """Whether a weld holds what the file shows."""
     data = mujoco.MjData(named.model)
     mujoco.mj_kinematics(named.model, data)
@@ -181,12 +200,26 @@ def _against_force(named: Named, i: int, acted: ActuatorTransmission) -> str:
     model, numbers = named.model, np.abs(gain_of(named.model, i)) + np.abs(bias_of(named.model, i))
     if (numbers[1] and acted.length is None) or (numbers[2] and acted.rate is None):
         return "its force depends on the motion of what has several freedoms, or of a site beside another"
-    if acted.range is not None and len(acted.acts_on) + len(acted.forces) > 1:
+    on_joint = int(model.actuator_trntype[i]) in (ON_JOINT, JOINT_IN_PARENT)
+    if not on_joint and _reaches_limited(named, acted):
+        return "a joint that it moves limits the sum of its forces (actuatorfrcrange); act on that joint alone"
+    return "" if acted.range is None else _against_range(named, i, acted, on_joint)
+
+
+def _against_range(named: Named, i: int, acted: ActuatorTransmission, on_joint: bool) -> str:
+    """Why the range of the force that a joint or tendon bears has no counterpart."""
+    model = named.model
+    if on_joint and model.jnt_actgravcomp[int(model.actuator_trnid[i, 0])]:
+        return "what it pulls limits its force, and gravity compensation with it (actuatorgravcomp)"
+    if on_joint and len(acted.acts_on) != 1:
         return "what it pulls limits its force (actuatorfrcrange); limit the force of the actuator"
     ends = [(int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])) for k in actuators(model)]
-    on_joint = ends[i][0] in (ON_JOINT, JOINT_IN_PARENT)
-    if acted.range is not None and on_joint and model.jnt_actgravcomp[ends[i][1]]:
-        return "what it pulls limits its force, and gravity compensation with it (actuatorgravcomp)"
-    if acted.range is not None and ends.count(ends[i]) > 1:
+    if ends.count(ends[i]) > 1:
         return "what it pulls limits the sum of its actuators (actuatorfrcrange); limit each actuator"
     return ""
+
+
+def _reaches_limited(named: Named, acted: ActuatorTransmission) -> bool:
+    """Whether an actuator of a tendon or site moves a joint that limits the force of all its actuators."""
+    limited = [named.joints[j] for j in np.flatnonzero(named.model.jnt_actfrclimited).tolist()]
+    return bool(limited) and (bool(acted.forces) or bool(set(limited) & acted.acts_on.keys()))
