@@ -64,7 +64,8 @@ def deviation(path, scene: gauss.Scene) -> float:
 def _random(system, rng) -> State:
     """Random state that satisfies the constraints."""
     state = random_state(system, rng)
-    if not (system.scene.couplings or system.scene.relations or system.closes):
+    scene = system.scene
+    if not (scene.couplings or scene.relations or system.closes or len(scene.joints) > len(scene.bodies)):
         return state
     rest = system.reference
     q = rest.q + SPREAD * (state.q - rest.q) * (not system.quaternions)

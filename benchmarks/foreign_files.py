@@ -6,8 +6,9 @@ Run it with:
 
 Each folder holds a copy of a public source, as a wheel of the Python package index unpacked (gymnasium, gymnasium-robotics,
 dm_control, brax, robosuite) or a checkout (google-deepmind/mujoco, gazebosim/gz-sim, gazebosim/sdformat). It is the root
-folder of its files. Files that MuJoCo itself refuses, that hold flexible bodies or plugins, or where nothing moves are counted
-apart. Accelerations are compared at random states without contacts, limits and friction.
+folder of its files. Files that MuJoCo itself refuses, that hold flexible bodies or plugins, or where nothing moves, are
+counted apart, as are SDFormat files with models on a server. Accelerations are compared at random states and controls,
+without contacts, limits and friction.
 """
 
 import argparse
@@ -29,7 +30,10 @@ PATIENCE = 120  # s for each file
 AGREED = 1e-9  # relative deviation of accelerations; of closed loops, whose reference is differenced, AGREED_LOOPS
 AGREED_LOOPS = 1e-5
 KINDS = {".xml": "mujoco", ".sdf": "sdf", ".world": "sdf"}
+ON_SERVER = "it is on a server"
 STILL = ("nothing moves", "there is no model in it")
+STATES = ("agreed", "opened", "nothing moves", "differs", "refused", "too slow", "crashed")
+APART = ("model on a server", "refused by MuJoCo", "flex or plugin")
 QUOTED, NUMBER = re.compile(r"'[^']*'"), re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -39,7 +43,7 @@ class FileRecord(NamedTuple):
     source: str
     path: str
     status: str
-    reasons: tuple[str, ...]
+    reasons: tuple[str, ...] = ()
     deviation: float = float("nan")
     has_loops: bool = False
 
@@ -59,33 +63,36 @@ def root_of(path: Path) -> str:
 
 def of_file(folder: Path, path: Path) -> FileRecord:
     """Open a file and compare its accelerations."""
-    make = lambda status, *rest: FileRecord(folder.name, str(path.relative_to(folder)), status, *rest)  # noqa: E731
-    if path.suffix == ".xml":
-        apart = excluded(path)
-        if apart:
-            return make(apart, ())
     signal.alarm(PATIENCE)
     try:
-        scene = gauss.load(path, root_folder=folder)
-        status = "opened" if any(joint.kind != "fixed" for joint in scene.joints.values()) else "nothing moves"
-        if path.suffix != ".xml" or status != "opened":
-            return make(status, ())
-        try:
-            found = deviation(path, scene)
-            agreed = found < (AGREED_LOOPS if scene.relations or scene.couplings else AGREED)
-            return make("agreed" if agreed else "differs", (), found, bool(scene.relations))
-        except NotCompared:
-            return make("opened", (), float("nan"))
+        apart = excluded(path) if path.suffix == ".xml" else ""
+        found = (apart,) if apart else opened(folder, path)
     except GaussError as error:
-        if any(words in str(error) for words in STILL):
-            return make("nothing moves", ())
-        return make("refused", reasons(str(error)))
+        still = any(words in str(error) for words in STILL)
+        gone = not still and ON_SERVER in str(error)
+        found = ("nothing moves",) if still else ("model on a server",) if gone else ("refused", reasons(str(error)))
     except TimeoutError:
-        return make("too slow", ())
+        found = ("too slow",)
     except Exception as error:  # a fault of gauss
-        return make("crashed", (f"{type(error).__name__}: {error}"[:90],))
+        found = ("crashed", (f"{type(error).__name__}: {error}"[:90],))
     finally:
         signal.alarm(0)
+    return FileRecord(folder.name, str(path.relative_to(folder)), *found)
+
+
+def opened(folder: Path, path: Path) -> tuple:
+    """Status, no reasons, deviation of accelerations and whether loops are closed, of a file that opens."""
+    scene = gauss.load(path, root_folder=folder)
+    if all(joint.kind == "fixed" for joint in scene.joints.values()):
+        return ("nothing moves",)
+    if path.suffix != ".xml":
+        return ("opened",)
+    has_loops = bool(scene.relations or scene.couplings) or len(scene.joints) > len(scene.bodies)
+    try:
+        found = deviation(path, scene)
+    except NotCompared:
+        return ("opened",)
+    return "agreed" if found < (AGREED_LOOPS if has_loops else AGREED) else "differs", (), found, has_loops
 
 
 def excluded(path: Path) -> str:
@@ -101,45 +108,50 @@ def excluded(path: Path) -> str:
 
 
 def reasons(message: str) -> tuple[str, ...]:
-    """Reasons of a refusal without names, places and numbers."""
-    message = re.sub(r"\([^()]*:\d+\)", "", message)
+    """Reasons of a refusal without names, places, numbers and advice."""
     text = re.sub(r"^\S+?\.(xml|sdf|world)(:\d+)?: (not modelled: )?", "", message).partition(". Remove them")[0]
-    return tuple(sorted({NUMBER.sub("#", QUOTED.sub("…", one)).strip()[:110] for one in text.split("; ")}))
+    parts = [part.strip("; ").partition("; ")[0].strip() for part in re.split(r"\([^()]*:\d+\)", text)]
+    return tuple(sorted({NUMBER.sub("#", QUOTED.sub("…", part))[:110] for part in parts if part}))
 
 
 def page(found: list[FileRecord]) -> list[str]:
     """Page of the results."""
-    states = ("agreed", "opened", "nothing moves", "differs", "refused", "too slow", "crashed")
-    apart = ("refused by MuJoCo", "flex or plugin")
-    lines = [
-        "# Model files of others",
-        "",
-        *(__doc__ or "").split("\n")[9:],
-        f"gauss {gauss.__version__}, MuJoCo {mujoco.__version__}.",
-        "",
-    ]
-    lines += [
-        f"| source | files | {' | '.join((*states, *apart))} | of those that move, open |",
-        "|---" * (3 + len(states + apart)) + "|",
-    ]
-    for source in [*dict.fromkeys(one.source for one in found), "all"]:
-        own = [one for one in found if source in (one.source, "all")]
-        count = Counter(one.status for one in own)
-        opened = count["agreed"] + count["opened"] + count["differs"]
-        moving = opened + count["refused"] + count["too slow"] + count["crashed"]
-        share = f"{opened} of {moving}: {100 * opened / max(moving, 1):.0f} %"
-        lines.append(f"| {source} | {len(own)} | {' | '.join(str(count[s]) for s in (*states, *apart))} | {share} |")
-    worst = [one.deviation for one in found if one.status == "agreed" and not one.has_loops]
-    lines += ["", f"Largest relative deviation of accelerations of the trees that agree: {max(worst, default=0.0):.1e}.", ""]
-    lines += ["| refused for | files | alone |", "|---|---|---|"]
+    about = (__doc__ or "").split("\n")[6:]
+    lines = ["# Model files of others", "", *about, f"gauss {gauss.__version__}, MuJoCo {mujoco.__version__}.", ""]
+    lines += [f"| source | files | {' | '.join((*STATES, *APART))} | of those that move, open |"]
+    lines += ["|---" * (3 + len(STATES + APART)) + "|"]
+    lines += [_row(source, [one for one in found if source in (one.source, "all")]) for source in _sources(found)]
+    trees = [one.deviation for one in found if one.status == "agreed" and not one.has_loops]
+    loops = [one.deviation for one in found if one.status == "agreed" and one.has_loops]
+    lines += ["", "Largest relative deviation of accelerations of those that agree: "]
+    lines += [f"{max(trees, default=0.0):.1e} of trees, {max(loops, default=0.0):.1e} of loops (differenced).", ""]
+    return [*lines, *_refusals(found), *_exceptions(found), ""]
+
+
+def _sources(found: list[FileRecord]) -> list[str]:
+    return [*dict.fromkeys(one.source for one in found), "all"]
+
+
+def _row(source: str, own: list[FileRecord]) -> str:
+    count = Counter(one.status for one in own)
+    good = count["agreed"] + count["opened"] + count["differs"]
+    moving = good + count["refused"] + count["too slow"] + count["crashed"]
+    numbers = " | ".join(str(count[status]) for status in (*STATES, *APART))
+    return f"| {source} | {len(own)} | {numbers} | {good} of {moving}: {100 * good / max(moving, 1):.0f} % |"
+
+
+def _refusals(found: list[FileRecord]) -> list[str]:
     refused = [one.reasons for one in found if one.status == "refused"]
     alone = Counter(one[0] for one in refused if len(one) == 1)
-    for reason, number in Counter(reason for one in refused for reason in one).most_common():
-        lines.append(f"| {reason.replace('|', '/')} | {number} | {alone[reason]} |")
+    count = Counter(reason for one in refused for reason in one)
+    rows = [f"| {reason.replace('|', '/')} | {number} | {alone[reason]} |" for reason, number in count.most_common()]
+    return ["| refused for | files | alone |", "|---|---|---|", *rows]
+
+
+def _exceptions(found: list[FileRecord]) -> list[str]:
     odd = [one for one in found if one.status in ("differs", "crashed", "too slow")]
-    lines += ["", "| file | status | |", "|---|---|---|"] if odd else []
-    lines += [f"| {one.source}/{one.path} | {one.status} | {one.deviation:.1e} {' '.join(one.reasons)} |" for one in odd]
-    return [*lines, ""]
+    rows = [f"| {one.source}/{one.path} | {one.status} | {one.deviation:.1e} {' '.join(one.reasons)} |" for one in odd]
+    return ["", "| file | status | |", "|---|---|---|", *rows] if rows else []
 
 
 def _too_slow(*_):

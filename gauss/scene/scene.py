@@ -358,7 +358,10 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
 
     def _place_input(self, given: Input):
         self._require_new(given.name, "input", self.inputs | self.loads | self._constraints)
-        self._require_coordinate(given.joint, f"input {given.name!r}")
+        for joint in given.acts_on:
+            self._require_coordinate(joint, f"input {given.name!r}")
+        for force in given.forces:
+            self._require_body(force.body, f"input {given.name!r}: force {force.name!r}")
         self.inputs[given.name] = given
 
     def _place_output(self, output: Output):

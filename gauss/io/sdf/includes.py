@@ -77,48 +77,38 @@ class Includes:
             return []
         if file in seen:
             raise FileError(f"{place}: includes {file.name}, which includes it again.")
+        model = self._read(include, file)
+        self.expand(model, file, seen)
+        return merged(self.whole, include, model) if include.get("merge") in TRUE else [model]
+
+    def _read(self, include: Element, file: Path) -> Element:
+        """Model of a file, with the name, pose and so on that the include gives it."""
         inner = read_xml(file, ("sdf",), limits=UNBOUNDED, loose_comments=True)
         self.whole.places.update(inner.places)
         found = [child for child in inner.root if child.tag in ("model", "actor", "light")]
         if len(found) != 1:
+            place = self.whole.place(include)
             raise FileError(f"{place}: {file} holds {len(found)} models; a file of one can be included.")
         model = found[0]
-        if text(include, "name"):
-            model.set("name", text(include, "name"))
-        if include.find("placement_frame") is not None:
-            model.set("placement_frame", text(include, "placement_frame"))
-        for tag in MOVED:
-            given = include.find(tag)
+        for tag in ("name", "placement_frame"):
+            if text(include, tag):
+                model.set(tag, text(include, tag))
+        for given in (include.find(tag) for tag in MOVED):
             if given is not None:
-                for former in model.findall(tag):
+                for former in model.findall(given.tag):
                     model.remove(former)
                 model.insert(0, given)
         model.extend(include.findall("plugin"))
-        self.expand(model, file, seen)
-        if include.get("merge") in TRUE:
-            return merged(self.whole, include, model)
-        return [model]
+        return model
 
     def _file(self, include: Element, path: Path) -> Path | None:
         """File that an include names; None if there is none and it is left out."""
         uri, place = text(include, "uri"), self.whole.place(include)
         if not uri:
             raise FileError(f"{place}: <include> without <uri>; name the model there.")
-        named = SCHEME.sub("", uri)
-        homes = [path.resolve().parent, self.home] + ([self.root_folder] if self.root_folder else [])
-        if not uri.startswith(ON_SERVER):
-            for home in homes:
-                found = model_in(home / named.lstrip("/"))
-                if found:
-                    return self._allowed(include, found)
-        last = PurePosixPath(named).parts[-1:] or ("",)
-        if number(last[0]) is not None:  # a version on a server
-            last = PurePosixPath(named).parts[-2:-1]
-        below = [self.home] + ([self.root_folder] if self.root_folder else [])
-        for home in below if last else []:
-            found = search(home, last[0])
-            if found:
-                return self._allowed(include, found)
+        found = self._named(uri, path)
+        if found is not None:
+            return self._allowed(include, found)
         if self.leave_out:
             return None
         where = "it is on a server; get a copy of it" if uri.startswith(ON_SERVER) else "no such model"
@@ -126,6 +116,16 @@ class Includes:
             f"{place}: includes {uri!r}: {where} below the folder of the file, or below another that "
             "root_folder= names; or leave it out by missing='left out'."
         )
+
+    def _named(self, uri: str, path: Path) -> Path | None:
+        """Model file of a URI: where it says, else in a folder of its name below that of the file, or of the user."""
+        named, below = SCHEME.sub("", uri), [self.home] + ([self.root_folder] if self.root_folder else [])
+        for home in [] if uri.startswith(ON_SERVER) else [path.resolve().parent, *below]:
+            found = model_in(home / named.lstrip("/"))
+            if found:
+                return found
+        parts = [part for part in PurePosixPath(named).parts if number(part) is None]  # without a version on a server
+        return next((found for home in below if parts and (found := search(home, parts[-1]))), None)
 
     def _allowed(self, include: Element, found: Path) -> Path:
         require_inside(self.whole, include, self.home, str(found), self.root_folder)
@@ -185,16 +185,20 @@ def model_in(place: Path) -> Path | None:
         return place
     if not place.is_dir():
         return None
-    configured = place / "model.config"
-    if configured.is_file():
-        files = [element for element in read_xml(configured, ("model",)).root.findall("sdf") if (element.text or "").strip()]
-        files.sort(key=lambda element: number(element.get("version", "0")) or 0.0)
-        if files and (place / (files[-1].text or "").strip()).is_file():
-            return place / (files[-1].text or "").strip()
-    if (place / MODEL_FILE).is_file():
-        return place / MODEL_FILE
+    for file in (*_configured(place), place / MODEL_FILE):
+        if file.is_file():
+            return file
     versions = sorted((number(one.name) or 0.0, one) for one in place.iterdir() if number(one.name) is not None)
     return model_in(versions[-1][1]) if versions else None
+
+
+def _configured(folder: Path) -> list[Path]:
+    """Files that the model.config of a folder names, of the newest version of the format first."""
+    if not (folder / "model.config").is_file():
+        return []
+    named = read_xml(folder / "model.config", ("model",), loose_comments=True).root.findall("sdf")
+    named.sort(key=lambda element: number(element.get("version", "0")) or 0.0, reverse=True)
+    return [folder / (element.text or "").strip() for element in named if (element.text or "").strip()]
 
 
 def search(home: Path, name: str) -> Path | None:

@@ -70,10 +70,7 @@ def read_sdf(path, root: str | None = None, limits: str = "start", root_folder=N
     includes.expand(source.root, source.path)
     reader = _SdfReader(source)
     try:
-        scene = reader.scene(root)
-        if limits == "stops":
-            for joint in [joint for joint in scene.joints.values() if joint.limits]:
-                add_stop(scene, joint.name)
+        scene = reader.scene(root, limits == "stops")
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
     gone = ", ".join(dict.fromkeys(includes.missing))
@@ -119,7 +116,7 @@ class _SdfReader:
         for element in [] if world.tag == "world" else world.findall("model"):
             check(source, element, self.left)
 
-    def scene(self, root: str | None) -> Scene:
+    def scene(self, root: str | None, stops: bool) -> Scene:
         """Scene of the file."""
         scopes = list(self.world.all())
         carriers = [scope.canonical for scope in scopes[1:] if not scope.is_static]
@@ -131,6 +128,8 @@ class _SdfReader:
                 for element in scope.root.findall(tag):
                     read(scope, element)
         self._bind(root)
+        for joint in [joint.name for joint in self.result.joints.values() if joint.limits and stops]:
+            add_stop(self.result, joint)
         return self.result
 
     def _body(self, scope: Scope, path: str | None) -> str:
