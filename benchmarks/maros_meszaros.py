@@ -22,6 +22,7 @@ Writes benchmarks/results/maros_meszaros.md and .csv; measurements in the work f
 
 import argparse
 import csv
+import hashlib
 import json
 import os
 import subprocess
@@ -37,9 +38,10 @@ from benchmarks import published_form, published_form_report
 from benchmarks.command import RESULTS
 from gauss.bench.contestants import contestants
 from gauss.bench.folders import of_folder
-from gauss.bench.levels import BEYOND, LEVELS, LIMIT, settings
+from gauss.bench.levels import LEVELS, LIMIT, as_qpbenchmark_sets
+from gauss.bench.machine import header
 from gauss.bench.markdown import head, share, table
-from gauss.bench.qp import compare
+from gauss.bench.qp import PACKAGES, compare
 from gauss.bench.summary import is_kept, mean_time
 from gauss.bench.table import header_of, read_table, write_table
 from gauss.bench.worker import ONE_THREAD
@@ -64,7 +66,7 @@ def main():
     given = parser.parse_args()
     if given.report:
         path = RESULTS / "maros_meszaros.csv"
-        write_page(_read(path), header_of(path), given.most)
+        write_page(read_pairs(path), header_of(path), given.most)
         return
     theirs = published(given.folder / "results" / "qpbenchmark_results.csv")
     solvers = sorted(set(contestants()) & {solver for solver, *_ in theirs})
@@ -86,19 +88,21 @@ def main():
 
 
 def in_published_form(data: Path, work: Path, solvers: list[str], problems: list[str]) -> Path:
-    """Ask the solvers of today for the published form, unless the work folder has their verdicts; return these."""
-    verdicts, asked = work / "published_form.csv", work / "settings.json"
+    """Ask the solvers of today for the published form, unless the work folder has their verdicts; return these.
+
+    Verdicts are kept under a digest of the problems, settings and versions that they are of, and when they are complete.
+    """
     by_solver = {s: {level: as_qpbenchmark_sets(s, level) for level in SETTINGS} for s in solvers}
-    asked.write_text(json.dumps({"problems": problems, "settings": by_solver}, indent=1), encoding="utf-8")
+    text = json.dumps({"problems": problems, "settings": by_solver}, indent=1)
+    digest = hashlib.sha256("\n".join([text, *header(*PACKAGES)[2:3]]).encode()).hexdigest()[:12]
+    verdicts, asked = work / f"published_form_{digest}.csv", work / "settings.json"
+    asked.write_text(text, encoding="utf-8")
     if not verdicts.exists():
-        command = [sys.executable, published_form.__file__, *map(str, (data, asked, verdicts))]
+        begun = verdicts.with_suffix(".begun")
+        command = [sys.executable, published_form.__file__, *map(str, (data, asked, begun))]
         subprocess.run(command, check=True, env=os.environ | ONE_THREAD)
+        begun.rename(verdicts)
     return verdicts
-
-
-def as_qpbenchmark_sets(solver: str, level: str) -> dict:
-    """Settings without what the comparison adds to qpbenchmark's, but for limits of iterations."""
-    return {name: value for name, value in settings(solver, level).items() if name not in BEYOND.get(solver, ())}
 
 
 def verdicts(path: Path) -> list[dict]:
@@ -106,7 +110,7 @@ def verdicts(path: Path) -> list[dict]:
     return [_judged(row | {"outcome": "answered", "error": np.nan, "backend": row["solver"]}) for row in read_table(path)]
 
 
-def _read(path: Path) -> list[tuple[dict, dict]]:
+def read_pairs(path: Path) -> list[tuple[dict, dict]]:
     """Rows of the table that was written, ours beside the published ones."""
     rows = []
     for row in read_table(path):

@@ -74,7 +74,7 @@ from gauss.io.linkage import load_linkage
 from gauss.io.rotors import load_rotors, save_rotors
 from gauss.linkages import Linkage
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Simulator, Trajectory, crossings, prepare, rollout, simulate
+from gauss.simulation import Simulator, SimulatorBatch, Trajectory, crossings, prepare, rollout, simulate
 from gauss.simulation.sweeps import load_sweep, sweep
 from gauss.system import State, System
 from gauss.view.viewer import show
@@ -98,6 +98,7 @@ __all__ = [
     "Plan",
     "Scene",
     "Simulator",
+    "SimulatorBatch",
     "Solution",
     "Spring",
     "Start",

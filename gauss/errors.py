@@ -57,6 +57,10 @@ class BackendError(GaussError, ValueError):
     """A backend does not exist, is not installed, or does not take this problem."""
 
 
+class DeviceError(GaussError, RuntimeError):
+    """A device does not exist, its driver is missing, or it cannot run a function."""
+
+
 class SimulationError(GaussError, RuntimeError):
     """A simulation cannot go on; ``trajectory`` holds what was computed so far.
 
@@ -127,6 +131,10 @@ class CacheWarning(UserWarning):
 
 class PainleveWarning(UserWarning):
     """Rigid bodies with Coulomb friction have no accelerations, or several (Painlevé): the motion is one of many."""
+
+
+class ContactLawWarning(UserWarning):
+    """Steps with contacts did not meet the laws of contact and friction to the tolerance."""
 
 
 def did_you_mean(name: str, existing: Iterable[str]) -> str:

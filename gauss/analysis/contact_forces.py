@@ -11,7 +11,7 @@ from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.contact.free_body_step import free_body_stepper
+from gauss.dynamics.contact.contact_stepper import contact_stepper
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.gap_functions import gaps, with_gaps
 from gauss.dynamics.kinematics import kinematics
@@ -160,11 +160,11 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
 
 def _parts(trajectory: Trajectory):
     plan = trajectory.stats.plan
-    if plan is not None and plan.dynamics == "free bodies" and trajectory.step is not None:
-        stepper = free_body_stepper(trajectory.system)
+    if plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None:
+        stepper = contact_stepper(trajectory.system)
         stepper.forget()
         for index in range(len(trajectory)):
-            yield stepper.forces_of(stepper.step(trajectory.state(index), trajectory.step))
+            yield stepper.forces_over(trajectory.state(index), trajectory.step)
         return
     for index, motion in enumerate(trajectory.motions):
         yield contact_parts(motion, step_at(trajectory, index).force)

@@ -21,6 +21,7 @@ from gauss.backends.solution import Answer, Solution, failure
 from gauss.errors import BackendError
 
 DOUBLE = np.dtype(float)
+OURS = "gauss."  # modules whose classes write to nothing that they are given
 REAL_KINDS = "fiu"  # kinds of arrays of real numbers; others might be converted, but hardly mean what they then say
 
 
@@ -57,7 +58,8 @@ def _ways(compulsion: Compulsion, backend: Backend) -> Iterator[Callable[[], tup
         for factor in factors(compulsion):
             yield partial(_factored_answer, compulsion, cast(Factored, backend), factor)
     else:
-        yield lambda: (checked_answer(compulsion, call(backend, compulsion)),)
+        given = compulsion if type(backend).__module__.startswith(OURS) else compulsion.read_only()
+        yield lambda: (checked_answer(compulsion, call(backend, given)),)
 
 
 def _refuse(backend: Backend):

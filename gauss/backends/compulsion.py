@@ -9,7 +9,7 @@ Mathematik 4, 1829; Udwadia and Kalaba, Analytical Dynamics, 1996, ch. 3). Φ is
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 else:
     csc_array = object  # scipy.sparse is imported where a matrix is made: it takes as long as all of gauss
 
+VECTORS = ("Phi", "impressed", "P", "C", "D", "G", "h", "units")  # arrays of a compulsion that are not kept by blocks
 KEPT_PATTERNS = 64  # number of sparsity patterns of matrices that are kept
 
 
@@ -147,6 +148,12 @@ class Compulsion:
         ]
         return from_blocks(entries, (self.structure.n_rows, width))
 
+    def read_only(self) -> "Compulsion":
+        """Return the same problem with views that cannot be written to, for methods of somebody else."""
+        views: dict[str, Any] = {name: _view(getattr(self, name)) for name in VECTORS}
+        views |= {name: tuple(tuple(map(_view, row)) for row in getattr(self, name)) for name in ("A_blocks", "B_blocks")}
+        return replace(self, **views)
+
     def about_free(self) -> "Compulsion":
         """Return the same problem for the deviation a − a_free as unknown: its free motion is zero.
 
@@ -234,6 +241,13 @@ class Compulsion:
                 r3[columns] += sizes.T @ multipliers[rows]
                 r2[rows] += sizes @ qdd[columns]
         return r1, r2, r3
+
+
+def _view(array: np.ndarray) -> np.ndarray:
+    """Array on the same numbers that cannot be written to."""
+    found = array.view()
+    found.flags.writeable = False
+    return found
 
 
 def from_blocks(entries, shape) -> csc_array:

@@ -8,14 +8,13 @@ they differ in which solvers take them, in speed, and in the digits that are los
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
 
 from gauss.backends.answering import call, real_array, truth, whole_number
-from gauss.backends.compulsion import KEPT_PATTERNS, Compulsion
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.coordinates import Coordinates
 from gauss.backends.forms import Eliminated, eliminated, massless, scaled
 from gauss.backends.solution import Answer, failure
@@ -230,7 +229,7 @@ def full(compulsion: Compulsion) -> Programme:
     H = sparse.csc_matrix(sparse.diags_array(np.concatenate([compulsion.Phi, np.zeros(compulsion.P.size)])))
     c = -np.concatenate([compulsion.impressed, compulsion.P])
     C = sparse.csc_matrix(sparse.hstack([compulsion.A_sparse, compulsion.B_sparse]))
-    return Programme("F1", H, c, C, compulsion.D, sparse.csc_matrix(compulsion.G), compulsion.h, answer)
+    return Programme("F1", H, c, C, compulsion.D.copy(), sparse.csc_matrix(compulsion.G), compulsion.h.copy(), answer)
 
 
 def accelerations(compulsion: Compulsion) -> Programme:
@@ -251,15 +250,10 @@ def coordinates(compulsion: Compulsion) -> Programme:
 
 
 def _of_accelerations(name: str, form: Eliminated) -> Programme:
-    H = sparse.csc_matrix((form.weights, *_diagonal(form.weights.size)))
+    n = form.weights.size
+    H = sparse.csc_matrix((form.weights, np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32)))
     C, K = sparse.csc_matrix(form.C), sparse.csc_matrix(form.K)
     return Programme(name, H, -form.weights * form.x_free, C, form.d, K, form.k, form.answer)
-
-
-@lru_cache(maxsize=KEPT_PATTERNS)
-def _diagonal(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Row indices and column pointers of a diagonal matrix."""
-    return np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32)
 
 
 FORMS = {"F1": full, "F2": accelerations, "F2s": scaled_accelerations, "F3": coordinates}

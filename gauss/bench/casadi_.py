@@ -16,6 +16,7 @@ from scipy import sparse
 
 from gauss.backends.programme import Outcome, Programme
 from gauss.bench.clocks import UNKNOWN, Times
+from gauss.bench.ready import Ready
 from gauss.bench.structured import StructuredProgramme
 from gauss.errors import BackendError
 
@@ -26,8 +27,8 @@ SOLVERS: dict[str, dict[str, Any]] = {
 FREE = 1e6  # bounds of this size stand for none: HPIPM's residuals round where they are as large as CasADi's 1e8
 
 
-def ready(solver: str, programme: Programme, settings: dict):
-    """Call, reading, clock and surroundings of a solver; the call makes it anew, set-up included."""
+def ready(solver: str, programme: Programme, settings: dict) -> Ready:
+    """A solver with its problem; the call makes it anew, set-up included."""
     import casadi
 
     if solver in STAGEWISE:
@@ -55,10 +56,10 @@ def ready(solver: str, programme: Programme, settings: dict):
         words = said.get("return_status", said["unified_return_status"])
         return Outcome(x, y[:m], y[m:], said["success"], f"{solver}: {words}", max(int(said["iter_count"]), 0))
 
-    return call, read, _wall_time, _quiet()
+    return Ready(call, read, _wall_time, _quiet())
 
 
-def _stagewise(solver: str, programme: Programme, settings: dict):
+def _stagewise(solver: str, programme: Programme, settings: dict) -> Ready:
     """The same for solvers that take stages, and bounds as such."""
     if not isinstance(programme, StructuredProgramme):
         raise BackendError(f"{solver} takes programmes with stages only.")
@@ -91,7 +92,7 @@ class Bounds(NamedTuple):
         return np.maximum(self.signs * box[self.places], 0.0) / self.sizes
 
 
-def _hpipm(programme: StructuredProgramme, bounds: Bounds, settings: dict):
+def _hpipm(programme: StructuredProgramme, bounds: Bounds, settings: dict) -> Ready:
     """HPIPM takes rows of the dynamics with their sign turned."""
     import casadi
 
@@ -111,10 +112,10 @@ def _hpipm(programme: StructuredProgramme, bounds: Bounds, settings: dict):
         x, y, box = (np.asarray(result[name], dtype=float).ravel() for name in ("x", "lam_a", "lam_x"))
         return Outcome(x, -y, bounds.multipliers(box), *_claim("hpipm", said))
 
-    return call, read, _wall_time, _quiet()
+    return Ready(call, read, _wall_time, _quiet())
 
 
-def _fatrop(programme: StructuredProgramme, bounds: Bounds, settings: dict):
+def _fatrop(programme: StructuredProgramme, bounds: Bounds, settings: dict) -> Ready:
     """Fatrop as the solver of nonlinear programmes that it is; the functions that it evaluates are made beforehand."""
     import casadi
 
@@ -136,7 +137,7 @@ def _fatrop(programme: StructuredProgramme, bounds: Bounds, settings: dict):
         x, y, box = (np.asarray(result[name], dtype=float).ravel() for name in ("x", "lam_g", "lam_x"))
         return Outcome(x, y, bounds.multipliers(box), *_claim("fatrop", said))
 
-    return call, read, _wall_time, _quiet()
+    return Ready(call, read, _wall_time, _quiet())
 
 
 def _stages(programme: StructuredProgramme) -> dict[str, Any]:
@@ -151,7 +152,7 @@ def _claim(solver: str, said: dict[str, Any]) -> tuple[bool, str, int]:
     return said["success"], f"{solver}: {words}", max(int(said["iter_count"]), 0)
 
 
-STAGEWISE: dict[str, Callable[..., Any]] = {"fatrop": _fatrop, "hpipm": _hpipm}
+STAGEWISE: dict[str, Callable[[StructuredProgramme, Bounds, dict], Ready]] = {"fatrop": _fatrop, "hpipm": _hpipm}
 
 
 def _wall_time(found) -> Times:

@@ -5,26 +5,40 @@ import numpy as np
 from gauss.bench.classes import problems_of, story_of
 from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, is_answered, of_special_form, special_cells
 from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
-from gauss.bench.markdown import head, number, share, table
+from gauss.bench.markdown import count_of, head, number, share, table
 from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
+from gauss.bench.settings_report import compared_lines
 from gauss.bench.structured import COULOMB
-from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_lost, is_right, mean_time
+from gauss.bench.summary import (
+    RIGHT,
+    asked,
+    backends,
+    checksum,
+    dual_error,
+    is_broken,
+    is_kept,
+    is_lost,
+    is_right,
+    mean_time,
+    not_asked,
+)
 from gauss.bench.verdicts import is_false, stated, truth
 
 HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
 acceleration of a body or joint, is at most {RIGHT:g}, that of multipliers at most {WRONG:g}; of a problem without a
-solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for. **Claimed,
-beyond**: success was claimed, and a residual or the gap is above the tolerance and above rounding. **False verdict**:
-a problem is called infeasible or unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS, KVXOPT,
-qpmad and quadprog. Error of multipliers: of the solver's own, row by row or constraint by constraint, without the
-directions that redundant rows leave open; a solver that gives none is off by 1. Errors are medians over all problems.
+solution, its proven verdict is stated. **Kept**: residuals and gap are within the tolerance asked for, whatever a solver
+looks at. **Claimed, beyond**: success was claimed, and a residual that the solver promises is above its tolerance and
+above rounding; what each promises stands below, with its settings. **False verdict**: a problem is called infeasible or
+unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS, KVXOPT, qpmad and quadprog. Error of
+multipliers: of the solver's own, row by row or constraint by constraint, without the directions that redundant rows leave
+open; a solver that gives none is off by 1. Errors are medians over all problems.
 
-Times are CPU times of calls from Python on a ready problem, set-up included: shifted geometric means over all
-problems, a problem that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least. Library:
-the share of a call that the library reports as its own set-up and solve. Bounds are given as rows. How solvers are set is
-said in [the comparison](qp.md)."""
+Times are CPU times of calls from Python on a ready problem, set-up included, and a tenth of their wall times at least:
+shifted geometric means over all problems, a problem that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s,
+relative to the least. Library: the share of a call that the library reports as its own set-up and solve. Bounds are given
+as rows."""
 
 WARM = """Warm starts begin at the solution of the step before, where qpsolvers hands it on, which is x alone; set-up is made
 anew, so that what they spare is iterations. Medians over the steps that have one."""
@@ -52,13 +66,16 @@ before the clock runs; its tolerance is scaled, and its bounds are loose by abou
 
 def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     """The page of a class: all of its main level, and a table by levels where there are others."""
-    every, rows = rows, at_main_level(rows)
+    left, every = not_asked(at_main_level(rows)), asked(rows)
+    rows = at_main_level(every)
     problems = list(dict.fromkeys(row["problem"] for row in rows))
     mine = ordered(cells(rows))
     solvable = any(truth(row) == SOLVABLE for row in rows)
-    lines = head(f"QP solvers on problems of class {kind}", [*header, f"all packages: [{CLASS_LOCK}]({CLASS_LOCK})"])
+    conditions = [*header, f"all packages: [{CLASS_LOCK}]({CLASS_LOCK})", checksum(rows)]
+    lines = head(f"QP solvers on problems of class {kind}", conditions)
     lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
     lines += [BY_CLASS[kind], ""] if kind in BY_CLASS else []
+    lines += left
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
     lines += _board("Leaderboard", mine, solvable) + _sentences(list(mine), mine, *fronts(rows)[1:])
     special = of_special_form(rows, mine)
@@ -68,7 +85,8 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
         lines += [OWN_TIMES, ""]
     elif kind != COULOMB:
         lines += [NONE_OF_OURS, ""]
-    return "\n".join(lines + _by_level(every, list(mine)) + _by_problem(problems, mine | others)) + "\n"
+    lines += _by_level(every, list(mine)) + _by_problem(problems, mine | others)
+    return "\n".join(lines + compared_lines([name for name in backends(rows) if name not in OURS], MAIN_LEVEL)) + "\n"
 
 
 def at_main_level(rows) -> list[dict]:
@@ -127,7 +145,8 @@ def _special_board(rows: list[dict], named: list[str], solvable: bool) -> list[s
     if not rows:
         return []
     mine, overall, panels = ordered(cells(rows)), *fronts(rows)[1:]
-    title = f"Leaderboard of the {len(set(row['problem'] for row in rows))} problems that solvers of a special form take"
+    taken = count_of(len({row["problem"] for row in rows}), "problem")
+    title = f"Leaderboard of the {taken} that solvers of a special form take"
     return _board(title, mine, solvable) + _sentences(named, mine, overall, panels)[2:]
 
 

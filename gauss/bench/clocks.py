@@ -1,7 +1,8 @@
 """Times of a solver: those that its library reports, and those of calls from Python, cold and warm.
 
-The time of a call is its wall time, or the CPU time of its process where that is less by more than the resolution of its
-clock: what other processes take of a busy machine is no part of it.
+The time of a call is its wall time, or the CPU time of its process and of the children of that where this is less by more
+than the resolution of its clock: what other processes take of a busy machine is no part of it. It is a tenth of the wall
+time at least, so that neither sleep nor work in processes that go on is free.
 """
 
 import multiprocessing
@@ -21,8 +22,9 @@ except ImportError:  # not a POSIX system
 ROUNDS = 15  # timed calls, fewer when they take long ...
 FEWEST = 3  # ... but not fewer than these, as quartiles need them
 BUDGET = 0.1  # [s] for them
+WALL_PER_CPU = 10.0  # times: wall time of a call that counts as one of CPU time, where less was used
 INTERRUPTION = 2e-5  # [s] of wall time beyond CPU time that tell of other processes; clocks differ by a few microseconds
-GRACE = 2.0  # of the limit, CPU time after which a call is ended with its process
+GRACE = 2.0  # of the limit, time after which a call is ended with its process
 
 
 class Times(NamedTuple):
@@ -45,36 +47,45 @@ def timed(call: Callable[[], Any], limit: float, compiles: bool = False) -> tupl
     found: list = []
     seconds: list[float] = []
     while not seconds or (compiles and len(seconds) == 1) or (len(seconds) <= ROUNDS and seconds[-1] < limit):
-        with _ended(0.0 if compiles and not seconds else GRACE * limit):
+        with ended(0.0 if compiles and not seconds else GRACE * limit):
             cpu, begin = cpu_time(), time.perf_counter()
             found.append(call())
             wall = time.perf_counter() - begin
             cpu = cpu_time() - cpu
-            seconds.append(cpu if wall - cpu > INTERRUPTION else wall)
+            seconds.append(max(cpu, wall / WALL_PER_CPU) if wall - cpu > INTERRUPTION else wall)
         if len(seconds) > FEWEST and sum(seconds[1:]) > BUDGET:
             break
     return found, seconds
 
 
 def cpu_time() -> float:
-    """CPU time [s] of the process, to a microsecond; that of :mod:`time` stands still to 4 ms while a timer of it runs."""
+    """CPU time [s] of the process and of its children that have ended.
+
+    To a microsecond: that of :mod:`time` stands still to 4 ms while a timer of it runs.
+    """
     if resource is None:
         return time.process_time()
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    return used.ru_utime + used.ru_stime
+    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 @contextmanager
-def _ended(limit: float) -> Iterator[None]:
-    """End a worker by SIGPROF when its block has taken so much CPU time [s], 0 for no limit: no library can prevent it."""
+def ended(limit: float) -> Iterator[None]:
+    """End a worker when its block has taken so much CPU time [s], or ten times as much wall time; 0 for no limit.
+
+    SIGPROF and SIGALRM end it, which no library prevents.
+    """
     if multiprocessing.parent_process() is None or not hasattr(signal, "setitimer"):
         yield
         return
-    signal.setitimer(signal.ITIMER_PROF, limit)
+    timers = {signal.ITIMER_PROF: limit, signal.ITIMER_REAL: WALL_PER_CPU * limit}
+    for timer, seconds in timers.items():
+        signal.setitimer(timer, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        for timer in timers:
+            signal.setitimer(timer, 0.0)
 
 
 def summary(seconds: list[float]) -> dict:
@@ -96,7 +107,7 @@ def median_times(times: list[Times], seconds: list[float]) -> dict:
 
 # Solvers whose libraries report no time of their own; that around the call of the library, as qpsolvers takes it, stands
 # for it.
-AROUND = ("cvxopt", "gurobi", "highs", "jaxopt_osqp", "kvxopt", "qpax", "qtqp", "quadprog", "sip")
+AROUND = ("cvxopt", "gurobi", "highs", "kvxopt", "qpax", "qtqp", "quadprog", "sip")
 COMPILING = ("jaxopt_osqp", "qpax")  # solvers that compile for every size of problem in their first call
 UNITS = {"proxqp": 1e-6, "scs": 1e-3}  # of the times that are reported, where these are not seconds
 

@@ -6,17 +6,16 @@ rows are those of the programme itself.
 
 from collections.abc import Callable
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from scipy import linalg, sparse
 
 from gauss.backends.programme import Outcome
-from gauss.bench.clocks import UNKNOWN, Times
+from gauss.bench.clocks import Times
+from gauss.bench.ready import Ready
 from gauss.bench.structured import StructuredProgramme
 
 RANK_RELATIVE = 1e-14  # relative to the largest eigenvalue of H: smaller ones are zero
-Prepared = tuple[Callable[[], Any], Callable[[Any], Outcome], Callable[[Any], Times]]  # call, reading, clock
 
 
 def installed() -> list[str]:
@@ -24,8 +23,8 @@ def installed() -> list[str]:
     return [name for name in SOLVERS if find_spec(name)]
 
 
-def ready(solver: str, programme: StructuredProgramme, settings: dict) -> Prepared:
-    """Call, reading and clock of a solver; the call makes it anew, set-up included."""
+def ready(solver: str, programme: StructuredProgramme, settings: dict) -> Ready:
+    """A solver with its problem; the call makes it anew, set-up included."""
     return SOLVERS[solver](programme, settings)
 
 
@@ -34,7 +33,7 @@ def _stacked(p: StructuredProgramme) -> tuple[sparse.csc_matrix, np.ndarray]:
     return sparse.vstack([p.C, p.K], format="csc"), np.concatenate([p.d, p.k])
 
 
-def _clarabel(p: StructuredProgramme, settings: dict) -> Prepared:
+def _clarabel(p: StructuredProgramme, settings: dict) -> Ready:
     import clarabel
 
     cones = [clarabel.ZeroConeT(p.d.size)] if p.d.size else []
@@ -53,10 +52,10 @@ def _clarabel(p: StructuredProgramme, settings: dict) -> Prepared:
         status, z = str(found.status), np.array(found.z)
         return _outcome(p, np.array(found.x), z, status == "Solved", f"clarabel: {status}", found.iterations)
 
-    return call, read, lambda found: Times(np.nan, np.nan, found.solve_time)
+    return Ready(call, read, lambda found: Times(np.nan, np.nan, found.solve_time))
 
 
-def _scs(p: StructuredProgramme, settings: dict) -> Prepared:
+def _scs(p: StructuredProgramme, settings: dict) -> Ready:
     import scs
 
     rows, right = _stacked(p)
@@ -74,10 +73,10 @@ def _scs(p: StructuredProgramme, settings: dict) -> Prepared:
         setup, solve = (1e-3 * found["info"][name] for name in ("setup_time", "solve_time"))
         return Times(setup, solve, setup + solve)
 
-    return call, read, library
+    return Ready(call, read, library)
 
 
-def _ecos(p: StructuredProgramme, settings: dict) -> Prepared:
+def _ecos(p: StructuredProgramme, settings: dict) -> Ready:
     import ecos
 
     n, (values, vectors) = p.c.size, linalg.eigh(p.H.toarray())
@@ -103,10 +102,10 @@ def _ecos(p: StructuredProgramme, settings: dict) -> Prepared:
         setup, solve = (found["info"]["timing"][name] for name in ("tsetup", "tsolve"))
         return Times(setup, solve, setup + solve)
 
-    return call, read, library
+    return Ready(call, read, library)
 
 
-def _cvxopt(p: StructuredProgramme, settings: dict) -> Prepared:
+def _cvxopt(p: StructuredProgramme, settings: dict) -> Ready:
     import cvxopt
     from cvxopt.solvers import coneqp
 
@@ -127,7 +126,7 @@ def _cvxopt(p: StructuredProgramme, settings: dict) -> Prepared:
         claims = found["status"] == "optimal"
         return _outcome(p, x, np.concatenate([y, z]), claims, f"cvxopt: {found['status']}", found["iterations"])
 
-    return call, read, lambda found: UNKNOWN
+    return Ready(call, read)
 
 
 def _outcome(p: StructuredProgramme, x, multipliers, found: bool, message: str, iterations: int) -> Outcome:
@@ -135,4 +134,9 @@ def _outcome(p: StructuredProgramme, x, multipliers, found: bool, message: str, 
     return Outcome(np.asarray(x), multipliers[:m], multipliers[m:], found, message, int(iterations))
 
 
-SOLVERS = {"clarabel": _clarabel, "cvxopt": _cvxopt, "ecos": _ecos, "scs": _scs}
+SOLVERS: dict[str, Callable[[StructuredProgramme, dict], Ready]] = {
+    "clarabel": _clarabel,
+    "cvxopt": _cvxopt,
+    "ecos": _ecos,
+    "scs": _scs,
+}

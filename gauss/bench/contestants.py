@@ -1,49 +1,27 @@
 """How a QP solver of the comparison is called: its problem made ready first, then nothing but the call under the clock."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import qpsolvers
 
 from gauss.backends import qpsolvers_
 from gauss.backends.programme import Outcome, Programme, Programmed, checked_outcome
-from gauss.bench import casadi_, clocks, conic, coulomb, mujoco_
+from gauss.bench import casadi_, clocks, conic, coulomb, jaxopt_, mujoco_
 from gauss.bench.instances import FILE, Instance
 from gauss.bench.levels import settings
+from gauss.bench.ready import Ready
 from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, StructuredProgramme
 from gauss.errors import BackendError
 
 # To which qpsolvers hands a first x; it ignores that for all others.
 WARM = ("cvxopt", "osqp", "proxqp", "pyqpmad", "qpalm", "scs", "sip")
 DENSE = 3e7  # entries of dense matrices, 0.24 GB
-
-
-@dataclass(frozen=True)
-class Ready:
-    """A QP solver with a problem in the form that it takes.
-
-    Parameters
-    ----------
-    call : callable
-        Set-up and solve from nothing; what the clock runs.
-    read : callable
-        ``read(found)`` turns what the call returned into an :class:`gauss.backends.programme.Outcome`.
-    library : callable
-        ``library(found)`` returns the times of set-up, solve, and both [s] that the library itself reports; nan where it
-        reports none.
-    around : context manager
-        What holds while the solver is called.
-    """
-
-    call: Callable[[], Any]
-    read: Callable[[Any], Outcome]
-    library: Callable[[Any], clocks.Times] = lambda found: clocks.UNKNOWN
-    around: AbstractContextManager = nullcontext()
+ONE_SIDED = ("qtqp",)  # solvers that take no problems of equality rows alone
 
 
 def contestants(kind: str = ROWS) -> list[str]:
@@ -74,11 +52,13 @@ def ready(solver: str, programme: Programme, level: str) -> Ready:
     chosen = settings(solver, level)
     if isinstance(programme, StructuredProgramme) and (kind := programme.structure.kind) in (CONES, COULOMB):
         if solver in mujoco_.SOLVERS:
-            return Ready(*mujoco_.ready(solver, programme, chosen))
-        return Ready(*{CONES: conic, COULOMB: coulomb}[kind].ready(solver, programme, chosen))
+            return mujoco_.ready(solver, programme, chosen)
+        return {CONES: conic.ready, COULOMB: coulomb.ready}[kind](solver, programme, chosen)
     if solver in (*casadi_.SOLVERS, *casadi_.STAGEWISE):
-        return Ready(*casadi_.ready(solver, programme, chosen))
+        return casadi_.ready(solver, programme, chosen)
     problem = qpsolvers_.converted(programme, solver)
+    if solver == jaxopt_.SOLVER:
+        return jaxopt_.ready(problem, chosen)
     return Ready(
         lambda: qpsolvers.solve_problem(problem, solver, **chosen),
         lambda found: _read(found, solver, problem, chosen),
@@ -103,11 +83,15 @@ def suits(solver: str, instance: Instance) -> bool:
     return ":" in solver or solver in contestants(instance.structure.kind)
 
 
-def takes(solver: str, programme: Programme) -> bool:
-    """Whether the matrices fit a solver: dense ones must not fill the memory."""
-    n = programme.c.size
+def refusal(solver: str, programme: Programme) -> str:
+    """Why a solver is not asked, in words; "" if it is: dense matrices must not fill the memory."""
+    n, rows = programme.c.size, programme.d.size + programme.k.size
     dense = solver in qpsolvers_.installed() and solver not in qpsolvers.sparse_solvers
-    return not dense or n * (n + programme.d.size + programme.k.size) <= DENSE
+    if not rows:
+        return "no rows: nothing to ask for"
+    if solver in ONE_SIDED and not programme.k.size:
+        return "takes no problems without inequality rows"
+    return f"takes dense matrices, which would have more than {DENSE:g} entries" if dense and n * (n + rows) > DENSE else ""
 
 
 def backend(solver: str, level: str) -> Programmed:
@@ -131,6 +115,13 @@ def imported(solver: str) -> Callable[[], Callable[[Programme], Outcome]]:
             f"solver {solver!r}: {type(error).__name__}: {error}. Expected module:Class, importable from here, whose "
             "objects are called with a gauss.backends.programme.Programme and return an Outcome."
         ) from None
+
+
+def source_of(solver: str) -> bytes:
+    """Source of the module of a solver of one's own; nothing where it has none."""
+    spec = find_spec(solver.partition(":")[0])
+    file = None if spec is None else spec.origin
+    return Path(file).read_bytes() if file is not None and Path(file).is_file() else b""
 
 
 def _own(solver: str, programme: Programme) -> Ready:

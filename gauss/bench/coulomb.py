@@ -12,7 +12,6 @@ the convex step without De Saxcé's correction, see :mod:`gauss.bench.mujoco_`.
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -21,6 +20,7 @@ from gauss.backends.accuracy import tolerances
 from gauss.backends.programme import Outcome
 from gauss.bench import conic
 from gauss.bench.clocks import cpu_time
+from gauss.bench.ready import Ready
 from gauss.bench.structured import ProgrammeStructure, StructuredProgramme
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem
 from gauss.errors import SimulationError
@@ -37,9 +37,9 @@ def installed() -> list[str]:
     return [name for name in SOLVERS if name != "staggered" or find_spec("clarabel")]
 
 
-def ready(solver: str, programme: StructuredProgramme, settings: dict) -> tuple[Callable[[], Any], Callable[[Any], Outcome]]:
-    """Call and reading of a solver; the call starts at zero forces."""
-    return SOLVERS[solver](programme, **settings), lambda found: found
+def ready(solver: str, programme: StructuredProgramme, settings: dict) -> Ready:
+    """A solver with its problem; the call starts at zero forces."""
+    return Ready(SOLVERS[solver](programme, **settings), lambda found: found)
 
 
 def projected(r: np.ndarray, friction: np.ndarray) -> np.ndarray:
@@ -141,8 +141,8 @@ def _staggered(p: StructuredProgramme, *, tolerance: float, iterations: int, sec
     def solve() -> Outcome:
         end, sliding = cpu_time() + seconds, np.zeros(p.c.size)
         for count in range(1, iterations + 1):
-            call, read, _ = conic.ready("clarabel", replace(convex, c=p.c + sliding), inner)
-            r = read(call()).x
+            cones = conic.ready("clarabel", replace(convex, c=p.c + sliding), inner)
+            r = cones.read(cones.call()).x
             if r is None:
                 return Outcome(None, None, None, False, "staggered: no forces", count)
             if _residual(p, r) <= tolerance:

@@ -1,5 +1,6 @@
 """Instances of the comparison: programmes with what is known of them, be they compulsions or from a file."""
 
+import hashlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,7 +11,7 @@ from scipy import sparse
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS, Programme
 from gauss.bench.known import KnownSolution, known
-from gauss.bench.problems import INCONSISTENT, SOLVABLE, MechanismProblem, make_problem
+from gauss.bench.problems import INCONSISTENT, SOLVABLE, UNKNOWN, MechanismProblem, make_problem
 from gauss.bench.reference import ReferenceSolution, reference
 from gauss.bench.structured import ROWS, ProgrammeStructure, StructuredProgramme
 from gauss.errors import BackendError
@@ -41,7 +42,7 @@ class Instance:
     name, group, note : str
         Its name, its class, and what it is.
     verdict : str
-        "solvable", "inconsistent", "infeasible" or "unbounded".
+        "solvable", "inconsistent", "infeasible" or "unbounded"; "unknown" of files without a solution or a proof.
     compulsion : Compulsion, optional
         Where the programme comes from, in every form.
     expected : ReferenceSolution, optional
@@ -54,6 +55,8 @@ class Instance:
         Where a warm start begins: the solution of the problem before it in a sequence.
     structure : ProgrammeStructure
         Cones, friction or stages of the programme; none when not given.
+    data : str
+        SHA-256 of its numbers, see :func:`data_of`; of the suite that in the manifest of its files.
     """
 
     name: str
@@ -66,6 +69,7 @@ class Instance:
     known: KnownSolution | None = None
     start: np.ndarray | None = None
     structure: ProgrammeStructure = ProgrammeStructure()
+    data: str = ""
 
     def programme(self, form: str) -> Programme:
         """Programme in a form, without entries that are zero."""
@@ -95,16 +99,33 @@ def _unread(*_, **__):
 def of_problem(problem: MechanismProblem) -> Instance:
     """Instance of a problem, with its reference."""
     expected = None if problem.verdict == INCONSISTENT else reference(problem.compulsion)
-    return Instance(problem.name, group_of(problem), problem.note, problem.verdict, problem.compulsion, expected)
+    c = problem.compulsion
+    data = data_of(c.Phi, c.impressed, c.P, c.A_sparse, c.B_sparse, c.D, c.G, c.h)
+    return Instance(problem.name, group_of(problem), problem.note, problem.verdict, c, expected, data=data)
 
 
 def of_arrays(name: str, group: str, P, q, A, b, G, h, x=None, **fields) -> Instance:
-    """Instance of a programme given by its arrays; A, b or G, h may be None, and so may its solution x."""
+    """Instance of a programme given by its arrays; A, b or G, h may be None, and so may its solution x, unknown then."""
     n = np.size(q)
     A, b = (sparse.csc_matrix((0, n)), np.zeros(0)) if A is None else (sparse.csc_matrix(A), np.asarray(b, dtype=float))
     G, h = (sparse.csc_matrix((0, n)), np.zeros(0)) if G is None else (sparse.csc_matrix(G), np.asarray(h, dtype=float))
     matrices = Matrices(sparse.csc_matrix(P), np.asarray(q, dtype=float), A, b, G, h)
-    return Instance(name, group, matrices=matrices, known=None if x is None else known(matrices, x), **fields)
+    solution = {"verdict": UNKNOWN} if x is None else {"known": known(matrices, x)}
+    fields = {"data": data_of(*matrices)} | solution | fields
+    return Instance(name, group, matrices=matrices, **fields)
+
+
+def data_of(*parts) -> str:
+    """SHA-256 of the numbers of vectors and matrices, whatever the order in which these are stored."""
+    found = hashlib.sha256()
+    for part in parts:
+        if sparse.issparse(part):
+            columns = sparse.csc_array(part).sorted_indices()
+            found.update(repr(columns.shape).encode() + columns.indptr.astype("<i8").tobytes())
+            found.update(columns.indices.astype("<i8").tobytes() + columns.data.astype("<f8").tobytes())
+        else:
+            found.update(np.asarray(part, dtype="<f8").tobytes())
+    return found.hexdigest()
 
 
 def of_scene(scene, name: str, duration: float = 1.0, count: int = 5) -> Iterator[Instance]:

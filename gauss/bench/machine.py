@@ -2,6 +2,7 @@
 
 import os
 import platform
+import subprocess
 from datetime import date
 from pathlib import Path
 
@@ -9,16 +10,18 @@ import numpy as np
 
 from gauss.versions import version_of
 
+GIT_TIME = 10.0  # [s] that git may take
+
 
 def header(*packages: str) -> list[str]:
     """Lines of the header."""
-    versions = [f"{name} {version_of(name) or 'not installed'}" for name in packages]
+    versions = [f"{name} {version_of(name) or 'not installed'}" for name in ("gauss", *packages)]
     lines = [
         f"date: {date.today().isoformat()}{_load()}",
         f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
         f"python {platform.python_version()}; " + ", ".join(versions),
     ]
-    return lines
+    return [*lines, *_commit()]
 
 
 def libraries() -> str:
@@ -31,6 +34,22 @@ def libraries() -> str:
 def _load() -> str:
     """How busy the machine is when the measurement starts: single times on one that is shared are no records."""
     return f", load average {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+
+
+def _commit() -> list[str]:
+    """Line of the commit, and whether files differ from it, where the package is in a checkout of its repository."""
+    folder = Path(__file__).resolve().parents[2]
+    if not (folder / ".git").exists():
+        return []
+    ask = ["git", "-C", str(folder)]
+    try:
+        name, changed = (
+            subprocess.run([*ask, *words], capture_output=True, text=True, check=True, timeout=GIT_TIME).stdout.strip()
+            for words in (("rev-parse", "--short=12", "HEAD"), ("status", "--porcelain", "--untracked-files=no", "gauss"))
+        )
+    except (OSError, subprocess.SubprocessError):
+        return []
+    return [f"commit: {name}{', with changes' if changed else ''}"]
 
 
 def _processor() -> str:

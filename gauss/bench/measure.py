@@ -11,15 +11,18 @@ from gauss.backends.certificate import TOLERANCE, conclude
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import Outcome, Programme, read
 from gauss.backends.solution import Answer
-from gauss.bench.clocks import COMPILING, UNKNOWN, median_times, summary, timed
-from gauss.bench.contestants import ready, started, takes
+from gauss.bench.clocks import COMPILING, UNKNOWN, ended, median_times, summary, timed
+from gauss.bench.contestants import ready, refusal, started
 from gauss.bench.instances import Instance, of_arrays
-from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.levels import LIMIT, OWN, Promise, promise
+from gauss.bench.ready import Ready
 from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, ProgrammeStructure, StructuredProgramme
 from gauss.errors import BackendError
 
 AUTO = "auto"  # gauss's own choice, with its rescue
 OURS = (AUTO, *BACKENDS)
+NOT_ASKED = "not asked"  # outcome of a problem that a solver does not take: no failure
+LOADING = 30.0  # [s] of CPU time that a library may take to load and to solve next to nothing
 WRONG = 1e-3  # relative error above which an answer is wrong for any purpose
 # Relative to the terms that a residual sums: rounding of a residual that is no fault of a solver.
 TERM_ROUNDING_RELATIVE = 10.0 * np.finfo(float).eps
@@ -36,16 +39,18 @@ def measure(instance: Instance, backend: str, form: str, level: str) -> dict:
     if backend in OURS:
         return _own(instance, backend)
     programme = instance.programme(form)
-    if not programme.d.size and not programme.k.size:
-        raise BackendError("no rows: nothing to ask for")
-    if not takes(backend, programme):
-        raise BackendError(f"takes dense matrices only; {programme.c.size} unknowns are too many for these")
-    _loaded(backend, level, instance.structure.kind)
+    if reason := refusal(backend, programme):
+        return unanswered() | {"outcome": NOT_ASKED, "reason": reason}
     given = _copied(programme)  # a solver may change what it is given; it is judged by the programme itself
-    outcome, times = _called(backend, given, level)
+    try:
+        prepared = ready(backend, given, level)
+    except BackendError as error:
+        return unanswered() | {"outcome": NOT_ASKED, "reason": str(error)}
+    _loaded(backend, level, instance.structure.kind)
+    outcome, times = _called(prepared, backend in COMPILING)
     if _differs(given, programme):
         outcome = replace(outcome, found=False, message="the solver changed the programme that it was given")
-    row = unanswered() | times | _judged(instance, programme, outcome, LEVELS[level])
+    row = unanswered() | times | _judged(instance, programme, outcome, promise(backend, level))
     row["warm"] = _warm(instance, backend, programme, level)
     if times["seconds"] > LIMIT:
         row |= {"outcome": "timed out", "claimed": False, "reason": f"{times['seconds']:.2g} s, the limit is {LIMIT:g} s"}
@@ -69,11 +74,10 @@ def unanswered() -> dict:
     return dict.fromkeys(FIGURES, np.nan) | {"claimed": False, "certified": False, "iterations": 0, "reason": ""}
 
 
-def _called(backend: str, programme: Programme, level: str) -> tuple[Outcome, dict]:
+def _called(prepared: Ready, compiles: bool) -> tuple[Outcome, dict]:
     """Outcome of a solver, and its times."""
-    prepared = ready(backend, programme, level)
     with prepared.around:
-        found, seconds = timed(lambda: _returned(prepared.call), LIMIT, backend in COMPILING)
+        found, seconds = timed(lambda: _returned(prepared.call), LIMIT, compiles)
         times = [UNKNOWN if isinstance(one, BaseException) else prepared.library(one) for one in found]
         last = found[-1]
         if isinstance(last, BaseException):
@@ -130,12 +134,12 @@ def _loaded(backend: str, level: str, kind: str):
     """Call a solver once for next to nothing, so that loading its library is no part of its first solve."""
     tiny = TINY[kind]
     prepared = ready(backend, tiny.programme(""), level)
-    with prepared.around:
+    with prepared.around, ended(LOADING):
         _returned(prepared.call)
 
 
-def _judged(instance: Instance, programme: Programme, outcome: Outcome, tolerance: float) -> dict:
-    """Residuals of what a solver says, how much they exceed what was asked for, its error, and the certificate."""
+def _judged(instance: Instance, programme: Programme, outcome: Outcome, promised: Promise) -> dict:
+    """Residuals of what a solver says, how much they exceed what it promises, its error, and the certificate."""
     row = {"claimed": outcome.found, "iterations": outcome.iterations, "reason": outcome.message, "outcome": "refused"}
     if outcome.x is None:
         return row
@@ -147,9 +151,7 @@ def _judged(instance: Instance, programme: Programme, outcome: Outcome, toleranc
         y, z = programme.multipliers(outcome.x, y, z)
     residuals = programme.residuals(outcome.x, y, z)
     row |= dict(zip(("primal", "dual", "gap"), residuals, strict=True))
-    row["excess"] = max(
-        r / max(tolerance, floor) for r, floor in zip(residuals, _floors(programme, outcome.x, y, z), strict=True)
-    )
+    row["excess"] = _excess(programme, outcome.x, y, z, promised)
     if instance.compulsion is None:
         known = instance.known
         dual_error = np.nan if known is None else known.dual_error(np.concatenate([y, z]))
@@ -163,15 +165,27 @@ def _is_finite(outcome: Outcome) -> bool:
     return all(np.isfinite(part).all() for part in (outcome.x, outcome.y, outcome.z) if part is not None)
 
 
-def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:
-    """Rounding of the residuals that :meth:`Programme.residuals` returns: where numbers are large, no solver gets below."""
+def _excess(programme: Programme, x, y, z, promised: Promise) -> float:
+    """Largest of the residuals over what is promised of them, or over the rounding of their terms where this is more."""
+    p = programme
+    residuals, floors = p.residuals(x, y, z), _floors(p, x, y, z)
+    tolerances = np.array(promised[:3])
+    if promised.relative:  # as Clarabel, CVXOPT and ECOS measure residuals, by two-norms
+        norm = np.linalg.norm
+        primal = norm(np.concatenate([p.d, p.k])) + norm(x) + norm(p.k - p.K @ x)
+        dual = norm(p.c) + norm(x) + norm(np.concatenate([y, z]))
+        tolerances[:2] *= np.maximum([float(primal), float(dual)], 1.0)
+    return float(np.max(residuals / np.maximum(tolerances, floors)))
+
+
+def _floors(programme: Programme, x, y, z) -> np.ndarray:
+    """Rounding (3,) of the residuals that :meth:`Programme.residuals` returns: where numbers are large, none gets below."""
     p, x, y, z = programme, np.abs(x), np.abs(y), np.abs(z)
     H, C, K = abs(p.H), abs(p.C), abs(p.K)
     rows = max((C @ x + np.abs(p.d)).max(initial=0.0), (K @ x + np.abs(p.k)).max(initial=0.0))
     stationarity = (H @ x + np.abs(p.c) + C.T @ y + K.T @ z).max(initial=0.0)
     gap = x @ (H @ x) + np.abs(p.c) @ x + np.abs(p.d) @ y + np.abs(p.k) @ z
-    largest, stationarity, terms = (TERM_ROUNDING_RELATIVE * float(size) for size in (rows, stationarity, gap))
-    return largest, stationarity, terms
+    return TERM_ROUNDING_RELATIVE * np.array([rows, stationarity, gap])
 
 
 def _certified(instance: Instance, answer: Answer) -> dict:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from gauss.backends.programme import Outcome, Programme
-from gauss.bench.clocks import UNKNOWN, Times
+from gauss.bench.ready import Ready
 from gauss.bench.structured import StructuredProgramme
 from gauss.errors import BackendError
 
@@ -38,8 +38,8 @@ def takes(programme: Programme) -> bool:
     return not programme.d.size and set(cones) == {3} and diagonal and not programme.k.any()
 
 
-def ready(solver: str, programme: StructuredProgramme, settings: dict):
-    """Call, reading and clock of a solver; the call starts at zero forces, and forms J M⁻¹ Jᵀ where the solver needs it."""
+def ready(solver: str, programme: StructuredProgramme, settings: dict) -> Ready:
+    """A solver with its problem; the call starts at zero forces, and forms J M⁻¹ Jᵀ where the solver needs it."""
     import mujoco
 
     if not takes(programme):
@@ -67,11 +67,7 @@ def ready(solver: str, programme: StructuredProgramme, settings: dict):
         words = "solved" if solved else "iteration limit"
         return Outcome(force, np.zeros(0), z, solved, f"{solver}: {words}", iterations)
 
-    return call, read, _unknown
-
-
-def _unknown(found) -> Times:
-    return UNKNOWN
+    return Ready(call, read)
 
 
 def _model(count: int, solver: str, settings: dict):

@@ -20,7 +20,7 @@ STIFF = 1e5  # [1/s], rate of Baumgarte's stabilisation
 OFF = 1e-6  # [rad], what the stabilised state is off
 EDGES = np.array([1.0, 0.6, 0.4])  # of a box [m], its centre of mass in the middle
 NOISE = 1e-8  # relative, of the rows of redundant constraints
-SOLVABLE, INCONSISTENT = "solvable", "inconsistent"  # verdicts
+SOLVABLE, INCONSISTENT, UNKNOWN = "solvable", "inconsistent", "unknown"  # verdicts; the last of files without any
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from gauss.bench.levels import MAIN_LEVEL
 from gauss.bench.markdown import when_and_where
 from gauss.bench.problems import INCONSISTENT
 from gauss.bench.report import cells_shown, markdown
-from gauss.bench.summary import backends, groups, is_broken, profile
+from gauss.bench.summary import asked, backends, groups, is_broken, profile
 from gauss.bench.table import header_of, read_table
 
 RATIOS = np.logspace(0, 4, 200)
@@ -24,14 +24,14 @@ def publish(folder: Path, table: Path, reused: Path | None) -> list[Path]:
     report = folder / "qp.md"
     again = read_table(reused) if reused is not None and reused.exists() else []
     report.write_text(markdown(rows, again, header), encoding="utf-8")
-    return [report, *_charts(folder, rows, header)]
+    return [report, *_charts(folder, asked(rows), header)]
 
 
 def publish_class(folder: Path, kind: str, table: Path) -> list[Path]:
     """Write the page of a class, and its chart if its problems have solutions; return what was written."""
     rows, header, name = read_table(table), header_of(table), name_of(kind)
     chart, page = folder / f"{name}.png", folder / f"{name}.md"
-    names, overall, panels = fronts(at_main_level(rows))
+    names, overall, panels = fronts(at_main_level(asked(rows)))
     page.write_text(class_page(kind, rows, header, chart.name if overall else ""), encoding="utf-8")
     if not overall:
         return [page]

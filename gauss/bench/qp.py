@@ -1,5 +1,6 @@
 """``gauss bench qp``: every backend on every instance, in every form, at every level."""
 
+import hashlib
 from collections.abc import Iterable
 from contextlib import nullcontext
 from pathlib import Path
@@ -9,14 +10,15 @@ from tqdm import tqdm
 from gauss.backends import BACKENDS
 from gauss.backends.programme import FORMS as PROGRAMMES
 from gauss.bench import compiled
-from gauss.bench.clocks import COMPILING
-from gauss.bench.contestants import everyone, imported, suits
+from gauss.bench.clocks import BUDGET, COMPILING, FEWEST, ROUNDS, WALL_PER_CPU
+from gauss.bench.contestants import everyone, imported, source_of, suits
 from gauss.bench.instances import Instance, of_selection
-from gauss.bench.levels import LEVELS, OWN
+from gauss.bench.levels import LEVELS, LIMIT, OWN, promise, settings
 from gauss.bench.machine import header, libraries, write_lock
-from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure, unanswered
+from gauss.bench.measure import AUTO, FIGURES, OURS, TERM_ROUNDING_RELATIVE, forms_of, measure, unanswered
 from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
+from gauss.bench.suite import VERSION
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers
 from gauss.errors import BackendError
@@ -24,7 +26,9 @@ from gauss.errors import BackendError
 NAME = "qp"  # of the table of the selection
 LOCK, CLASS_LOCK = "qp.lock", "qp_classes.lock"  # beside it, and beside tables of classes
 KEYS = ("problem", "form", "backend", "level")
-VALUES = ("group", "verdict", "outcome", *FIGURES, "claimed", "certified", "iterations", "reason")
+DIGITS = 12  # of digests in tables
+CONTENT = ("data", "settings")  # digests of the numbers of a problem, and of how a solver is set, measured and judged
+VALUES = ("group", "verdict", "outcome", *FIGURES, "claimed", "certified", "iterations", "reason", *CONTENT)
 FORMS = ("F2", "F2s")
 QUICK = (
     "ur5",
@@ -45,7 +49,7 @@ PACKAGES = tuple(
 
 
 def quick_backends() -> list[str]:
-    """Backends of a quick comparison: those that do not compile for every problem."""
+    """Backends of a quick comparison and of classes of the suite: those that do not compile for every size of problem."""
     return [name for name in (AUTO, *BACKENDS, *everyone()) if name not in COMPILING]
 
 
@@ -96,7 +100,8 @@ def compare(
     names = (*chosen(backends, (AUTO, *BACKENDS, *everyone()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
     levels, forms = chosen(levels, LEVELS, "level"), chosen(forms, PROGRAMMES, "form")
-    table = ResultTable(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
+    conditions = [*header(*PACKAGES), libraries(), f"problems: suite {VERSION} of gauss"]
+    table = ResultTable(Path(folder) / f"{name}.csv", conditions, KEYS, VALUES, fresh)
     write_lock(Path(folder) / (LOCK if name == NAME else CLASS_LOCK))
     given = of_selection(problems) if instances is None else instances
     count = len(problems) if instances is None else None
@@ -117,12 +122,21 @@ def _measure(table: ResultTable, instance: Instance, cell: tuple[str, str, str],
     """Measure a cell that is not measured yet; methods of gauss share a worker, a foreign solver may kill its own."""
     backend, form, level = cell
     key = _key(instance, *cell)
-    if table.has(**key):
+    content = {"data": instance.data[:DIGITS], "settings": digest(backend, level)}
+    if table.has(**key, **content):
         return
     place = "gauss" if backend in OURS else backend
     timeout = CELL_TIME + (COMPILATION_TIME if backend in COMPILING else 0.0)
     row = _row(places[place].call(measure, instance, backend, form, level, timeout=timeout))
-    table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
+    table.add(key | {"group": instance.group, "verdict": instance.verdict} | row | content)
+
+
+def digest(backend: str, level: str) -> str:
+    """Digest of what a row hinges on beside its problem: settings and promise of a solver, its own source, the clocks."""
+    given = {} if level == OWN else settings(backend, level) | promise(backend, level)._asdict()
+    source = source_of(backend) if ":" in backend else b""
+    clock = LIMIT, ROUNDS, FEWEST, BUDGET, WALL_PER_CPU, TERM_ROUNDING_RELATIVE
+    return hashlib.sha256(repr((sorted(given.items()), clock)).encode() + source).hexdigest()[:DIGITS]
 
 
 def _key(instance: Instance, backend: str, form: str, level: str) -> dict[str, str]:
@@ -147,11 +161,12 @@ def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, 
 def _add_compiled(table: ResultTable, instance: Instance):
     """Measure the compiled dynamics of a problem with a reference, if it is that of a system and not measured yet."""
     key = _key(instance, compiled.NAME, OWN, OWN)
-    if instance.expected is None or table.has(**key):
+    content = {"data": instance.data[:DIGITS], "settings": digest(compiled.NAME, OWN)}
+    if instance.expected is None or table.has(**key, **content):
         return
     row = compiled.compiled(make_problem(instance.name), instance.expected)
     if row is not None:
-        table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
+        table.add(key | {"group": instance.group, "verdict": instance.verdict} | row | content)
 
 
 def _row(reply: Reply) -> dict:

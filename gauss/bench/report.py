@@ -19,7 +19,9 @@ from gauss.bench.summary import (
     SHIFT,
     SHIFTS,
     against_compiled,
+    asked,
     backends,
+    checksum,
     clocks,
     groups,
     is_broken,
@@ -27,6 +29,7 @@ from gauss.bench.summary import (
     is_lost,
     is_right,
     is_wrong,
+    not_asked,
     sensitivity,
     totals,
     verdict,
@@ -37,16 +40,18 @@ HOW = f"""Every backend gets the same quadratic programmes of mechanisms, in a p
 error of an answer is the largest relative error of a body's or joint's acceleration against a reference with residuals of
 50 digits. F2: accelerations of the bodies, in their units; F2s: scaled by Φ^½, rows of unit length. Levels are absolute
 tolerances of residuals and duality gap: low 1e-3, mid 1e-6, high 1e-9, tightest 1e-12 (HiGHS 1e-10). An answer after
-{LIMIT:g} s of CPU time is none.
+{LIMIT:g} s is none.
 
 Two rules, the same for all. **Right**: the error is at most {RIGHT:g}, that of multipliers at most {WRONG:g}, whoever
 answered and whatever a certificate says. **Kept**: primal and dual residual and gap are within the tolerance that was
-asked for, as qpbenchmark judges; a solver that promised a residual is held to that, and its error is another column.
-**Claimed, beyond**: success was claimed, and a residual or the gap is above the tolerance and above ten times the
-rounding of its own terms, where forces of 1e9 leave no other choice.
+asked for, as qpbenchmark judges, whatever the solver looks at. **Claimed, beyond**: success was claimed, and a residual
+that the solver promises (see its settings) is above its tolerance and above ten times the rounding of its own terms, where
+forces of 1e9 leave no other choice; the error is another column. Of a file without a solution or a proof the verdict is
+unknown: it is judged by its residuals alone.
 
 Times are medians of calls from Python, set-up included, on a problem in the form that the solver takes; making that form
-is not timed. They are wall times, or CPU times of the process where these are less, so that a busy machine adds nothing.
+is not timed. They are wall times, or CPU times of the process where these are less, so that a busy machine adds nothing,
+and a tenth of the wall times at least, so that waiting is not free.
 The time of the library is what it reports of itself. Those of gauss's own methods include making their matrices in
 Python. Means are shifted geometric means over all problems of a class (shift {1e3 * SHIFT:g} ms), a problem
 that is not solved right counting as {LIMIT:g} s. The machine may be shared: times side by side compare, single ones are
@@ -56,8 +61,9 @@ open; a solver that gives none is off by 1."""
 
 def markdown(rows, reused, header) -> str:
     """The whole report."""
-    lines = head("QP backends on mechanism problems", [*header, "all packages: [qp.lock](qp.lock)"])
-    lines += [HOW, "", *(["![Errors of the backends](qp_errors.png)"] if cells_shown(rows) else [])]
+    left, rows = not_asked(rows), asked(rows)
+    lines = head("QP backends on mechanism problems", [*header, "all packages: [qp.lock](qp.lock)", checksum(rows)])
+    lines += [HOW, "", *left, *(["![Errors of the backends](qp_errors.png)"] if cells_shown(rows) else [])]
     lines += ["![Time against error](qp_time_error.png)", "", "![Performance profiles](qp_profile.png)", ""]
     lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], MAIN_LEVEL)
     lines += _errors(rows) + _totals(rows) + _verdicts(rows) + _times(rows) + _means(rows) + _against(rows) + _honesty(rows)
@@ -305,8 +311,8 @@ def _claims(level: str, asked: list[dict]) -> str:
     claims = [r for r in asked if r["claimed"]]
     broken, wrong = [r for r in claims if is_broken(r)], [r for r in claims if is_wrong(r)]
     return (
-        f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with a residual or a gap above the "
-        f"tolerance and rounding; {len(wrong)} with an error above {WRONG:g} or numbers that are not finite, of which "
+        f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with a residual above its "
+        f"promise and rounding; {len(wrong)} with an error above {WRONG:g} or numbers that are not finite, of which "
         f"the certificate refused {sum(not r['certified'] for r in wrong)}."
     )
 

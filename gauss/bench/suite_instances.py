@@ -8,9 +8,9 @@ from scipy import sparse
 
 from gauss.bench.instances import Instance, Matrices, of_arrays
 from gauss.bench.known import KnownSolution, known
-from gauss.bench.problems import SOLVABLE
+from gauss.bench.problems import SOLVABLE, UNKNOWN
 from gauss.bench.structured import ProgrammeStructure
-from gauss.bench.suite import CLASSES, SuiteInstance, made, recipes
+from gauss.bench.suite import CLASSES, SuiteInstance, fingerprint, made, recipes
 from gauss.bench.suite.instance import SOLVED
 from gauss.bench.suite.optimality import plain_multipliers
 from gauss.bench.suite.refine import held_rows
@@ -43,11 +43,16 @@ def of_suite_instance(found: SuiteInstance, start: np.ndarray | None = None) -> 
     rows = sparse.vstack([plain, sparse.csr_array(found.G)[found.orthant :]], format="csc")
     right = np.concatenate([right, found.h[found.orthant :]])
     structure = ProgrammeStructure(found.cones, tuple(found.friction), found.stages)
-    fields = {"note": found.story, "structure": structure}
+    fields = {"note": found.story, "structure": structure, "data": fingerprint(found)}
     instance = of_arrays(found.name, found.kind, found.P, found.q, found.A, found.b, rows, right, **fields)
-    verdict = SOLVABLE if found.verdict == SOLVED else found.verdict
-    is_known = verdict == SOLVABLE and found.reference is not None and found.reference.x.hi.size == found.n
-    right_one = _known(found, instance.matrices) if is_known and instance.matrices is not None else None
+    right_one = None
+    if found.reference is None or (found.verdict == SOLVED and found.reference.x.hi.size != found.n):
+        verdict = UNKNOWN
+    elif found.verdict == SOLVED:
+        assert instance.matrices is not None  # it was made of arrays
+        verdict, right_one = SOLVABLE, _known(found, instance.matrices)
+    else:
+        verdict = found.verdict
     return replace(instance, known=right_one, verdict=verdict, start=start)
 
 

@@ -1,11 +1,13 @@
 """What the rows of the comparison say together: shares and means over equal sets of problems, and who is fastest.
 
 One rule for all backends, gauss's own among them: an answer is right if its error beside the reference is at most
-1e-6, that of its multipliers at most 1e-3, and in time. A solver that was asked for a tolerance of its residuals is
-judged by these, too: it has kept what it promised if primal and dual residual and duality gap are within the
-tolerance, as qpbenchmark judges. Certificates are no part of either.
+1e-6, that of its multipliers at most 1e-3, and in time. A solver that was asked for a tolerance is judged by residuals,
+too: it has kept the tolerance if primal and dual residual and duality gap are within it, as qpbenchmark judges, whatever
+the solver itself looks at; and it claims beyond its promise if a residual that its tolerance is of is above it
+(gauss.bench.levels.promise). Certificates are no part of either. Problems that a solver does not take are no failures of it.
 """
 
+import hashlib
 from collections.abc import Iterable
 from operator import itemgetter
 
@@ -14,8 +16,9 @@ import numpy as np
 from gauss.bench import compiled
 from gauss.bench.instances import FILE
 from gauss.bench.levels import LEVELS, LIMIT, OWN
-from gauss.bench.measure import OURS, WRONG, middle
-from gauss.bench.problems import SOLVABLE
+from gauss.bench.markdown import count_of
+from gauss.bench.measure import NOT_ASKED, OURS, WRONG, middle
+from gauss.bench.problems import SOLVABLE, UNKNOWN
 from gauss.bench.suite.instance import INFEASIBLE
 from gauss.bench.verdicts import said, stated, truth
 
@@ -54,9 +57,9 @@ def is_right(row) -> bool:
 
     Of a problem that has no solution, whether its verdict is stated.
     """
-    if truth(row) != SOLVABLE:
+    if truth(row) not in (SOLVABLE, UNKNOWN):
         return row["outcome"] != "timed out" and stated(row) == truth(row)
-    if np.isnan(row["error"]):
+    if truth(row) == UNKNOWN or np.isnan(row["error"]):
         return is_kept(row)
     return row["outcome"] == "answered" and bool(row["error"] <= RIGHT) and not is_without_multipliers(row)
 
@@ -73,7 +76,7 @@ def is_kept(row) -> bool:
 
 
 def is_broken(row) -> bool:
-    """Whether a solver claims success with residuals above its tolerance and above rounding, or with nan."""
+    """Whether a solver claims success with residuals above what it promises and above rounding, or with nan."""
     return bool(row["claimed"]) and row["level"] in LEVELS and not row["excess"] <= 1.0
 
 
@@ -85,6 +88,31 @@ def is_wrong(row) -> bool:
 def is_lost(row) -> bool:
     """Whether the process of a solver died, or its time was over."""
     return row["outcome"] in ("crashed", "timed out")
+
+
+def asked(rows) -> list[dict]:
+    """Rows of the problems that solvers take."""
+    return [row for row in rows if row["outcome"] != NOT_ASKED]
+
+
+def checksum(rows) -> str:
+    """Condition of a page: SHA-256 of those of the numbers of its problems, in the order of the names."""
+    data = sorted({(row["problem"], row.get("data", "")) for row in rows})
+    whole = hashlib.sha256("".join(f"{one}\n" for _, one in data).encode()).hexdigest()
+    return f"data of its {len(data)} problems: checksum {whole[:12]}"
+
+
+def not_asked(rows) -> list[str]:
+    """Lines of Markdown that say which solvers take how many of the problems, and why not all; none where all do."""
+    count: dict[tuple[str, str], set[str]] = {}
+    for row in rows:
+        if row["outcome"] == NOT_ASKED:
+            count.setdefault((row["reason"], row["backend"]), set()).add(row["problem"])
+    solvers: dict[tuple[str, int], list[str]] = {}
+    for (reason, solver), problems in count.items():
+        solvers.setdefault((reason, len(problems)), []).append(solver)
+    found = [f"* {', '.join(names)}, {count_of(many, 'problem')}: {reason}." for (reason, many), names in solvers.items()]
+    return ["Not asked:", "", *found, ""] if found else []
 
 
 def complete(rows, problems: list[str], form: str) -> dict[tuple[str, str], list[dict]]:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from gauss.errors import FileError
 
-TEXTS = ("problem", "group", "backend", "reason")  # columns of names and words, be they "001" or "nan"
+TEXTS = ("problem", "group", "backend", "reason", "data", "settings")  # columns of names and words, be they "001" or "nan"
+COMMIT = "# commit:"  # line of a header that may differ where a measurement goes on, as the first, the date, does
 
 
 class ResultTable:
@@ -43,14 +44,18 @@ class ResultTable:
                 csv.writer(file).writerow(self.columns)
 
     def add(self, row: dict):
-        """Write a row at once."""
+        """Write a row at once, in the place of one of the same key."""
+        key, written = self._key(row), {column: _text(row[column]) for column in self.columns}
+        if self.rows.pop(key, None) is not None:
+            write_table(self.path, header_of(self.path), list(self.rows.values()), self.columns)
         with open(self.path, "a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow([_text(row[column]) for column in self.columns])
-        self.rows[self._key(row)] = {column: _text(row[column]) for column in self.columns}
+            csv.writer(file).writerow(written.values())
+        self.rows[key] = written
 
-    def has(self, **key) -> bool:
-        """Whether a row is there already."""
-        return self._key(key) in self.rows
+    def has(self, **cells) -> bool:
+        """Whether a row is there already: one of this key, whose other given cells are the same."""
+        found = self.rows.get(self._key(cells))
+        return found is not None and all(found[column] == _text(cell) for column, cell in cells.items())
 
     def numbers(self) -> list[dict]:
         """All rows, numbers and truths as such."""
@@ -62,7 +67,7 @@ class ResultTable:
     def _take_up(self, comments: list[str]):
         lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
         found, rest = _parted(lines)
-        if found[1:] != comments[1:]:  # the first is the date
+        if _lasting(found) != _lasting(comments):
             raise FileError(f"{self.path} was measured elsewhere or with other versions; --fresh starts over.")
         reader = csv.DictReader(line for line in rest if line.endswith("\n"))
         if reader.fieldnames != list(self.columns):
@@ -105,6 +110,11 @@ def _parted(lines: Iterable[str]) -> tuple[list[str], list[str]]:
     lines = list(lines)
     count = next((i for i, line in enumerate(lines) if not line.startswith("#")), len(lines))
     return lines[:count], [line for line in lines[count:] if not line.startswith("# ")]
+
+
+def _lasting(comments: list[str]) -> list[str]:
+    """Lines of a header but those of the date and of the commit."""
+    return [line for line in comments[1:] if not line.startswith(COMMIT)]
 
 
 def _text(value) -> str:

@@ -2,7 +2,7 @@
 
 import re
 
-from gauss.bench.problems import INCONSISTENT, SOLVABLE
+from gauss.bench.problems import INCONSISTENT, SOLVABLE, UNKNOWN
 from gauss.bench.suite.instance import INFEASIBLE, UNBOUNDED
 
 # A certificate of dual infeasibility is a ray of descent.
@@ -28,11 +28,11 @@ def stated(row) -> str:
 
 
 def truth(row) -> str:
-    """Verdict that is proven of the problem of a row: "solvable", "infeasible" or "unbounded"."""
+    """Verdict that is proven of the problem of a row: "solvable", "infeasible" or "unbounded"; "unknown" without a proof."""
     found = row.get("verdict", SOLVABLE)  # older tables have problems with solutions alone, and one class by its name
     return INFEASIBLE if INCONSISTENT in (found, row.get("group")) else found
 
 
 def is_false(row) -> bool:
     """Whether a row states a verdict that is not true."""
-    return stated(row) not in ("", truth(row))
+    return truth(row) != UNKNOWN and stated(row) not in ("", truth(row))

@@ -15,6 +15,8 @@ START = 120.0  # [s] that a new process may take to import what it needs
 # So that backends are compared, not threads; the last is for solvers in Rust.
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 ONE_THREAD |= {"XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"}  # JAX
+# Exit codes of a process that a timer has ended, and the time that the timer measures.
+TIMERS = {-signal.SIGPROF: "CPU", -signal.SIGALRM: "wall"} if hasattr(signal, "SIGPROF") else {}
 STARTING = threading.Lock()  # the environment that a new process inherits is that of all threads
 
 
@@ -73,8 +75,8 @@ class Worker:
             process.join()
             code = process.exitcode
             self.stop()
-            if code is not None and code == -getattr(signal, "SIGPROF", 0):
-                return Reply("timed out", reason="the CPU time of a call was over")
+            if code in TIMERS:
+                return Reply("timed out", reason=f"the {TIMERS[code]} time of a call was over")
             return Reply("crashed", reason=f"the process of the solver died: {_death(code)}")
 
     def stop(self):

@@ -3,7 +3,8 @@ from gauss.codegen.branches import branches
 from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
-from gauss.codegen.disk_cache import from_disk
+from gauss.codegen.device_module import DeviceModule, vector_width
+from gauss.codegen.disk_cache import from_disk, is_noted, note
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Entry, Expression, Graph, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
@@ -26,6 +27,8 @@ from gauss.codegen.taylor_series import Series
 from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
+    "DeviceModule",
+    "vector_width",
     "BODY",
     "BatchCode",
     "DOUBLE",
@@ -71,6 +74,8 @@ __all__ = [
     "forward",
     "fresh_symbols",
     "from_disk",
+    "is_noted",
+    "note",
     "gc_pause",
     "graph_of",
     "intrinsic",

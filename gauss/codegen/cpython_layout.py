@@ -6,6 +6,7 @@ them on example arrays once in each process, before any code relies on them.
 """
 
 import ctypes
+import pickle
 import struct
 import sys
 from functools import cache
@@ -14,7 +15,6 @@ import numpy as np
 
 TABLE_ENTRIES = (
     "ndarray",
-    "double",
     "float",
     "none",
     "out",
@@ -36,6 +36,7 @@ CONTIGUOUS, ALIGNED, CAN_BE_WRITTEN, WARNS = 0x0001, 0x0100, 0x0400, 1 << 31  # 
 READABLE_FLAGS = (CONTIGUOUS | ALIGNED,) * 2  # mask, and value required under it
 WRITEABLE_FLAGS = (CONTIGUOUS | ALIGNED | CAN_BE_WRITTEN | WARNS, CONTIGUOUS | ALIGNED | CAN_BE_WRITTEN)
 NPY_DOUBLE = 12  # numpy's type number of double
+TYPE_WORD_OFFSET = 24  # offset, in PyArray_Descr, of 8 bytes: kind, character, byte order, a flag of numpy 1, type number
 PYARRAY_NEW = 93  # index of PyArray_New in numpy's C-API table
 NUMPY_ABI = (0x01000009, 0x02000000)  # of numpy 1 and 2
 FASTCALL, KEYWORDS = 0x0080, 0x0002  # calling convention: METH_FASTCALL, METH_KEYWORDS
@@ -52,7 +53,7 @@ class PinnedObjects:
     """
 
     def __init__(self, fallback, over_limit):
-        self.pinned = {"ndarray": np.ndarray, "double": np.dtype(float), "float": float, "none": None}
+        self.pinned: dict[str, object] = {"ndarray": np.ndarray, "float": float, "none": None}
         self.pinned |= {"out": sys.intern("out"), "fallback": fallback, "over_limit": over_limit}
 
     def addresses(self) -> ctypes.Array:
@@ -85,7 +86,20 @@ def is_known() -> bool:
         version = ctypes.PYFUNCTYPE(ctypes.c_uint)(_numpy_table()[0])()
     except AttributeError:
         return False
-    return version in NUMPY_ABI and all(_is_as_expected(array) for array in _examples())
+    return (
+        version in NUMPY_ABI
+        and all(_is_as_expected(array) for array in _examples())
+        and all(_has_type_word(dtype) for dtype in _example_types())
+    )
+
+
+def type_word(dtype: np.dtype) -> int:
+    """Word at ``TYPE_WORD_OFFSET`` that tells a scalar type: equal for equal types, as their addresses are not.
+
+    A type that was read from a pickle is another object than ``numpy.dtype(float)``.
+    """
+    fields = dtype.kind.encode(), dtype.char.encode(), dtype.byteorder.encode(), b"\0", dtype.num
+    return struct.unpack("@q", struct.pack("@cccci", *fields))[0]
 
 
 def method_definition(name: str, address: int, doc: str) -> tuple[bytes, bytes, bytes]:
@@ -127,6 +141,16 @@ def _examples() -> list[np.ndarray]:
     frozen = np.arange(5.0)
     frozen.flags.writeable = False
     return [np.arange(3.0), np.arange(12).reshape(3, 4)[:, ::2], frozen, np.zeros((), dtype=complex)]
+
+
+def _example_types() -> list[np.dtype]:
+    copied = pickle.loads(pickle.dumps(np.dtype(float)))
+    return [np.dtype(float), copied, np.dtype(np.float32), np.dtype(float).newbyteorder(), np.dtype(complex), np.dtype(int)]
+
+
+def _has_type_word(dtype: np.dtype) -> bool:
+    """Whether a scalar type has its :func:`type_word` at ``TYPE_WORD_OFFSET``."""
+    return ctypes.c_int64.from_address(id(dtype) + TYPE_WORD_OFFSET).value == type_word(dtype)
 
 
 def _is_as_expected(array: np.ndarray) -> bool:

@@ -7,7 +7,6 @@ object code (:mod:`gauss.codegen.machine`), and instead of the objects that the 
 has. An entry is read under the seal of :mod:`gauss.codegen.object_cache`, like the machine code itself.
 """
 
-import copyreg
 import hashlib
 import io
 import pickle
@@ -15,14 +14,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, TypeVar
 
-import numpy as np
-
 from gauss.codegen import machine, object_cache
 from gauss.codegen.content_digest import content_digest
 from gauss.codegen.package_digest import package_digest
 
 T = TypeVar("T")
-FLOAT = np.dtype(float)
 
 
 def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None) -> T:
@@ -46,6 +42,19 @@ def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None)
         if _name(content) == name:  # a function may have changed what it closes over meanwhile
             _write(name, found, content)
     return found
+
+
+def is_noted(content: tuple, first: bytes | None = None) -> bool:
+    """Whether a content was noted, by this process or another one; content and ``first`` as of :func:`from_disk`."""
+    name = _name(content, first)
+    return name is not None and object_cache.read(name) is not None
+
+
+def note(content: tuple, first: bytes | None = None):
+    """Note a content: a fact, as that a function of a system has passed a test; it holds for this version of the sources."""
+    name = _name(content, first)
+    if name is not None:
+        object_cache.write(name, b"")
 
 
 def _name(content: tuple, first: bytes | None = None) -> str | None:
@@ -79,9 +88,6 @@ class _NotCachedError(Exception):
 
 
 class _Pickler(pickle.Pickler):
-    # arrays are read with numpy's own type of doubles, by whose address machine code knows it; pickle makes a copy of it
-    dispatch_table = copyreg.dispatch_table | {type(FLOAT): lambda dtype: (np.dtype, (dtype.str,))}
-
     def __init__(self, file, content: tuple):
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         self.places = {id(thing): k for k, thing in enumerate(content)}

@@ -17,10 +17,16 @@ from gauss.codegen.straight_line import calling, result_rooms, straight_line
 
 
 class Writer:
-    """Writer of one module of functions and of the loops that call them."""
+    """Writer of one module of functions and of the loops that call them.
 
-    def __init__(self):
-        self.module = ir.Module(name="gauss")
+    Parameters
+    ----------
+    module : llvmlite.ir.Module, optional
+        The module; one for this CPU by default.
+    """
+
+    def __init__(self, module: ir.Module | None = None):
+        self.module = ir.Module(name="gauss") if module is None else module
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
 

@@ -2,9 +2,8 @@
 
 The machine code reads the fields of its array arguments (numpy's PyArrayObject_fields) and runs only if they are contiguous
 vectors of doubles of the right length. Any other argument goes to :class:`PythonWrapper`, which converts it or raises; a
-call
-whose results exceed their limits goes to another function with the same arguments. Where the memory layout of CPython and
-numpy is unknown (:func:`gauss.codegen.cpython_layout.is_known`), :class:`PythonWrapper` serves every call.
+call whose results exceed their limits goes to another function with the same arguments. Where the memory layout of
+CPython and numpy is unknown (:func:`gauss.codegen.cpython_layout.is_known`), :class:`PythonWrapper` serves every call.
 
 The buffer protocol, which belongs to CPython's stable ABI, would read the same arguments without field offsets; it costs
 0.115 µs more for three vectors and a result, a call of a double pendulum 0.185 µs instead of 0.07 µs.
@@ -247,7 +246,8 @@ class _EntryWriter:
         """Data of an argument, required to be an array of doubles; flags: mask, and value required under it."""
         b, at = self.b, cpython_layout.ARRAY_OFFSETS
         self._require(self._is(thing, "ndarray"))
-        self._require(b.icmp_unsigned("==", self._field(thing, at["descr"], OBJECT), self._pinned("double", OBJECT)))
+        word = self._field(self._field(thing, at["descr"], OBJECT), cpython_layout.TYPE_WORD_OFFSET, INTEGER)
+        self._require(b.icmp_signed("==", word, INTEGER(cpython_layout.type_word(np.dtype(float)))))
         self._require(b.icmp_signed("==", self._field(thing, at["nd"], FLAG), FLAG(len(shape))))
         for k, size in enumerate(shape):
             length = b.load(b.gep(self._field(thing, at["dimensions"], INTEGER.as_pointer()), [INTEGER(k)]))

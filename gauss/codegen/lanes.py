@@ -4,7 +4,8 @@ import math
 
 from llvmlite import ir
 
-from gauss.codegen import machine
+from gauss.codegen.device_module import DeviceModule, vector_width
+from gauss.codegen.elementary import elementary
 from gauss.codegen.expression import Expression
 from gauss.codegen.intrinsics import external, intrinsic
 from gauss.codegen.multiply_add import FUSED
@@ -108,6 +109,8 @@ class Lanes:
             return b.fneg(x[0])
         if op in COMPARISONS:
             return b.fcmp_ordered(COMPARISONS[op], *x)
+        if op in ("exp", "log", "atan2") and isinstance(self.module, DeviceModule):
+            return b.call(elementary(self.module, op), x)
         if op == "atan2":
             return self._each_lane("atan2", x)
         return b.call(intrinsic(self.module, INTRINSICS[op], self.kind, len(x)), x)
@@ -142,7 +145,7 @@ class Lanes:
 
     def sincos_together(self, angles: dict):
         """Compute sines and cosines of angles {node: value}, a vector register of angles at a time."""
-        at_once = machine.width() // self.width
+        at_once = vector_width(self.module) // self.width
         nodes = list(angles) if at_once > 1 else []
         for start in range(0, len(nodes), at_once):
             part = nodes[start : start + at_once]

@@ -2,16 +2,20 @@
 
 Argument reduction by π/2 in three parts (Cody and Waite 1980) and the minimax polynomials of the public FDLIBM kernels
 (Sun Microsystems 1993, k_sin.c, k_cos.c). The products q·P1 and q·P2 are exact for |x| ≤ 1e5 rad; beyond, each lane calls
-the C library, whose argument reduction is exact.
+the C library, whose argument reduction is exact. A GPU has no such library: there x − q·π/2 is formed by fused multiply–adds
+in pairs of doubles, up to |x| = 1e9 rad, and the result is NaN beyond.
 """
 
 from llvmlite import ir
 
+from gauss.codegen.device_module import DeviceModule
 from gauss.codegen.intrinsics import intrinsic
 
 LARGEST_REDUCED_ANGLE = 1e5  # [rad]: above, the products with P1 and P2 are rounded
 TWO_OVER_PI = 0.6366197723675814
 P1, P2, P2_TAIL = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
+LARGEST_PAIRED_ANGLE = 1e9  # [rad]: above, q is no 32-bit integer
+HALF_PI = 1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33  # π/2 as the sum of three doubles
 SIN = (
     -1.66666666666666324348e-01,
     8.33333333332248946124e-03,
@@ -70,7 +74,8 @@ class SinCos:
             bits = b.bitcast(large, ir.IntType(self.width))
             some = b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
         with b.if_then(some, likely=False):
-            exact = zip(self._library(b, x), (sine, cosine), strict=True)
+            known = self._paired(b, x, size) if isinstance(self.module, DeviceModule) else self._library(b, x)
+            exact = zip(known, (sine, cosine), strict=True)
             self._return(b, *(b.select(large, *pair) for pair in exact))  # so that lanes are independent
         self._return(b, sine, cosine)
         return function
@@ -87,10 +92,32 @@ class SinCos:
         r = b.fsub(t, w)
         lost = b.fsub(b.fmul(q, c(P2_TAIL)), b.fsub(b.fsub(t, r), w))
         y = b.fsub(r, lost)
-        tail = b.fsub(b.fsub(r, y), lost)
+        return self._reduced(b, q, y, b.fsub(b.fsub(r, y), lost))
+
+    def _reduced(self, b: ir.IRBuilder, q, y, tail):
+        """Sine and cosine of q·π/2 + y + tail."""
         z = b.fmul(y, y)
         sine, cosine = self._sine(b, y, tail, z), self._cosine(b, y, tail, z)
         return self._quadrant(b, q, sine, cosine)
+
+    def _paired(self, b: ir.IRBuilder, x, size):
+        """Sine and cosine of a large angle without a library; NaN above LARGEST_PAIRED_ANGLE.
+
+        x − q·H₁ is a multiple of the last bits of both and below 1: one fused multiply–add forms it exactly.
+        """
+        c, fma = self.constant, self._intrinsic("llvm.fma", 3)
+        first, second, third = map(c, HALF_PI)
+        known = b.fcmp_ordered("<=", size, c(LARGEST_PAIRED_ANGLE))
+        x = b.select(known, x, c(0.0))
+        q = b.call(self._intrinsic("llvm.rint"), [b.fmul(x, c(TWO_OVER_PI))])
+        r = b.call(fma, [b.fneg(q), first, x])
+        w = b.fmul(q, second)
+        lost = b.fadd(b.call(fma, [q, second, b.fneg(w)]), b.fmul(q, third))
+        y = b.fsub(r, w)
+        back = b.fsub(y, r)
+        off = b.fsub(b.fsub(r, b.fsub(y, back)), b.fadd(w, back))  # r − w − y (Knuth's two-sum)
+        tail = b.fsub(off, lost)
+        return [b.select(known, found, c(float("nan"))) for found in self._reduced(b, q, y, tail)]
 
     def _horner(self, b: ir.IRBuilder, z, coefficients):
         fma = self._intrinsic("llvm.fma", 3)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from llvmlite import ir
 
-from gauss.codegen import machine
+from gauss.codegen.device_module import vector_width
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER
@@ -41,7 +41,8 @@ def straight_line(
     """
     values = _Values(scheduled, fetch, keep)
     nodes = scheduled.nodes
-    groups = superword_groups(scheduled, machine.width()) if vectorise and lanes.width == 1 else []
+    width = vector_width(lanes.module)
+    groups = superword_groups(scheduled, width) if vectorise and lanes.width == 1 < width else []
     for parts in groups:
         _vectorised(lanes, parts, values)
     written = {node.index for parts in groups for part in parts for node in part}

@@ -1,6 +1,6 @@
 """Accelerations of single states: machine code with an error check, and the certified recursion where the check fails."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -18,19 +18,21 @@ from gauss.codegen import (
     fastcall,
     write,
 )
+from gauss.codegen.gpu.device_function import DeviceFunction
+from gauss.codegen.gpu.rows import RowsOnDevice
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes
 from gauss.dynamics.contact.unilateral import unilateral_dynamics
-from gauss.dynamics.engines.call_graph import call_graph_kernels
+from gauss.dynamics.engines.call_graph import refined_call_graph
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.engines.tree_recursion import corrected_recursion
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_forces import LoadForces
-from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
+from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_refinement import refined, refined_once
@@ -57,7 +59,10 @@ StateError
 SimulationError
     If no accelerations can be certified.
 """
-BY_KERNELS = "call graph", "tree recursion"  # dynamics with all laws evaluated by Python
+BY_KERNELS: dict[str, Callable[[System, Sequence], NativeFunction]] = {  # dynamics with all laws evaluated by Python
+    "call graph": refined_call_graph,
+    "tree recursion": corrected_recursion,
+}
 
 
 class Accelerations:
@@ -111,6 +116,28 @@ def forward_dynamics(system: System) -> Callable:
     return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
 
 
+def forward_dynamics_on_device(system: System, device: str) -> DeviceFunction:
+    """Function (q, v, load, t=0.0) → q̈ of batches on a device; rows that fail the check are repeated on this CPU.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled as a whole, with the reasons.
+    """
+    laws = Laws(system)
+    BATCHES.plan(Question(system, laws))
+    limits = (ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE)
+    interface = Interface(_sizes(system), "t", limits, ((system.n_v,),))
+
+    def make() -> RowsOnDevice:
+        trace = write(partial(refined_once, Program(system, laws)), *interface.sizes, 1, name=NAME)
+        return RowsOnDevice(device, trace, interface)
+
+    key = forward_dynamics_on_device, laws.key, device
+    rows = cached_on_disk(system, key, make)
+    return cached(system, (DeviceFunction, *key), lambda: DeviceFunction(rows, interface, forward_dynamics(system), NAME))
+
+
 def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
     """Machine code of the dynamics under the traced loads.
 
@@ -120,12 +147,10 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
     def make():
         interface = Interface(_sizes(system), "t", limits=(ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE))
         last = _last(system, laws.traced)
-        if plan.dynamics == "call graph":
-            kernels, loads = call_graph_kernels(system), LoadForces(system, (), laws)
-            return PythonWrapper(lambda given: kernels.refined(given, loads), interface, system.n_v + 3, last, NAME, DOC)
-        if plan.dynamics == "tree recursion":
-            entry = written(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
-            rows = batched(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
+        if plan.dynamics in BY_KERNELS:
+            by_kernels = BY_KERNELS[plan.dynamics]
+            entry = written(by_kernels, interface, lambda: by_kernels(system, laws.traced))
+            rows = batched(by_kernels, interface, lambda: by_kernels(system, laws.traced))
             return fastcall(entry, interface, last, NAME, DOC, rows)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
 

@@ -9,7 +9,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
 from gauss.integrators import ExplicitPair, FixedStep
-from gauss.scene import Points
+from gauss.scene import Contact, Points
 from gauss.system import System, build, phase_scene, sides
 from gauss.system.contact_gaps import of_shapes, slips
 from gauss.system.elimination_cost import MOST_WORK
@@ -22,6 +22,19 @@ MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per b
 WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
+MOST_CONTACT_OPERATIONS = 3_000  # of the gap functions up to which it is: more take longer to compile than kernels of pairs
+CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordinates of the scene, measured
+    ("HalfSpace", "Sphere"): 122,
+    ("Sphere", "Sphere"): 661,
+    ("Capsule", "Sphere"): 969,
+    ("Box", "Sphere"): 1_386,
+    ("Capsule", "HalfSpace"): 257,
+    ("Capsule", "Capsule"): 1_557,
+    ("Box", "Capsule"): 18_255,
+    ("Box", "HalfSpace"): 635,
+    ("Box", "Box"): 42_787,
+}
+WIDEST_MECHANISM = 128  # rates up to which the mass matrix of a mechanism is dense straight-line code
 
 
 def is_large(system) -> bool:
@@ -140,9 +153,44 @@ def small_contact_problem(ask: Question) -> list[str]:
     return found + ([f"{n_v} rates beside contacts are more than {WIDEST_CONTACT}"] if n_v > WIDEST_CONTACT else [])
 
 
-def free_bodies_in_contact(ask: Question) -> bool:
+def few_contact_operations(ask: Question) -> list[str]:
+    """The gap functions of contacts are short enough to be written out in the coordinates of the scene."""
+    scene = ask.system.scene
+    contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
+    work = sum(_operations(scene.shapes[one.shape], scene.shapes[one.other]) for one in contacts)
+    return [f"its contacts would have about {work:.0e} operations"] if work > MOST_CONTACT_OPERATIONS else []
+
+
+def _operations(one, other) -> int:
+    """Operations of the gap functions of two shapes with their derivatives, roughly."""
+    names = ("Sphere" if isinstance(shape, Points) else type(shape).__name__ for shape in (one, other))
+    balls = max((len(shape.corners) for shape in (one, other) if isinstance(shape, Points)), default=1)
+    first, second = sorted(names)
+    return balls * CONTACT_OPERATIONS.get((first, second), 0)
+
+
+def shapes_in_contact(ask: Question) -> bool:
+    """Whether there are contacts of shapes."""
+    return any(isinstance(contact, Contact) for contact in ask.system.scene.contacts.values())
+
+
+def takes_pair_kernels(ask: Question) -> list[str]:
+    """Kernels of pairs of shapes take its shapes, and its other constraints are rows of joints."""
+    system, scene = ask.system, ask.system.scene
+    touching = {name for one in scene.contacts.values() if isinstance(one, Contact) for name in (one.shape, one.other)}
+    found = [f"{name!r} has no radius" for name in sorted(touching) if _is_sharp(scene.shapes[name])]
+    if are_free_in_contact(system):
+        return found
+    if not system.Phi.any() or system.dynamics is None:
+        found.append("it was built without machine code")
+    n_v = system.n_v
+    found += [f"{n_v} rates beside contacts are more than {WIDEST_MECHANISM}"] if n_v > WIDEST_MECHANISM else []
+    return found + (["a constraint depends on the time"] if system.relations.asks_time else [])
+
+
+def are_free_in_contact(system: System) -> bool:
     """Whether contacts of shapes are all that acts on bodies that hang on free joints from the ground or are fixed to it."""
-    return _are_free(ask.system) and _touch_alone(ask.system.scene)
+    return _are_free(system) and _touch_alone(system.scene)
 
 
 def _are_free(system: System) -> bool:
@@ -157,8 +205,12 @@ def _touch_alone(scene) -> bool:
     """Whether contacts are the only loads and constraints, of shapes that are boxes or have a radius."""
     if scene.loads or scene.relations or scene.couplings or scene.set_valued or not scene.contacts:
         return False
-    sharp = any(isinstance(shape, Points) and not shape.radius for shape in scene.shapes.values())
-    return of_shapes(scene) and not sharp
+    return of_shapes(scene) and not any(map(_is_sharp, scene.shapes.values()))
+
+
+def _is_sharp(shape) -> bool:
+    """Whether a shape is points without a radius."""
+    return isinstance(shape, Points) and not shape.radius
 
 
 def smooth_system(system: System) -> System:

@@ -1,4 +1,4 @@
-"""Inputs of a system: as parameters of traced functions, as generalised forces, and as drives with laws."""
+"""Inputs of a system: as parameters of traced functions, as generalised forces, and as loads with laws."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -6,8 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gauss.codegen import Graph
-from gauss.scene import Drive, Input, Scene
-from gauss.system import BoundLoad, System
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.load_forces import generalised_forces
+from gauss.dynamics.loads import Applied
+from gauss.scene import Drive, Force, Input, Scene
+from gauss.scene.values import as_function
+from gauss.system import BoundLoad, State, System
 
 
 def input_loads(system: System) -> tuple[BoundLoad, ...]:
@@ -18,7 +22,7 @@ def input_loads(system: System) -> tuple[BoundLoad, ...]:
 
 
 class InputForces:
-    """Inputs of a system as generalised forces Q = S clip(u).
+    """Inputs of a system as generalised forces, Q = S clip(u) where each acts along one rate.
 
     Parameters
     ----------
@@ -28,22 +32,29 @@ class InputForces:
     Attributes
     ----------
     columns : ndarray of int, shape (n_u,)
-        Rate along which each input acts.
+        Rate along which each input acts, where all are torques or forces of one joint.
     low, high : ndarray, shape (n_u,)
         Least and largest effort [N m, N].
     """
 
     def __init__(self, system: System):
         inputs = system.scene.inputs.values()
-        self.system, self.columns = system, np.array([system.column(given.joint) for given in inputs], dtype=int)
+        self.system, self.is_plain = system, all(given.is_plain for given in inputs)
+        columns = [system.column(given.joint) for given in inputs if isinstance(given.joint, str)] if self.is_plain else []
+        self.columns = np.array(columns, dtype=int)
         self.low, self.high = np.array([given.bounds for given in inputs]).reshape(-1, 2).T
 
     def efforts(self, u: np.ndarray) -> np.ndarray:
         """Efforts (n_u,) of input values (n_u,), cut off at the limits [N m, N]."""
         return np.clip(u, self.low, self.high)
 
-    def forces(self, u: np.ndarray) -> np.ndarray:
-        """Generalised forces (n_v,) of input values (n_u,) [N m, N]."""
+    def forces(self, u: np.ndarray, state: State) -> np.ndarray:
+        """Generalised forces (n_v,) of input values (n_u,) in a state [N m, N]."""
+        if not self.is_plain:
+            given = self.system.scene.inputs.values()
+            loads = [BoundLoad(one, (lambda *_, u=value: u,)) for one, value in zip(given, u, strict=True)]
+            motion = kinematics(self.system, state)
+            return generalised_forces(motion, Applied(motion, loads))
         found = np.zeros(self.system.n_v)
         np.add.at(found, self.columns, self.efforts(u))
         return found
@@ -74,7 +85,7 @@ class HeldLaw:
 
 
 def driven_scene(scene: Scene, laws: Mapping[str, Callable]) -> Scene:
-    """Scene with drives for its inputs.
+    """Scene with drives, and forces on bodies, for its inputs.
 
     Parameters
     ----------
@@ -83,16 +94,44 @@ def driven_scene(scene: Scene, laws: Mapping[str, Callable]) -> Scene:
     laws : mapping of str to callable
         Input → law t ↦ value [N m, N], cut off at the limits of the input.
     """
-    drives = {}
+    loads: dict[str, Drive | Force] = {}
     for name, given in scene.inputs.items():
-        joint, along = _rate_of(scene, given)
-        drives[name] = Drive(name, joint, HeldLaw(laws[name], *given.bounds, along))
-    return replace(scene, loads={**scene.loads, **drives}, inputs={})
+        for number, (on, factor) in enumerate(given.acts_on.items()):
+            joint, along = _rate_of(scene, on, factor)
+            called = name if not number else f"{name} on {on}"
+            loads[called] = Drive(called, joint, _law_of(given, laws[name], along))
+        for number, force in enumerate(given.forces):
+            called = name if not given.acts_on and not number else f"{name} on {force.body}, {number + 1}"
+            push, turn = (_PartOfForce(given, laws[name], part) for part in (force.force, force.moment))
+            loads[called] = replace(force, name=called, force=push, moment=turn)
+    return replace(scene, loads={**scene.loads, **loads}, inputs={})
 
 
-def _rate_of(scene: Scene, given: Input) -> tuple[str, tuple[float, ...]]:
-    """Joint of an input, and 1 for its rate among those of the joint, else 0."""
-    if given.joint in scene.joints:
-        return given.joint, (1.0,)
-    owner, _, rate = given.joint.rpartition(".")
-    return owner, tuple(float(one == rate) for one in scene.joints[owner].pair.rates)
+def _law_of(given: Input, law: Callable, along: tuple[float, ...]) -> Callable:
+    """Law of the efforts along the rates of a joint."""
+    if given.effort is None:
+        return HeldLaw(law, *given.bounds, along)
+    return lambda t, motion: np.array(along) * _effort(given, law, t, motion)
+
+
+def _effort(given: Input, law: Callable, t, motion):
+    value = np.clip(law(t), *given.bounds)
+    return value if given.effort is None else given.effort(value, t, motion)
+
+
+class _PartOfForce:
+    """Law of the force or moment of an input on a body."""
+
+    def __init__(self, given: Input, law: Callable, part):
+        self.given, self.law, self.part = given, law, as_function(part)
+
+    def __call__(self, t, motion) -> np.ndarray:
+        return _effort(self.given, self.law, t, motion) * np.asarray(self.part(t, motion))
+
+
+def _rate_of(scene: Scene, joint: str, factor: float) -> tuple[str, tuple[float, ...]]:
+    """Joint of a rate, and the factor for this rate among those of the joint, else 0."""
+    if joint in scene.joints:
+        return joint, (factor,)
+    owner, _, rate = joint.rpartition(".")
+    return owner, tuple(factor * float(one == rate) for one in scene.joints[owner].pair.rates)

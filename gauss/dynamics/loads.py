@@ -10,7 +10,10 @@ from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import GROUND, Drive, ElasticLink, Force, Input, JointSpring, Slipping, Spring
-from gauss.scene.values import evaluated
+from gauss.scene.values import as_function, evaluated
+
+NO_FORCE = np.zeros(3)
+NO_FORCE.flags.writeable = False  # one array for all bodies without loads
 
 
 class Applied:
@@ -36,7 +39,7 @@ class Applied:
     def __init__(self, motion: Kinematics, loads=None):
         system = motion.system
         places = system.structure.n_bodies + 1  # with the ground
-        self.F, self.M = ([np.zeros(3) for _ in range(places)] for _ in range(2))
+        self.F, self.M = [NO_FORCE] * places, [NO_FORCE] * places
         self.P = np.zeros(system.n_v, dtype=motion.state.v.dtype)
         self.driven = self.loaded = self.dissipated = 0.0
         for bound in system.loads if loads is None else loads:
@@ -78,15 +81,27 @@ def _(load: Drive, laws, motion: Kinematics, applied: Applied):
 def _(load: Input, laws, motion: Kinematics, applied: Applied):
     low, high = load.bounds
     value = laws[0](motion.state.t, motion)
-    effort = value if load.limits is None else math.clip(value, low, high)
-    column = motion.system.column(load.joint)
-    applied.P[column] += effort
-    applied.driven += effort * motion.state.v[column]
+    value = value if load.limits is None else math.clip(value, low, high)
+    effort = value if load.effort is None else load.effort(value, motion.state.t, motion)
+    for joint, factor in load.acts_on.items():
+        column, along = motion.system.column(joint), effort if factor == 1.0 else factor * effort
+        applied.P[column] += along
+        applied.driven += along * motion.state.v[column]
+    for force in load.forces:
+        of_force = (as_function(force.force), as_function(force.moment))
+        applied.driven += _push(force, of_force, motion, applied, effort)
 
 
 @apply.register
 def _(load: Force, laws, motion: Kinematics, applied: Applied):
+    applied.loaded += _push(load, laws, motion, applied)
+
+
+def _push(load: Force, laws, motion: Kinematics, applied: Applied, factor=None):
+    """Add a force and a moment, times a factor if there is one; their power [W]."""
     force, moment = (_evaluate(f, motion, f"force {load.name!r}", 3) for f in laws)
+    if factor is not None:
+        force, moment = factor * force, factor * moment
     if load.axes == "body":
         R = motion.rotation(load.body)
         force, moment = R @ force, R @ moment
@@ -95,7 +110,7 @@ def _(load: Force, laws, motion: Kinematics, applied: Applied):
     applied.push(motion, body, point, force)
     applied.M[body] = applied.M[body] + moment
     velocity = motion.u[body] + cross(motion.W[body], point - motion.x[body])
-    applied.loaded += force @ velocity + moment @ motion.W[body]
+    return force @ velocity + moment @ motion.W[body]
 
 
 @apply.register

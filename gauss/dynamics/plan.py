@@ -7,14 +7,15 @@ driver              dynamics        applies to
 ==================  ==============  =====================================================================================
 constant            none            scenes without degrees of freedom
 time stepping       compiled        ``integrator="time_stepping"``
-time stepping       free bodies     the same of bodies without joints between them, many contacts of shapes
+time stepping       pair kernels    the same with many contacts of shapes
 time stepping       certified       the same, where the dynamics cannot be compiled
 events              compiled        unilateral constraints, joint friction, limited forces, losses
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
+compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
-Python loop         call graph      many kinematic loops
+Python loop         call graph      many kinematic loops with opaque laws
 Python loop         tree recursion  large trees with opaque laws
 Python loop         compiled        opaque laws, and systems too large for a compiled step
 library             certified       all other scenes, by integrators of other libraries
@@ -34,7 +35,7 @@ from gauss.dynamics.conditions import (
     contacts_alone,
     explicit,
     few_bodies,
-    free_bodies_in_contact,
+    few_contact_operations,
     has_contacts,
     large_loops,
     large_tree,
@@ -42,8 +43,10 @@ from gauss.dynamics.conditions import (
     narrow,
     no_held_inputs,
     own_backend,
+    shapes_in_contact,
     small_contact_problem,
     smooth,
+    takes_pair_kernels,
     traced_laws,
     written_out,
 )
@@ -109,23 +112,26 @@ def _both(one: Callable[[Question], bool], other: Callable[[Question], bool]) ->
 
 _CODE = own_backend, compilable
 _WHOLE = *_CODE, written_out, traced_laws, narrow
-_STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
+_FEW_CONTACTS = small_contact_problem, few_contact_operations
+_STEP = own_backend, smooth(compilable), smooth(few_bodies), *_FEW_CONTACTS, smooth(traced_laws)
+_PAIR_KERNELS = own_backend, no_held_inputs, smooth(traced_laws), takes_pair_kernels
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
-_TREE_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
+_KERNEL_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
 
 MOTIONS = RuleTable(
     (
         Rule("constant", "none", when=lambda ask: not ask.system.n_v),
         Rule("time stepping", "compiled", "certified", is_time_stepping, _STEP),
-        Rule("time stepping", "free bodies", "", _both(is_time_stepping, free_bodies_in_contact), (own_backend,)),
+        Rule("time stepping", "pair kernels", "", _both(is_time_stepping, shapes_in_contact), _PAIR_KERNELS),
         Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs,)),
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs,)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
         Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _LOOP),
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _LOOP),
-        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _TREE_LOOP),
+        Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
+        Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _KERNEL_LOOP),
         Rule("samples", "compiled", "certified", _both(_held, _by_accelerations)),
         Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
@@ -135,10 +141,17 @@ MOTIONS = RuleTable(
     ),
     _refused,
 )
+TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 # Batches (ensembles) of motions of one system.
 BATCHES = RuleTable(
-    (Rule("batch", "compiled", "simulate", conditions=(compilable, few_bodies, traced_laws)),),
-    lambda ask, why: f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use simulate for each motion.",
+    (
+        Rule("batch", "compiled", "simulate", is_time_stepping, _STEP),
+        Rule("batch", "compiled", "simulate", lambda ask: not is_time_stepping(ask), (compilable, few_bodies, traced_laws)),
+    ),
+    lambda ask, why: (
+        f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use "
+        f"{TIME_STEPPING_FIRST if _is_nonsmooth(ask) else ''}simulate for each motion."
+    ),
 )
 
 

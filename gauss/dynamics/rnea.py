@@ -91,6 +91,11 @@ class KinematicTree:
         """Acceleration (6,) of every link, less gravity, under joint accelerations (n_v,)."""
         return self._outward(rates, self.ground, {body: kin.bias for body, kin in self.joint_kinematics.items()})
 
+    def biases(self) -> dict[int, np.ndarray]:
+        """Acceleration (6,) of every link where the accelerations of all joints are zero."""
+        biases = {body: kin.bias for body, kin in self.joint_kinematics.items()}
+        return self._outward(np.zeros(self.subsystem.n_v), np.zeros(6), biases)
+
     def carried(self, rates) -> dict[int, np.ndarray]:
         """Velocity (6,) of every link given the joint rates (n_v,)."""
         return self._outward(rates, np.zeros(6), dict.fromkeys(self.joint_kinematics, np.zeros(6)))

@@ -48,7 +48,7 @@ class Plan:
     dynamics : str
         Where accelerations come from: "compiled" (straight-line code of the scene), "call graph" (a kernel for each kind of
         link and loop), "tree recursion" (a kernel for each kind of link), "unilateral" (compiled, with an active set of
-        contacts), "free bodies" (kernels of pairs of shapes, shared by all scenes), "certified" (a QP backend solves every
+        contacts), "pair kernels" (kernels of pairs of shapes, shared by all scenes), "certified" (a QP backend solves every
         state, with a certificate), or "none".
     stabilisation : str
         Constraint stabilisation.

@@ -137,6 +137,20 @@ class StateTerms:
         R, point = self.frame_pose(frame)
         return self._jacobian(self.system.frame(frame).body, R, np.zeros(3) if reference == "world" else point, reference)
 
+    def jacobian_of(self, body: int, point) -> np.ndarray:
+        """Jacobian J (6, n_v) of a body at a point of the world, in world axes."""
+        return self._jacobian(body, np.eye(3), point, "local_world_aligned")
+
+    @cached_property
+    def velocities(self) -> dict[int, np.ndarray]:
+        """Velocity (6,) of every link, in its frame."""
+        return self.tree.carried(self.v)
+
+    @cached_property
+    def biases(self) -> dict[int, np.ndarray]:
+        """Acceleration (6,) of every link where the accelerations of all joints are zero, in its frame."""
+        return self.tree.biases()
+
     def _jacobian(self, body: int, R, point, reference: str) -> np.ndarray:
         tree, J = self.still, np.zeros((6, self.system.n_v), dtype=object)
         to = {edge.outer: edge for edge in tree.edges}

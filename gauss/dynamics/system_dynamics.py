@@ -72,11 +72,14 @@ class SystemDynamics(Store):
 
         return forward_dynamics(system)
 
-    def function(self, system: System, names, reference: str, independent) -> Callable:
+    def function(self, system: System, names, reference: str, independent, device=None) -> Callable:
         """Compiled function of a state, or of several at once."""
+        from gauss.dynamics.accelerations import forward_dynamics_on_device
         from gauss.dynamics.state_functions import state_function
 
-        return state_function(system, names, reference, independent)
+        if names == ("forward_dynamics",):
+            return self.forward_dynamics(system) if device is None else forward_dynamics_on_device(system, device)
+        return state_function(system, names, reference, independent, device)
 
     def evaluate(self, system: System, names, given: dict, t, reference: str, independent) -> dict:
         """Results of several functions of a state, by their names, for arguments by their names."""

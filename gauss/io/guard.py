@@ -3,6 +3,7 @@
 No document type and no entities, no endless nesting, no numbers beyond reason, no files elsewhere.
 """
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -40,7 +41,7 @@ class Source:
         return str(self.path) if element is None else self.places.get(element, str(self.path))
 
 
-def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = ()) -> Source:
+def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = (), loose_comments: bool = False) -> Source:
     """Read a file that may come from anybody.
 
     Parameters
@@ -51,6 +52,9 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = ()) -> Sour
         What its outermost element may be.
     limits : tuple of str
         Elements whose numbers may be of any size: where there is no limit, files hold the largest double.
+    loose_comments : bool
+        Whether comments may hold "--", and blanks precede the declaration: only where no other parser reads the file again,
+        which might see other elements.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = ()) -> Sour
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
     try:
-        source = _Parser(path).parsed(content)
+        source = _parsed(path, content, loose_comments)
     except expat.ExpatError as error:
         raise FileError(f"{path}: not XML: {error}.") from error
     if source.root.tag not in roots:
@@ -79,16 +83,55 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = ()) -> Sour
     return source
 
 
-def require_inside(source: Source, element: Element, home: Path, named: str):
-    """Refuse a file that is not in a folder.
+def require_inside(source: Source, element: Element, home: Path, named: str, root_folder: Path | None = None):
+    """Refuse a file that is neither in a folder nor in the one that the user named.
 
     Raises
     ------
     FileError
         Naming the file and where it is asked for.
     """
-    if not (home / named).resolve().is_relative_to(home.resolve()):
-        raise FileError(f"{source.place(element)}: names the file {named!r} outside its own folder; put a copy there.")
+    file, allowed = (home / named).resolve(), [folder for folder in (home, root_folder) if folder is not None]
+    if any(file.is_relative_to(folder.resolve()) for folder in allowed):
+        return
+    if root_folder is None:
+        remedy = "put a copy there, or name a folder that holds both, where it can be: gauss.load(..., root_folder=...)"
+    else:
+        remedy = f"and outside root_folder {str(root_folder)!r}; name a folder that holds both"
+    raise FileError(f"{source.place(element)}: names the file {named!r} outside its own folder; {remedy}.")
+
+
+def checked_root(path, root_folder) -> Path | None:
+    """Folder that a file may name files in, as the user gave it.
+
+    Raises
+    ------
+    FileError
+        If it is no folder.
+    """
+    if root_folder is None:
+        return None
+    if not isinstance(root_folder, str | Path) or not Path(root_folder).is_dir():
+        raise FileError(f"{path}: root_folder: expected a folder, got {root_folder!r}.")
+    return Path(root_folder).resolve()
+
+
+def _parsed(path: Path, content: bytes, loose_comments: bool) -> Source:
+    try:
+        return _Parser(path).parsed(content)
+    except expat.ExpatError as error:
+        if not loose_comments:
+            raise
+        try:
+            return _Parser(path).parsed(_without_comments(content))
+        except expat.ExpatError:
+            raise error from None
+
+
+def _without_comments(content: bytes) -> bytes:
+    """Text of the same lines without comments and declaration."""
+    blank = lambda found: b"\n" * found[0].count(b"\n")  # noqa: E731
+    return re.sub(rb"<!--.*?-->", blank, re.sub(rb"^\s*<\?xml.*?\?>", blank, content, flags=re.S), flags=re.S)
 
 
 class _Parser:

@@ -12,6 +12,8 @@ from gauss.scene import Scene
 from gauss.scene.toml import from_tables, tables, write_toml
 
 EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
+OF_SDF = ("root", "limits", "root_folder", "missing")
+OF_MJCF = ("limits", "contacts", "root_folder", "keyframe")
 READ = (".toml", ".urdf", ".xml", ".sdf", ".world")
 
 
@@ -28,8 +30,10 @@ def load(source, **options):
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
     **options
         For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``limits="start"|"stops"``, ``resistance=True`` and
-        ``collisions=True`` (see :func:`gauss.io.urdf.extras.with_extras`); for .sdf ``root`` and ``limits``; for .xml
-        ``limits`` and ``contacts=True`` (see :func:`gauss.io.mjcf.read.read_mjcf`); for families their parameters.
+        ``collisions=True`` (see :func:`gauss.io.urdf.extras.with_extras`); for .sdf ``root``,
+        ``limits``, ``root_folder=FOLDER`` and ``missing`` (see :func:`gauss.io.sdf.read.read_sdf`); for .xml ``limits``,
+        ``contacts=True``, ``root_folder=FOLDER`` and ``keyframe=NAME`` (see :func:`gauss.io.mjcf.read.read_mjcf`); for
+        families their parameters.
 
     Returns
     -------
@@ -50,9 +54,9 @@ def load(source, **options):
     if path.suffix.lower() == ".toml":
         return _without_options(name, options, _read_toml, path)
     if path.suffix.lower() == ".xml":
-        return _read_mjcf(path, _known(name, options, ("limits", "contacts")))
+        return _read_mjcf(path, _known(name, options, OF_MJCF))
     if path.suffix.lower() in (".sdf", ".world"):
-        return import_module("gauss.io.sdf.read").read_sdf(path, **_known(name, options, ("root", "limits")))
+        return import_module("gauss.io.sdf.read").read_sdf(path, **_known(name, options, OF_SDF))
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
     files = shipped() | servo_files()

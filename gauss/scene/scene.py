@@ -358,14 +358,21 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
 
     def _place_input(self, given: Input):
         self._require_new(given.name, "input", self.inputs | self.loads | self._constraints)
-        self._require_coordinate(given.joint, f"input {given.name!r}")
+        for joint in given.acts_on:
+            self._require_coordinate(joint, f"input {given.name!r}")
+        for force in given.forces:
+            self._require_body(force.body, f"input {given.name!r}: force {force.name!r}")
         self.inputs[given.name] = given
 
     def _place_output(self, output: Output):
         what = f"output {output.name!r}"
         self._require_new(output.name, "output", self.outputs)
-        if SENSORS[output.kind][0] == "joint":
+        measured = SENSORS[output.kind][0]
+        if measured == "joint":
             self.require_joint(output.of, what)
+        elif measured == "contact":
+            if output.of not in self.contacts:
+                raise SceneError(f"{what}: no contact {output.of!r}. {did_you_mean(output.of, self.contacts)}")
         else:
             self._require_place(output.of, what)
         self.outputs[output.name] = output

@@ -1,4 +1,6 @@
-from gauss.simulation.batch.rollout import Rollout, rollout
+from gauss.simulation.batch.batch_result import Rollout
+from gauss.simulation.batch.rollout import rollout
+from gauss.simulation.batch.simulator_batch import SimulatorBatch
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.prepared_motion import PreparedMotion, prepare
 from gauss.simulation.simulate import simulate
@@ -12,6 +14,7 @@ __all__ = [
     "PreparedMotion",
     "Rollout",
     "Simulator",
+    "SimulatorBatch",
     "Stats",
     "Trajectory",
     "crossings",

@@ -75,6 +75,10 @@ def _program(plan: Plan) -> type[Program]:
         from gauss.dynamics.tree_program import TreeProgram
 
         return TreeProgram
+    if plan.dynamics == "call graph":
+        from gauss.dynamics.call_graph_program import CallGraphProgram
+
+        return CallGraphProgram
     return Program
 
 
@@ -123,10 +127,10 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
         from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 
         return CompiledMoreauRun(problem, smooth_question(problem.question).laws).collect()
-    if plan.dynamics == "free bodies":
-        from gauss.simulation.moreau.free_body_run import FreeBodyRun
+    if plan.dynamics == "pair kernels":
+        from gauss.simulation.moreau.pair_kernel_run import PairKernelRun
 
-        return FreeBodyRun(problem).collect(problem.start, problem.samples, problem.progress)
+        return PairKernelRun(problem).collect(problem.start, problem.samples, problem.progress)
     from gauss.simulation.moreau.moreau_jean import MoreauRun
 
     run = MoreauRun(problem.system, problem.backend, cast(float, problem.step), problem.end, problem.switching)

@@ -224,8 +224,7 @@ class Simulator:
 
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
-        if not isinstance(n, Integral) or n < 1:
-            raise SimulationError(f"n: expected a positive number of steps, got {n!r}.")
+        n = checked_count("n", n)
         if n > len(self._grid):
             self._grid = _unchecked(n)
             self._bind()
@@ -307,6 +306,19 @@ def _run_of(problem: Problem) -> CompiledFixedRun:
 def _unchecked(n: int) -> np.ndarray:
     """Grid (n, 2) of steps that are checked every few steps, not where a call ends."""
     return np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
+
+
+def checked_count(name: str, value) -> int:
+    """A positive whole number.
+
+    Raises
+    ------
+    SimulationError
+        If it is none.
+    """
+    if not isinstance(value, Integral) or value < 1:
+        raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
+    return int(value)
 
 
 def _floats(u) -> np.ndarray | None:

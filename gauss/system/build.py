@@ -6,10 +6,10 @@ import numpy as np
 
 from gauss.backends.structure import ConstraintRows, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Drive, Force, Joint, Scene, Slipping
+from gauss.scene import GROUND, Drive, Force, Joint, OneSidedConstraint, Scene, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
-from gauss.system.contact_gaps import of_shapes
+from gauss.system.contact_gaps import sides
 from gauss.system.frozen_functions import written_laws
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.relations import place_relations
@@ -48,9 +48,15 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     _check_inertia(system)
     if scene.set_valued:
         system = replace(system, set_valued=place_relations(system, scene.set_valued.values()))
-    if not of_shapes(scene):
-        _ = system.contacts  # functions of the user are judged now; gap functions of shapes are traced when asked for
+    _check_gap_functions(system)
     return replace(system, written=written) if (written := written_laws(system)) else system
+
+
+def _check_gap_functions(system: System):
+    """Trace the gap functions of the user; those of shapes and joints are traced when they are asked for."""
+    own = [side for side in sides(system.scene) if isinstance(side.whole, OneSidedConstraint)]
+    if own:
+        place_relations(system, own)
 
 
 def _with_relations(system: System) -> System:

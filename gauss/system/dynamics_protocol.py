@@ -37,7 +37,7 @@ class Dynamics(Protocol):
     def forward_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
 
-    def function(self, system: "System", names, reference: str, independent) -> Callable:
+    def function(self, system: "System", names, reference: str, independent, device=None) -> Callable:
         """Compiled function of a state, or of several at once, by their names."""
 
     def evaluate(self, system: "System", names, given: dict, t, reference: str, independent) -> dict:

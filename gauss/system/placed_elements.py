@@ -77,4 +77,6 @@ class BoundLoad:
     @property
     def on_coordinates(self) -> bool:
         """Whether it acts along joint coordinates, and needs no poses of bodies."""
-        return isinstance(self.load, Drive | ElasticLink | Input | JointSpring | Slipping)
+        if isinstance(self.load, Input):
+            return not self.load.forces
+        return isinstance(self.load, Drive | ElasticLink | JointSpring | Slipping)

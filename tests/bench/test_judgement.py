@@ -13,19 +13,32 @@ from scipy import io, sparse
 from gauss.backends.programme import FORMS, Outcome
 from gauss.bench.class_page import class_page, sentence
 from gauss.bench.classes import classes_named
-from gauss.bench.clocks import FEWEST, ROUNDS, timed
+from gauss.bench.clocks import FEWEST, ROUNDS, WALL_PER_CPU, timed
+from gauss.bench.contestants import refusal
 from gauss.bench.export import export
 from gauss.bench.folders import of_folder
 from gauss.bench.fronts import FrontPoint, front, fronts
 from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_problem, of_selection
-from gauss.bench.levels import LIMIT
-from gauss.bench.measure import FIGURES, measure
-from gauss.bench.problems import INCONSISTENT, SOLVABLE, make_problem
+from gauss.bench.levels import LIMIT, Promise, promise
+from gauss.bench.measure import FIGURES, NOT_ASKED, _judged, measure
+from gauss.bench.problems import INCONSISTENT, SOLVABLE, UNKNOWN, make_problem
 from gauss.bench.publish import publish
 from gauss.bench.report import markdown
 from gauss.bench.suite.instance import INFEASIBLE, UNBOUNDED
 from gauss.bench.suite_instances import SUITE, of_suite
-from gauss.bench.summary import complete, is_broken, is_kept, is_right, mean_time, profile, sensitivity, totals, verdict
+from gauss.bench.summary import (
+    asked,
+    complete,
+    is_broken,
+    is_kept,
+    is_right,
+    mean_time,
+    not_asked,
+    profile,
+    sensitivity,
+    totals,
+    verdict,
+)
 from gauss.bench.table import write_table
 from gauss.bench.verdicts import is_false, said
 from gauss.bench.worker import Worker
@@ -172,6 +185,10 @@ def test_what_a_row_says():
     assert not is_right(own)  # whatever its certificate says
     assert is_right(GOOD | {"error": np.nan})  # no reference: residuals are all that there is
     assert not is_right(GOOD | BEYOND | {"error": np.nan})
+    unknown = GOOD | {"error": np.nan, "verdict": UNKNOWN}
+    assert is_right(unknown) and not is_right(unknown | BEYOND)
+    gives_up = unknown | NO_FIGURES | {"claimed": False, "outcome": "refused", "reason": "infeasible"}
+    assert not is_right(gives_up) and not is_false(gives_up)  # who knows
 
 
 def test_verdicts_on_what_has_no_solution():
@@ -202,6 +219,36 @@ def test_means_are_over_equal_sets():
     assert {name: share.tolist() for name, share in shares.items()} == {"one": [1.0, 1.0], "two": [0.0, 0.5]}
 
 
+def test_solvers_are_held_to_what_they_promise():
+    """A gap that DAQP does not look at is no broken promise; rows that contradict it are."""
+    (instance,) = of_suite("independent", ["equality ur5"])
+    programme, right = instance.programme(FILE), instance.known
+    m = programme.d.size
+    y, z = right.multipliers[:m], right.multipliers[m:]
+    one = Outcome(right.x, y, z, True, "solved")
+    shifted = Outcome(right.x + 1e-6 * np.abs(right.x).max(), y, z, True, "solved")
+    for solver in ("daqp", "piqp", "quadprog", "clarabel"):
+        assert _judged(instance, programme, one, promise(solver, "high"))["excess"] <= 1.0
+        excess = _judged(instance, programme, shifted, promise(solver, "high"))["excess"]
+        assert (excess > 1.0) == (solver != "quadprog")
+    gap_alone = [_judged(instance, programme, one, Promise(1.0, 1.0, gap))["excess"] for gap in (1e-300, np.inf)]
+    assert gap_alone[0] >= gap_alone[1] and gap_alone[1] <= 1.0
+
+
+def test_solvers_are_not_asked_for_what_they_do_not_take():
+    """Dense matrices that fill the memory, and equality rows alone: no failures, and named with the reason."""
+    (large,) = of_suite("large", ["large net 100"])
+    (equalities,) = of_suite("independent", ["equality ur5"])
+    rows = []
+    for instance, solver in ((large, "daqp"), (large, "qtqp"), (equalities, "qtqp"), (equalities, "daqp")):
+        assert (refusal(solver, instance.programme(FILE)) == "") == ((instance is large) == (solver == "qtqp"))
+    row = measure(large, "daqp", FILE, "high")
+    assert row["outcome"] == NOT_ASKED and not row["claimed"]
+    rows = [GOOD, GOOD | row | {"backend": "two"}, GOOD | {"backend": "two", "problem": "b"}, GOOD | {"problem": "b"}]
+    assert list(complete(asked(rows), ["a", "b"], "F2s")) == [("one", "high")]
+    assert any("two, 1 problem: takes dense matrices" in line for line in not_asked(rows))
+
+
 def test_classes_choose_problems():
     names = ("four-bar", "noisy copies", "box on 4 points")
     found = list(of_selection(names, (INEQUALITY, INCONSISTENT)))
@@ -220,7 +267,7 @@ def test_files_of_qpsolvers_are_instances(tmp_path):
     )
     qpsolvers.Problem(sparse.csc_matrix(P), q, lb=lb, ub=ub).save(str(tmp_path / "bounds.npz"))
     (instance,) = of_folder(tmp_path)
-    assert instance.name == "bounds" and instance.forms(("F2",)) == (FILE,)
+    assert (instance.name, instance.verdict, instance.forms(("F2",))) == ("bounds", UNKNOWN, (FILE,))
     row = measure(instance, "piqp", FILE, "high") | {"level": "high"}
     assert row["outcome"] == "answered" and np.isnan(row["error"]) and is_right(row)
     with pytest.raises(BackendError, match="take a compulsion"):
@@ -398,14 +445,17 @@ def test_clocks_run_a_cold_call_and_some_warm_ones():
     found, seconds = timed(lambda: computed(0.02), 0.01, compiles=True)
     assert len(seconds) == 2
     assert len(timed(lambda: computed(0.06), LIMIT)[1]) > FEWEST
-    assert timed(lambda: time.sleep(0.02), LIMIT)[1][0] < 0.02  # waiting costs a solver nothing
+    waits = timed(lambda: time.sleep(0.02), LIMIT)[1][0]
+    assert 0.02 / WALL_PER_CPU <= waits < 0.02  # less than work, but not free
 
 
-def test_a_call_that_takes_too_much_cpu_time_ends_with_its_process():
+def test_a_call_that_takes_too_much_time_ends_with_its_process():
     """No setting of a library is needed, and the next call is answered by a new process."""
     with Worker() as worker:
         late = worker.call(timed, partial(computed, 10.0), 0.1, timeout=60.0)
-        assert (late.outcome, late.value) == ("timed out", None)
+        assert (late.outcome, late.value) == ("timed out", None) and "CPU time" in late.reason
+        late = worker.call(timed, partial(time.sleep, 60.0), 0.02, timeout=60.0)
+        assert (late.outcome, late.value) == ("timed out", None) and "wall time" in late.reason
         assert worker.call(timed, partial(computed, 0.01), 0.1, timeout=60.0).outcome == "answered"
 
 

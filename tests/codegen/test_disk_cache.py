@@ -41,11 +41,6 @@ def made(factor: float, content=()) -> tuple[Kernel, bool]:
     return from_disk((trace, factor, *content), make), bool(calls)
 
 
-def test_arrays_that_are_read_have_the_type_that_machine_code_knows(place):
-    read = [from_disk((np.zeros, "arrays"), lambda: {"a": np.ones(3), "b": np.zeros((2, 0))}) for _ in range(2)][1]
-    assert all(array.dtype is np.dtype(float) for array in read.values()) and read["a"].tolist() == [1.0] * 3
-
-
 def entries(place: Path, begin: str = "made-") -> list[Path]:
     return sorted(place.glob(f"{begin}*"))
 

@@ -94,8 +94,11 @@ def test_every_way_to_pass_arguments(f):
 
 def test_arrays_of_doubles_do_not_pass_through_python(machine_code):
     out, f = np.zeros(4), machine_code
+    unpickled = pickle.loads(pickle.dumps(Q))
+    assert unpickled.dtype is not Q.dtype  # it has its own type of doubles
     for call in (lambda: f(Q, V), lambda: f(Q, V, out), lambda: f(Q, V, out=out), lambda: f(Q, V, None, 1.0)):
         assert calls_of_python(call) == 0
+    assert calls_of_python(lambda: f(unpickled, V, unpickled.repeat(4)[:4])) == 0
     assert calls_of_python(lambda: f(list(Q), V)) > 0
 
 
@@ -308,6 +311,7 @@ def test_the_interpreter_ends_in_peace():
         ("NEWEST_CPYTHON", (3, 2)),
         ("ARRAY_OFFSETS", cpython_layout.ARRAY_OFFSETS | {"flags": 60}),
         ("TYPE_OFFSET", 0),
+        ("TYPE_WORD_OFFSET", 16),
     ],
 )
 def test_unknown_layouts_are_not_relied_upon(monkeypatch, what, value):

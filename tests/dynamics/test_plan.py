@@ -72,6 +72,12 @@ def _mesh() -> Scene:
     return gauss.load("n_four_bar", n=50)
 
 
+def _driven_mesh() -> Scene:
+    scene = _mesh()
+    scene.drive("A0", torque=lambda t: float(t))
+    return scene
+
+
 # scene, arguments → driver, dynamics, what was rejected
 CASES = {
     "nothing moves": (_still, {}, ("constant", "none"), []),
@@ -93,7 +99,8 @@ CASES = {
         ("samples", "compiled"),
         ["events", "events"],
     ),
-    "many loops": (_mesh, {}, ("Python loop", "call graph"), ["compiled loop"]),
+    "many loops": (_mesh, {}, ("compiled loop", "call graph"), ["compiled loop"]),
+    "many loops, an opaque law": (_driven_mesh, {}, ("Python loop", "call graph"), ["compiled loop"] * 2),
     "a library": (lambda: mechanisms.rods(2), {"integrator": "scipy_dop853"}, ("library", "compiled"), []),
     "a library, a law": (_opaque, {"integrator": "scipy_dop853"}, ("library", "certified"), ["library"]),
     "contacts": (lambda: gauss.load("newtons_cradle"), {}, ("events", "compiled"), []),
@@ -113,12 +120,12 @@ CASES = {
         lambda: gauss.load("box_on_plane_4"),
         {"integrator": "time_stepping", "step": 1e-3, "backend": "kkt"},
         ("time stepping", "certified"),
-        ["time stepping"],
+        ["time stepping", "time stepping"],
     ),
     "steps of many contacts": (
         lambda: free_bodies.stack(2),
         {"integrator": "time_stepping", "step": 1e-3},
-        ("time stepping", "free bodies"),
+        ("time stepping", "pair kernels"),
         ["time stepping"],
     ),
     "Baumgarte": (mechanisms.four_bar, {"stabilisation": "baumgarte"}, ("compiled loop", "compiled"), []),
@@ -141,7 +148,7 @@ def test_a_motion_tells_its_plan(name, plans):
     plan = plans[name]
     assert (plan.driver, plan.dynamics) == (driver, dynamics)
     assert [found.driver for found in plan.rejected] == rejected and all(found.why for found in plan.rejected)
-    assert bool(plan.fallback) == (dynamics not in ("none", "certified", "free bodies") and driver != "library")
+    assert bool(plan.fallback) == (dynamics not in ("none", "certified", "pair kernels") and driver != "library")
 
 
 @pytest.mark.slow

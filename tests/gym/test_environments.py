@@ -25,8 +25,7 @@ def test_environments_pass_the_checker(make):
 def test_motions_of_a_vector_environment_are_those_of_single_ones(make):
     many, one = gym.MechanismVectorEnv(make(), 5), gym.MechanismEnv(make())
     observed, _ = many.reset(seed=3)
-    q, v = np.split(many._batch.reached[:, 2], [many.system.n_q])
-    alone, _ = one.reset(options={"state": gauss.State(0.0, q, v)})
+    alone, _ = one.reset(options={"state": gauss.State(0.0, many.simulators.q[2], many.simulators.v[2])})
     np.testing.assert_allclose(observed[2], alone, rtol=0.0, atol=ROUNDING)
     actions = np.random.default_rng(1).uniform(-1.0, 1.0, (4, *many.action_space.shape)) * many.single_action_space.high
     for action in actions:
@@ -47,7 +46,7 @@ def test_a_motion_that_diverges_is_marked_and_the_others_are_not_affected():
     right, many = (gym.MechanismVectorEnv(gym.cart_pole_swing_up(), 6) for _ in range(2))
     for environment in (right, many):
         environment.reset(seed=2)
-    many._batch.points[4, 1] = 1e200
+    many.simulators._batch.points[4, 1] = 1e200
     expected, found = (environment.step(np.ones((6, 1))) for environment in (right, many))
     assert found[4]["diverged"].tolist() == [False, True, False, False, False, False]
     assert found[2][1] and not found[0][1].any()

@@ -247,7 +247,7 @@ def test_names_that_only_mujoco_tells_apart(tmp_path):
     rest = '<equality><joint name="h" joint1="h" polycoef="0 0 0 0 0"/></equality>'
     rest += '<actuator><motor name="h" joint="h"/></actuator>'
     scene = quietly(_file(tmp_path, bodies, rest))
-    assert list(scene.bodies) == ["body ground"] and list(scene.relations) == ["equality h"] and list(scene.loads) == ["h"]
+    assert list(scene.bodies) == ["body ground"] and list(scene.relations) == ["equality h"] and list(scene.inputs) == ["h"]
 
 
 @pytest.mark.slow

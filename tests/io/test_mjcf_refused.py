@@ -3,7 +3,7 @@
 import pytest
 
 import gauss
-from gauss.errors import FileError
+from gauss.errors import FileError, NotImportedWarning
 
 
 def _file(folder, bodies, rest="", head=""):
@@ -16,61 +16,65 @@ HINGE = '<body name="a"><joint name="h" {}/><geom size="0.1" pos="0.1 0 0"/><sit
 TWO = HINGE.format("") + '<body name="b"><joint name="k"/><geom size="0.1" pos="0.1 0 0"/><site name="r"/></body>'
 BALL = '<body name="a"><joint name="B" type="ball" {}/><geom size="0.1"/></body>'
 UNSUPPORTED = {  # bodies, the rest of the file, what the message says, and the line
-    "limited tendon": (
-        HINGE.format(""),
-        '<tendon><fixed name="rope" range="-1 1"><joint joint="h" coef="1"/></fixed></tendon>',
-        "tendon 'rope': its length is limited",
-        5,
-    ),
     "tendon with friction": (
         TWO,
         '<tendon>\n<spatial name="rope" frictionloss="1"><site site="s"/><site site="r"/></spatial></tendon>',
         "tendon 'rope': its frictionloss",
         6,
     ),
-    "tendon around a pulley": (
-        TWO,
-        '<tendon><spatial><site site="s"/><site site="r"/><site site="s"/></spatial></tendon>',
-        "tendon 'tendon 0'.*more than two sites",
+    "tendon around a geom": (
+        TWO.replace("<site", '<geom name="g" size="0.05"/><site', 1),
+        '<tendon><spatial><site site="s"/><geom geom="g"/><site site="r"/></spatial></tendon>',
+        "tendon 'tendon 0'.*wrapped around geoms",
         5,
     ),
     "muscle": (
         HINGE.format('range="-1 1"'),
         '<actuator>\n\n<muscle name="m" joint="h" lengthrange="0 1"/></actuator>',
-        "'m'.*states",
+        "'m'.*force is not affine",
         7,
     ),
-    "gravcomp": ('\n<body name="a" gravcomp="1"><joint/><geom size="0.1"/></body>', "", "gravcomp of body 'a'", 4),
-    "damped ball": (BALL.format('damping="1"'), "", "damping of ball joint 'B'", 3),
-    "limited ball": (BALL.format('range="0 1" limited="true"'), "", "limits of ball joint 'B'", 3),
-    "stiff without a name": (
-        '<body>\n<joint type="ball" stiffness="1"/>\n<geom size="0.1"/></body>',
+    "a turned free joint with friction": (
+        '<body name="a" euler="10 0 0"><joint name="F" type="free" frictionloss="1"/><geom size="0.1"/></body>',
         "",
-        "stiffness of ball joint 'joint 0'",
-        4,
+        "frictionloss.* of free joint 'F'",
+        3,
     ),
-    "a curved spring": (HINGE.format('stiffness="1 2 0"'), "", "stiffness of joint 'h' beyond a constant", 3),
-    "open weld": (
-        TWO,
-        '<equality><weld name="e" body1="a" body2="b" relpose="1 0 0 1 0 0 0"/></equality>',
-        "'e'.*not that of",
+    "a filter that is never without control": (
+        HINGE.format(""),
+        '<actuator><general name="m" joint="h" dyntype="filter" dynprm="1" ctrlrange="1 2"/></actuator>',
+        "'m'.*states of its own, and its control may not be 0",
         5,
     ),
+    "a range that a joint shares among actuators": (
+        HINGE.format('actuatorfrcrange="-1 1"'),
+        '<actuator><motor name="m" joint="h"/><position joint="h"/></actuator>',
+        "'m'.*limits the sum of its actuators",
+        5,
+    ),
+    "a tendon of a joint that is limited": (
+        HINGE.format('actuatorfrcrange="-1 1"'),
+        '<tendon><fixed name="t"><joint joint="h" coef="2"/></fixed></tendon>'
+        '<actuator><motor name="m" tendon="t"/></actuator>',
+        "'m'.*a joint that it moves limits the sum",
+        5,
+    ),
+    "a crank": (
+        HINGE.format(""),
+        '<actuator><general name="m" cranksite="s" slidersite="s" cranklength="1"/></actuator>',
+        "'m'.*only actuators",
+        5,
+    ),
+    "a servo of a ball": (
+        BALL.format(""),
+        '<actuator><position name="m" joint="B" kp="2"/></actuator>',
+        "'m'.*several freedoms",
+        5,
+    ),
+    "a curved spring": (HINGE.format('stiffness="1 2 0"'), "", "stiffness of joint 'h' beyond a constant", 3),
     "a force that follows the motion": (
         HINGE.format(""),
         '<actuator><position name="m" site="s" refsite="s" gear="1 0 0 0 0 0"/></actuator>',
-        "'m'.*depends on the motion",
-        5,
-    ),
-    "a force of uneven limits": (
-        HINGE.format(""),
-        '<actuator><position name="m" joint="h" forcerange="-1 2"/></actuator>',
-        "'m'.*not to the same value",
-        5,
-    ),
-    "a body": (
-        HINGE.format(""),
-        '<actuator><adhesion name="m" body="a" ctrlrange="0 1"/></actuator>',
         "'m'.*only actuators",
         5,
     ),
@@ -84,28 +88,45 @@ def test_what_is_not_modelled_is_refused_by_name_and_line(tmp_path, name):
         gauss.load(_file(tmp_path, bodies, rest))
 
 
-HEADS = {
-    "a medium": ('<option density="1.2"/>', r"medium.*model.xml:1\)"),
-    "no actuation": (
-        '<option>\n<flag actuation="disable"/></option>',
-        r"flag actuation that is switched off \(.*model.xml:2\)",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", HEADS)
-def test_options_that_change_the_motion_are_refused(tmp_path, name):
-    head, words = HEADS[name]
-    with pytest.raises(FileError, match=words):
-        gauss.load(_file(tmp_path, HINGE.format(""), head=head))
-
-
 def test_lines_of_included_files_are_told(tmp_path):
     (tmp_path / "sub").mkdir()
-    (tmp_path / "sub" / "tip.xml").write_text('<mujocoinclude>\n\n<body name="t" gravcomp="1"/></mujocoinclude>')
+    (tmp_path / "sub" / "tip.xml").write_text(
+        '<mujocoinclude>\n\n<body name="t"><joint stiffness="1 2"/><geom size="1"/></body></mujocoinclude>'
+    )
     path = _file(tmp_path, '<body name="a"><joint/><geom size="1"/><include file="sub/tip.xml"/></body>')
-    with pytest.raises(FileError, match=r"gravcomp of body 't' \(.*tip.xml:3\)"):
+    with pytest.raises(FileError, match=r"stiffness of joint .*tip.xml:3\)"):
         gauss.load(path)
+
+
+def test_adhesion_needs_contacts(tmp_path):
+    path = _file(tmp_path, HINGE.format(""), '<actuator><adhesion name="m" body="a" ctrlrange="0 1"/></actuator>')
+    with pytest.warns(NotImportedWarning, match="adhesion, which needs contacts, of actuators m"):
+        gauss.load(path)
+    with pytest.raises(FileError, match="not modelled: actuator 'm'"):
+        gauss.load(path, contacts=True)
+
+
+def test_files_below_a_root_folder_are_read(tmp_path):
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "tip.xml").write_text("<mujocoinclude><joint/></mujocoinclude>")
+    path = _file(tmp_path / "robots", '<body name="a"><geom size="1" pos="1 0 0"/><include file="../tip.xml"/></body>')
+    assert list(gauss.load(path, root_folder=tmp_path).joints) == ["joint 0"]
+    with pytest.raises(FileError, match=r"model.xml:3: names the file .*tip.xml' outside .*root_folder="):
+        gauss.load(path)
+    with pytest.raises(FileError, match="and outside root_folder"):
+        gauss.load(path, root_folder=tmp_path / "robots")
+    with pytest.raises(FileError, match="root_folder: expected a folder"):
+        gauss.load(path, root_folder=tmp_path / "none")
+
+
+def test_includes_that_multiply_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("gauss.io.mjcf.guard.MOST_INCLUDES", 20)
+    for k in range(6):
+        twice = f'<include file="{k + 1}.xml"/>' * 2
+        (tmp_path / f"{k}.xml").write_text(f"<mujocoinclude>{twice}</mujocoinclude>")
+    (tmp_path / "6.xml").write_text("<mujocoinclude/>")
+    with pytest.raises(FileError, match="more than 20 files are included"):
+        gauss.load(_file(tmp_path, "", head='<include file="0.xml"/>'))
 
 
 def test_mujoco_has_no_equality_of_distances(tmp_path):

@@ -198,16 +198,16 @@ REFUSED = {  # the model, what the message says, and the line
     "an unknown child": (LINK + HINGE.format("ball", "").replace(">b<", ">bb<"), "no link, joint or frame 'bb'. Did you", 2),
     "a pose of itself": ('<link name="a"><pose relative_to="a">0 0 0 0 0 0</pose></link>', "relative to itself", 2),
     "a name twice": ('<link name="a"/>\n<link name="a"/>', "'a' is missing, reserved or taken", 3),
-    "a nested model": (LINK + '\n<model name="n"/>', "a file of one model", 3),
-    "an include": ("<include><uri>model://x</uri></include>", "<include> is not read", 2),
-    "a screw of the old kind": (
-        LINK + HINGE.format("screw", "<thread_pitch>1</thread_pitch>"),
-        "<thread_pitch> of joint 'A' is not modelled",
+    "a nested model without links": (LINK + '\n<model name="n"/>', "no links", 3),
+    "an include without a file": ("<include><uri>model://x</uri></include>", "no such model", 2),
+    "a screw that does not turn": (
+        LINK + HINGE.format("screw", "<thread_pitch>0</thread_pitch><axis/>"),
+        "<thread_pitch> of 0",
         2,
     ),
-    "no motion": (
-        LINK + HINGE.format("revolute", "<axis>\n<limit><lower>0</lower><upper>0</upper></limit></axis>"),
-        "leave no motion",
+    "limits the wrong way round": (
+        LINK + HINGE.format("revolute", "<axis>\n<limit><lower>1</lower><upper>0</upper></limit></axis>"),
+        "above the upper one",
         3,
     ),
     "a damped universal joint": (
@@ -216,7 +216,14 @@ REFUSED = {  # the model, what the message says, and the line
         "damping of a universal joint",
         3,
     ),
-    "inertia of collisions": ('<link name="a"><inertial auto="true"/></link>', "not computed", 2),
+    "inertia of no collision": ('<link name="a"><inertial auto="true"/></link>', "no collision with a volume", 2),
+    "inertia of a mesh": (
+        '<link name="a"><inertial auto="true"/>\n<collision name="c"><geometry><mesh/></geometry></collision></link>',
+        "not computed",
+        3,
+    ),
+    "a link that is led": ('<link name="a"><kinematic>true</kinematic></link>', "<kinematic> of link 'a'", 2),
+    "a canonical link of another model": ('<model name="n" canonical_link="x"><link name="l"/></model>', "no link 'x'", 2),
     "static": ("<static>true</static>" + LINK, "nothing moves", 1),
     "no links": ("", "no links", 1),
     "a huge number": ('<link name="a"><inertial><mass>1e300</mass></inertial></link>', "holds 1e300", 2),

@@ -18,7 +18,7 @@ STEP = 1e-3  # [s]
 ROUNDING = 1e-12  # of values of the order of 1 by two ways of computing
 LAWS = 1e-8  # of the largest force or speed: residual of the laws of contact
 SAME_STEPS = 1e-7  # coordinates after two hundred steps of two solvers, each with laws met to 1e-10
-FREE = Plan("time stepping", "free bodies")
+FREE = Plan("time stepping", "pair kernels")
 SHAPES = {
     "ball": lambda scene, body: scene.sphere(f"{body} shape", body, 0.1, at=(0.02, 0.0, 0.01)),
     "capsule": lambda scene, body: scene.capsule(f"{body} shape", body, 0.05, 0.2, at=(0.0, 0.03, 0.0), axis=(1, 2, 0)),
@@ -81,14 +81,14 @@ def test_small_scenes_move_as_by_the_machine_code_of_the_scene(kind):
     scene.contacts_all(friction=0.4)
     system = gauss.compile_scene(scene)
     one, other = moved(system, 0.2), moved(system, 0.2, plan=FREE)
-    assert (one.stats.plan.dynamics, other.stats.plan.dynamics) == ("compiled", "free bodies")
+    assert (one.stats.plan.dynamics, other.stats.plan.dynamics) == ("compiled", "pair kernels")
     np.testing.assert_allclose(one.q, other.q, atol=SAME_STEPS)
     np.testing.assert_allclose(one.work, other.work, atol=SAME_STEPS)
 
 
 def test_a_stack_stays():
     found = moved(stack(5), 0.3)
-    assert found.stats.plan.dynamics == "free bodies"
+    assert found.stats.plan.dynamics == "pair kernels"
     assert np.abs(found.q - found.q[0]).max() <= 1e-10
 
 

@@ -1,22 +1,23 @@
 """Backends that say anything: none is certified beyond what is right, in accelerations or in multipliers, and none raises.
 
-``python -m tests.validation.test_liars 10000`` tells as many lies, and counts what became of them.
+``python -m benchmarks.liars`` tells ten thousand, and counts what became of them.
 """
 
-import sys
+import contextlib
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import gauss
 from gauss.backends import Answer, make
 from gauss.backends.certificate import TOLERANCE
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.factorisation import factored
-from gauss.backends.programme import Outcome, Programmed
+from gauss.backends.programme import FORMS, Outcome, Programmed
 from gauss.bench.problems import make_problem
 from gauss.system import random_state
 from tests.support import mechanisms
@@ -184,11 +185,12 @@ def hidden(case, size, rng):
 WHOLES = (partly, partly, partly, partly, pumped, other_forces, other_rows, unbound, glued, hidden)
 
 
-def lie(case: Case, rng) -> Answer:
-    """Answer that is wrong in something, with a claim and a message that mean nothing."""
+def lie(case: Case, rng) -> tuple[str, Answer]:
+    """Kind of a lie, and an answer that is wrong in something, with a claim and a message that mean nothing."""
     whole = WHOLES[rng.integers(len(WHOLES))]
     said = whole(case, 10.0 ** rng.uniform(-12, 1), rng)
-    return replace(said, found=bool(rng.random() < 0.8), message=str(rng.choice(["", "solved", "optimal"])))
+    claim, words = bool(rng.random() < 0.8), str(rng.choice(["", "solved", "optimal"]))
+    return whole.__name__.replace("_", " "), replace(said, found=claim, message=words)
 
 
 def outcome(case: Case, said) -> str:
@@ -230,19 +232,22 @@ def determined(case: Case, active, found):
     return multipliers - loose, mu
 
 
-def mode(cases: dict[str, Case], count: int, seed: int = 0) -> Counter:
-    """What becomes of many lies."""
+def outcomes(cases: dict[str, Case], count: int, seed: int = 0) -> Counter:
+    """What becomes of many lies: numbers by kind of lie, problem and outcome."""
     rng, found = np.random.default_rng(seed), Counter()
     with np.errstate(all="ignore"):
         for _ in range(count):
-            case = list(cases.values())[rng.integers(len(cases))]
-            found[outcome(case, lie(case, rng))] += 1
+            name = list(cases)[rng.integers(len(cases))]
+            kind, said = lie(cases[name], rng)
+            found[kind, name.replace("_", " "), outcome(cases[name], said)] += 1
     return found
 
 
 @pytest.mark.slow
 def test_no_lie_is_certified_beyond_what_is_right(cases):
-    found = mode(cases, COUNT)
+    found = Counter()
+    for (_, _, became), number in outcomes(cases, COUNT).items():
+        found[became] += number
     assert sum(found.values()) == COUNT and min(found[kind] for kind in ("refused", "multipliers replaced", "solved")) > 10
 
 
@@ -361,5 +366,33 @@ def test_workspaces_that_are_written_again_change_no_solution(cases):
     assert np.isfinite(solution.a).all() and np.isfinite(solution.multipliers).all()
 
 
-if __name__ == "__main__":
-    print(dict(mode(made(), int(sys.argv[1]), seed=1)))
+def written_over(holder, seen: set[int]):
+    """Write to every array that can be reached from an object, as far as that is possible."""
+    if id(holder) in seen:
+        return
+    seen.add(id(holder))
+    if isinstance(holder, np.ndarray):
+        with contextlib.suppress(ValueError):
+            holder[...] = 7
+    elif is_dataclass(holder) or sparse.issparse(holder):
+        written_over(list(vars(holder).values()), seen)
+    elif isinstance(holder, list | tuple | dict):
+        for part in holder.values() if isinstance(holder, dict) else holder:
+            written_over(part, seen)
+
+
+def writing(given):
+    written_over(given, set())
+    raise RuntimeError("done")
+
+
+@pytest.mark.parametrize("backend", [Telling(writing), *(Programmed(Solving(writing), form) for form in FORMS)])
+@pytest.mark.parametrize("scene", ["four_bar", "box_on_plane_4"])
+def test_what_a_backend_writes_to_spoils_nothing(scene, backend):
+    """Neither the system, for later calls, nor the compulsion that the answer is certified for, nor what is kept."""
+    system = gauss.compile_scene(gauss.load(scene))
+    compulsion, later = (gauss.assemble(system, system.initial_state()) for _ in range(2))
+    right = gauss.solve(later)
+    assert "done" in str(gauss.solve(compulsion, backend).status)
+    for found in (gauss.solve(compulsion), gauss.solve(gauss.assemble(system, system.initial_state()))):
+        assert str(found.status) == "solved" and np.array_equal(found.qdd, right.qdd) and np.array_equal(found.a, right.a)

@@ -10,15 +10,24 @@ from gauss.codegen.kernels.column_pivoting import Pivots
 from gauss.codegen.kernels.compiled_loop import Loop, address
 from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
-from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record, updated_energy_record
+from gauss.codegen.kernels.energy_record import (
+    ENERGY_RECORD,
+    ENERGY_SAMPLE,
+    initial_energy_record,
+    recorded_energies,
+    updated_energy_record,
+)
 from gauss.codegen.kernels.explicit import ExplicitTrial, Interpolation, stride
 from gauss.codegen.kernels.first_accepted import FirstAccepted
 from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
+from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
+from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
 from gauss.codegen.kernels.taylor import TaylorStep
 from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
 
@@ -47,6 +56,11 @@ __all__ = [
     "Loop",
     "FixedStepBatchLoop",
     "RecordedCalls",
+    "RecordedSections",
+    "SectionCode",
+    "NearPairs",
+    "CompiledMechanismStep",
+    "StepFunctions",
     "Newton",
     "FirstAccepted",
     "Pivots",
@@ -69,6 +83,7 @@ __all__ = [
     "Vector",
     "WORST_RECORD",
     "initial_energy_record",
+    "recorded_energies",
     "stride",
     "updated_energy_record",
 ]

@@ -15,7 +15,7 @@ from gauss.codegen.kernels.energy_record import ENERGY_RECORD
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import LoopStatus, Numbers, numbers
 
-POINTERS = ("control", "lanes", "motions", "grid", "out")
+NAME, POINTERS = "adaptive_batch", ("control", "lanes", "motions", "grid", "out")
 MOTION_RECORD = (
     "h",
     "refused",
@@ -80,10 +80,8 @@ class AdaptiveBatchLoop(BatchLoop):
     def __init__(self, method: Adaptive, written: slice):
         self.size, self.written = method.size, written
         writer = Writer()
-        _AdaptiveBatchWriter(
-            method, LoopCode(writer, "adaptive_batch", POINTERS, MotionQueue, machine.width()), written
-        ).write()
-        super().__init__(writer, "adaptive_batch", MotionQueue, len(POINTERS) - 1)
+        write_adaptive_batch(writer, method, written, machine.width())
+        super().__init__(writer, NAME, MotionQueue, len(POINTERS) - 1, machine.width())
 
     def lanes(self) -> np.ndarray:
         """Array (size + len(MOTION_RECORD) + 1, width) of empty lanes."""
@@ -110,6 +108,13 @@ class AdaptiveBatchLoop(BatchLoop):
             Steps.
         """
         self._run.call(queue, lanes, motions, grid, out, budget)
+
+
+def write_adaptive_batch(writer: Writer, method: Adaptive, written: slice, width: int) -> ir.Function:
+    """Write the loop for a number of lanes: (*POINTERS, budget)."""
+    code = LoopCode(writer, NAME, POINTERS, MotionQueue, width)
+    _AdaptiveBatchWriter(method, code, written).write()
+    return code.function
 
 
 class _AdaptiveBatchWriter:

@@ -102,6 +102,7 @@ class CallRecorder:
 
     def __init__(self):
         self.start: list[float] = []  # initial content of the memory
+        self.kept: list[int] = []  # addresses of parameters and inputs; the other slots are results
         self.sections: dict[str, list[int]] = {}
         self.functions: list[Function] = []
         self._specialisations: dict[tuple, Specialisation] = {}
@@ -117,6 +118,7 @@ class CallRecorder:
         """Allocate slots with initial values: parameters, or inputs written before a run."""
         first = len(self.start)
         self.start.extend(float(value) for value in values)
+        self.kept.extend(range(first, len(self.start)))
         return _array([Slot(k) for k in range(first, len(self.start))])
 
     def operand(self, array: np.ndarray) -> Operand:
@@ -218,7 +220,7 @@ class CallRecorder:
 
     def compiled(self) -> "RecordedCalls":
         """Machine code of all sections, with the memory."""
-        return RecordedCalls(np.array(self.start), CallTable(self.functions), self.sections)
+        return RecordedCalls(np.array(self.start), np.array(self.kept, dtype=int), CallTable(self.functions), self.sections)
 
 
 class RecordedCalls:
@@ -228,14 +230,16 @@ class RecordedCalls:
     ----------
     values : ndarray
         The memory.
-    calls : Calls
-        Machine code of the functions.
+    kept : ndarray of int
+        Addresses of parameters and inputs.
+    calls : CallTable
+        The functions.
     sections : dict
         Call table of each section.
     """
 
-    def __init__(self, values: np.ndarray, calls: CallTable, sections):
-        self.values, self.calls = values, calls
+    def __init__(self, values: np.ndarray, kept: np.ndarray, calls: CallTable, sections):
+        self.values, self.kept, self.calls = values, kept, calls
         self.tables = {name: np.array(table, dtype=np.int32) for name, table in sections.items()}
 
     def run(self, section: str):
@@ -258,6 +262,12 @@ class Vector:
         self.addresses = np.array([flat[k].address for k in self.here], dtype=int)
         self.signs = np.array([-1.0 if flat[k].negative else 1.0 for k in self.here])
         self.constants = np.array([0.0 if isinstance(entry, Slot) else float(entry) for entry in flat])
+
+    @property
+    def is_contiguous(self) -> bool:
+        """Whether the entries are slots one after the other."""
+        whole = self.addresses.size == self.constants.size > 0
+        return whole and bool((self.signs > 0).all() and (np.diff(self.addresses) == 1).all())
 
     def read(self, memory: RecordedCalls) -> np.ndarray:
         """Values of the entries."""

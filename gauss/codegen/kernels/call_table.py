@@ -1,19 +1,22 @@
 """Loop in machine code that executes calls from a table: function index, addresses of inputs and outputs."""
 
 import ctypes
+from functools import cached_property
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, Lanes, machine, schedule, straight_line
+from gauss.codegen import INTEGER, POINTER, Function, Lanes, NativeFunction, Writer, machine, schedule, straight_line
 
 VOID, ENTRY = ir.VoidType(), ir.IntType(32)
 TABLE = ENTRY.as_pointer()
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
 
 
-class CallTable:
-    """Machine code of functions on one memory, and of the loop that calls them from a table.
+class CallTable(NativeFunction):
+    """Functions on one memory, and the loop that calls them from a table.
+
+    Its code is ``calls(double* memory, i32* table, i64 size)``, as the table is no vector of doubles.
 
     Parameters
     ----------
@@ -26,13 +29,28 @@ class CallTable:
         Number of functions.
     """
 
+    name = "calls"
+
     def __init__(self, functions: list[Function]):
-        module, self.count = ir.Module(name="gauss"), len(functions)
-        codes = [_code(module, f"function_{k}", function) for k, function in enumerate(functions)]
-        lengths = [1 + len(function.inputs) + len(function.outputs) for function in functions]
-        _loop(module, codes, lengths)
-        self.code = machine.load(str(module))
-        self._run = self.code.entry("run", SIGNATURE)
+        self.functions, self.count = functions, len(functions)
+
+    def write(self, writer: Writer, width: int) -> ir.Function:
+        """Machine code of the loop and of the functions, for one memory at a time."""
+        module = writer.module
+        codes = [_code(module, f"function_{k}", function) for k, function in enumerate(self.functions)]
+        lengths = [1 + len(function.inputs) + len(function.outputs) for function in self.functions]
+        return _loop(module, codes, lengths)
+
+    @cached_property
+    def _run(self):
+        writer = Writer()
+        calls = writer.body(self)
+        run = ir.Function(writer.module, calls.ftype, "run")
+        b = ir.IRBuilder(run.append_basic_block("entry"))
+        b.call(calls, run.args)
+        b.ret_void()
+        self.code = machine.load(str(writer.module))
+        return self.code.entry("run", SIGNATURE)
 
     def run(self, memory: np.ndarray, table: np.ndarray):
         """Execute a table of int32 entries: index of a function, addresses of its inputs, then of its outputs."""
@@ -63,9 +81,10 @@ def _code(module: ir.Module, name: str, function: Function) -> ir.Function:
     return code
 
 
-def _loop(module: ir.Module, codes, lengths):
-    """Emit ``run(double* memory, i32* table, i64 size)``."""
-    run = ir.Function(module, ir.FunctionType(VOID, [POINTER, TABLE, INTEGER]), "run")
+def _loop(module: ir.Module, codes, lengths) -> ir.Function:
+    """Emit ``calls(double* memory, i32* table, i64 size)``."""
+    run = ir.Function(module, ir.FunctionType(VOID, [POINTER, TABLE, INTEGER]), "calls")
+    run.linkage = "internal"
     memory, table, size = run.args
     b = ir.IRBuilder(run.append_basic_block("entry"))
     before = b.block
@@ -90,3 +109,4 @@ def _loop(module: ir.Module, codes, lengths):
     b.unreachable()
     b.position_at_end(done)
     b.ret_void()
+    return run

@@ -52,7 +52,7 @@ class Loop:
         """
         arrays = point, confirmed, grid, out
         for array in arrays:
-            if array.dtype is not FLOAT or not array.flags.c_contiguous:
+            if (array.dtype is not FLOAT and array.dtype != FLOAT) or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
         self._run.call(ctypes.byref(control), *map(address, arrays), budget)
 
@@ -94,15 +94,12 @@ class BatchLoop:
         Record type of its first argument.
     arrays : int
         Number of further arguments.
-
-    Attributes
-    ----------
     width : int
         Number of lanes.
     """
 
-    def __init__(self, writer: Writer, name: str, control: type[Numbers], arrays: int):
-        self.width, self.code = machine.width(), machine.load(str(writer.module), optimise=2)  # runs for long
+    def __init__(self, writer: Writer, name: str, control: type[Numbers], arrays: int, width: int):
+        self.width, self.code = width, machine.load(str(writer.module), optimise=2)  # runs for long
         self.name, self.control, self.arrays = name, control, arrays
         self._bind()
 

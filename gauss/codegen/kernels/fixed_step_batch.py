@@ -4,6 +4,8 @@ Points are a structure of arrays, one column per motion. A vector of motions mak
 begins, so that it stays in the first-level cache; a motion does not depend on the others, nor on the number of threads.
 """
 
+from llvmlite import ir
+
 from gauss.codegen import INTEGER, Function, Writer, intrinsic, machine
 from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record
@@ -11,8 +13,9 @@ from gauss.codegen.kernels.fixed_step import Fixed
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
-POINTERS = ("control", "points", "worst", "out")
-WORST_RECORD = ("error", "constraint_residual", "unseen", *ENERGY_RECORD)  # record of a motion
+OPTIONAL = 3  # numbers of a sample: the work
+NAME, POINTERS = "fixed_step_batch", ("control", "points", "worst", "out")
+WORST_RECORD = ("error", "constraint_residual", "unseen", "unsolved", *ENERGY_RECORD)  # record of a motion
 
 
 @numbers
@@ -35,6 +38,8 @@ class BatchSpan(Numbers):
         Steps between samples, between checks of the accelerations, and between changes of the inputs.
     motions, changes : float
         Number of motions with inputs, and of rows of inputs of each.
+    row : float
+        Numbers of a sample: all that may be written, or those without the optional ones.
     """
 
     columns: float
@@ -49,6 +54,7 @@ class BatchSpan(Numbers):
     hold: float = 1.0
     motions: float = 0.0
     changes: float = 0.0
+    row: float = 0.0
 
 
 class FixedStepBatchLoop(BatchLoop):
@@ -61,17 +67,18 @@ class FixedStepBatchLoop(BatchLoop):
     start : Function
         Initial point → (point with its rates, constraint residual, energy sample).
     written : slice
-        Part of a point that is a sample.
+        Part of a point that is a sample; its last ``OPTIONAL`` entries are written on request.
     inputs : int
         Number of inputs, the last entries of a point: each motion has a row of them for every ``hold`` steps.
+    width : int, optional
+        Number of lanes; as many as the vector register holds when not given.
     """
 
-    def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0):
+    def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0, width: int | None = None):
         self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
-        writer, pointers = Writer(), (*POINTERS, *(["inputs"] if inputs else []))
-        code = LoopCode(writer, "fixed_step_batch", pointers, BatchSpan, machine.width())
-        _write(code, method, start, written, inputs)
-        super().__init__(writer, "fixed_step_batch", BatchSpan, len(pointers) - 1)
+        writer, width = Writer(), machine.width() if width is None else width
+        write_fixed_step_batch(writer, method, start, written, inputs, width)
+        super().__init__(writer, NAME, BatchSpan, len(POINTERS) - 1 + bool(inputs), width)
 
     def __call__(self, span: BatchSpan, points, worst, out, *inputs):
         """Make steps of a range of motions; releases Python's global lock.
@@ -82,9 +89,9 @@ class FixedStepBatchLoop(BatchLoop):
             Motions and steps.
         points : ndarray, shape (size, columns)
             Points of the motions, changed; before step 0 their rates may be missing.
-        worst : ndarray, shape (len(WORST), columns)
-            Largest error of the accelerations and largest constraint residual (NaN propagates), and the energy record;
-            changed.
+        worst : ndarray, shape (len(WORST_RECORD), columns)
+            Largest error of the accelerations, largest constraint residual, steps that may have passed a condition of a law,
+            unsolved equations (NaN propagates), and the energy record; changed.
         out : ndarray, shape (columns, rows, row)
             Sample k of each motion is that after ``k * keep`` steps.
         inputs : ndarray, shape (motions, changes, n_u)
@@ -93,7 +100,11 @@ class FixedStepBatchLoop(BatchLoop):
         self._run.call(span, points, worst, out, *inputs, 0)
 
 
-def _write(code: LoopCode, method: Fixed, start: Function, written: slice, inputs: int):
+def write_fixed_step_batch(
+    writer: Writer, method: Fixed, start: Function, written: slice, inputs: int, width: int
+) -> ir.Function:
+    """Write the loop for a number of motions at a time: (*POINTERS, inputs if there are some, budget)."""
+    code = LoopCode(writer, NAME, (*POINTERS, *(["inputs"] if inputs else [])), BatchSpan, width)
     b, size = code.b, method.size
     given, reached = code.buffer(size + 1), code.buffer(max(len(method.step.outputs), len(start.outputs)))
     error, worst = code.buffer(len(method.check.outputs)), code.buffer(len(WORST_RECORD))
@@ -125,6 +136,7 @@ def _write(code: LoopCode, method: Fixed, start: Function, written: slice, input
             code.copy(given, reached, size)
             _raise(code, worst, 1, code.take(reached, size))
             _raise(code, worst, 2, code.take(reached, size + 4))
+            _raise(code, worst, 3, code.take(reached, size + 3))
             due = b.or_(_is_multiple(code, done, "every"), b.icmp_signed("==", done, last))
             with b.if_then(due):
                 code.call(method.check, reached, error)
@@ -137,6 +149,7 @@ def _write(code: LoopCode, method: Fixed, start: Function, written: slice, input
         _scatter(code, worsts, worst, columns, len(WORST_RECORD))
         b.store(b.add(column, INTEGER(code.width)), motion)
     code.finish()
+    return code.function
 
 
 def _take_inputs(code: LoopCode, room, count: int, column, row):
@@ -166,12 +179,14 @@ def _scatter(code: LoopCode, target, room, columns, size: int):
 def _write_rows(code: LoopCode, room, written: slice, column, row):
     """Write a sample of each motion."""
     b, size = code.b, written.stop - written.start
-    with code.each(code.width) as k:
-        place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
-        target = b.gep(code.pointer["out"], [b.mul(place, INTEGER(size))])
-        source = b.gep(code.at(room, written.start), [k])
-        for j in range(size):
-            b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
+    with b.if_else(b.icmp_signed("==", code.index("row"), INTEGER(size))) as (all_of_it, without_optional):
+        for branch, count in ((all_of_it, size), (without_optional, size - OPTIONAL)):
+            with branch, code.each(code.width) as k:
+                place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
+                target = b.gep(code.pointer["out"], [b.mul(place, INTEGER(count))])
+                source = b.gep(code.at(room, written.start), [k])
+                for j in range(count):
+                    b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
 
 
 def _raise(code: LoopCode, room, k: int, value):

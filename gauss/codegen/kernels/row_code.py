@@ -25,6 +25,7 @@ from gauss.codegen import (
     counted_loop,
     schedule,
     straight_line,
+    vector_width,
 )
 from gauss.codegen.text_builder import TextBuilder
 
@@ -45,10 +46,13 @@ class RowCode:
     ----------
     given, found : llvmlite.ir.Value
         Inputs and outputs.
+    is_batch : bool
+        Whether it is a loop over a batch, one motion per SIMD lane or in a thread of a GPU.
     """
 
     def __init__(self, writer: Writer, function: ir.Function, width: int):
         self.writer, self.function, self.width = writer, function, width
+        self.is_batch = width == vector_width(writer.module)
         self.given, _, self.found, _ = self.function.args
         self.b = TextBuilder(self.function.append_basic_block("entry"))
         self.motions, self.buffers = Lanes(writer.module, width, self.b), Buffers(self.b, width)
@@ -97,7 +101,7 @@ class RowCode:
 
     def each(self, count: int) -> Iterator:
         """Write ``for`` a loop over the whole numbers below a count; unrolled for a batch, which runs for long."""
-        if self.width > 1:
+        if self.is_batch:
             yield from map(INTEGER, range(count))
             return
         with counted_loop(self.b, INTEGER(0), INTEGER(count)) as k:
@@ -109,7 +113,7 @@ class RowCode:
 
     def reduced(self, count: int, start: ir.Value, following: Callable) -> ir.Value:
         """Value after ``value = following(k, value)`` for the whole numbers k below a count."""
-        if self.width > 1:
+        if self.is_batch:
             return reduce(lambda total, k: following(INTEGER(k), total), range(count), start)
         return reduced(self.b, INTEGER(0), INTEGER(count), start, following)
 

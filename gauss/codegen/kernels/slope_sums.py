@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Lanes, constant_array, counted_loop, machine
+from gauss.codegen import INTEGER, POINTER, Lanes, constant_array, counted_loop, vector_width
 from gauss.codegen.kernels.row_code import RowCode, reduced
 from gauss.codegen.text_builder import TextBuilder
 
@@ -43,7 +43,7 @@ class SlopeSums:
 
     def write(self, target, base, h, k, K):
         """Write sum k to an array: ``target = base + h · weights[k] @ K``."""
-        if self.rows.width > 1:
+        if self.rows.is_batch:
             self._unrolled(target, base, h, self.weights[k.constant], K)
             return
         b, name = self.rows.b, f"slope_sum_{self.size}_{self.rows.width}"
@@ -80,7 +80,7 @@ class SlopeSums:
         target, base, h, weights, places, first, last, K = code.args
         target.add_attribute("noalias")
         b = TextBuilder(code.append_basic_block("entry"))
-        lanes = Lanes(module, machine.width() if width == 1 else width, b)
+        lanes = Lanes(module, vector_width(module) if width == 1 else width, b)
         h = lanes.broadcast(b.load(h)) if width == 1 else lanes.load(h, INTEGER(0))
 
         def term(j, k):

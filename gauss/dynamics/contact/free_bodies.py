@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from gauss.codegen import Kernel, from_disk, write
+from gauss.codegen import Function, Kernel, from_disk, write
 from gauss.dynamics.contact.pair_kernels import POSE
 from gauss.rotations import cross
 from gauss.scene.pairs import PAIRS
@@ -19,7 +19,7 @@ from gauss.system.manifold import turned
 
 FREE = PAIRS["free"]
 CONSTANTS = 28  # joint frame in the ground and in the body (12 + 12), principal inertias (3), mass
-BEGUN = 52  # coordinates (7), pose (12), velocities (6), their rates with q̈ = 0 (3), without (6), inertia and inverse (18)
+BEGUN = 55  # coordinates (7), pose (12), velocities (6), their rates with q̈ = 0 (6), without (6), inertia and inverse (18)
 
 
 def constants(joint: PlacedJoint, Phi: np.ndarray) -> np.ndarray:
@@ -71,7 +71,7 @@ def _begin(q, v, given, gravity, step):
     ahead = v + (share * h) * body.rates(*body.free_acceleration(v, gravity))
     W, u = body.velocities(v)
     inertia = [body.R @ (entries[:, None] * body.R.T) for entries in (body.J, 1.0 / body.J)]
-    return at, body.R, body.x, W, u, body.bias(W), *body.free_acceleration(ahead, gravity), *inertia
+    return at, body.R, body.x, W, u, np.zeros(3), body.bias(W), *body.free_acceleration(ahead, gravity), *inertia
 
 
 def _end(at, v, given, change, step):
@@ -80,12 +80,17 @@ def _end(at, v, given, change, step):
     return _moved(at, ((1.0 - share) * h) * v), v
 
 
-def _place(R, x, W, u, pull, own, centre):
+def _place(R, x, W, u, spin, pull, own, centre):
     """Pose and velocities of a shape that is fixed to a body."""
     R = R.reshape(3, 3)
     arm = R @ centre
     turning = cross(W, arm)
-    return R @ own.reshape(3, 3), x + arm, W, u + turning, np.zeros(3), pull + cross(W, turning)
+    return R @ own.reshape(3, 3), x + arm, W, u + turning, spin, pull + cross(spin, arm) + cross(W, turning)
+
+
+def place_function() -> Function:
+    """Traced function of :attr:`FreeBodyKernels.place`."""
+    return write(_place, 9, 3, 3, 3, 3, 3, 9, 3, name="place")
 
 
 class FreeBodyKernels:
@@ -94,17 +99,17 @@ class FreeBodyKernels:
     Attributes
     ----------
     begin : Kernel
-        (q, v, constants, gravity, h, share) → begin of a step (52,).
+        (q, v, constants, gravity, h, share) → begin of a step (55,).
     end : Kernel
         (q after the share, v, constants, change of the velocities, h, share) → (q, v) at its end.
     place : Kernel
-        (rotation, centre, velocities and bias of a body, rotation and centre of a shape in it) → pose (24,) of the shape.
+        (rotation, centre, velocities and biases of a body, rotation and centre of a shape in it) → pose (24,) of the shape.
     """
 
     def __init__(self):
         self.begin = Kernel(write(_begin, 7, 6, CONSTANTS, 3, 2, name="begin"))
         self.end = Kernel(write(_end, 7, 6, CONSTANTS, 6, 2, name="end"))
-        self.place = Kernel(write(_place, 9, 3, 3, 3, 3, 9, 3, name="place"))
+        self.place = Kernel(place_function())
         assert (self.begin.n_out, self.place.n_out) == (BEGUN, POSE)
 
 

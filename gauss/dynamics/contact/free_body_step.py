@@ -30,6 +30,7 @@ from gauss.dynamics.contact.moreau_step import (
     least_rate,
 )
 from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts
+from gauss.dynamics.contact.paradox import Paradox
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
@@ -63,18 +64,21 @@ class FreeBodyStep(NamedTuple):
         Near contacts.
     force : ndarray, shape (m, 3)
         Mean forces with impulses along normals and tangents [N].
-    dissipated : float
-        Mean power lost in contacts [W].
+    power : ndarray, shape (3,)
+        Mean power of drives, of forces on bodies, and of dissipation, which is that of contacts [W].
     error : float or None
         Error of the laws, relative; None for the convex relaxation.
+    paradoxes : list of Paradox
+        None: contacts of many free bodies are not examined for Painlevé's paradox.
     """
 
     q: np.ndarray
     v: np.ndarray
     contacts: NearContacts
     force: np.ndarray
-    dissipated: float
+    power: np.ndarray
     error: float | None
+    paradoxes: list[Paradox]
 
 
 class _Begun(NamedTuple):
@@ -124,7 +128,7 @@ class FreeBodyStepper:
         column = np.full(self.system.structure.n_bodies + 1, -1, dtype=np.int64)
         column[self.child] = np.arange(self.n)
         fixed = [joint for joint in self.system.joints if not joint.pair.n_v]
-        self.fixed = np.zeros((21, len(fixed) + 1))
+        self.fixed = np.zeros((24, len(fixed) + 1))
         for k, joint in enumerate(fixed):
             R = joint.R_parent @ joint.R_child.T
             self.fixed[:12, k] = np.concatenate([R.ravel(), joint.p_parent - R @ joint.p_child])
@@ -138,6 +142,15 @@ class FreeBodyStepper:
         found = np.zeros(self.fixed.shape[1] + self.n)
         np.maximum.at(found, self.table.body, self.table.length)
         return found[: self.n]
+
+    acceleration_error = 0.0  # accelerations of free bodies are Euler's equations themselves
+
+    def check(self, state: State):
+        """Nothing to check."""
+
+    def projected(self, state: State) -> State:
+        """State as it is: nothing closes loops."""
+        return state
 
     def forget(self):
         """Forget the forces of the last step: a new motion begins."""
@@ -177,13 +190,13 @@ class FreeBodyStepper:
         end = self.kernels.end(np.concatenate([begun.q, begun.v[self.v_places], self.given, change, step]))
         found[0][self.q_places], found[1][self.v_places] = end[:7], end[7:]
         lost = -0.5 * (force * (known[..., 0] + rates(near, after[..., None])[..., 0])).sum()
-        return FreeBodyStep(*found, near, force, lost, error)
+        return FreeBodyStep(*found, near, force, np.array([0.0, 0.0, lost]), error, [])
 
     def _begin(self, state: State, h: float, share: float) -> _Begun:
         q, v = state.q[self.q_places], state.v[self.v_places]
         step = np.repeat([[h], [share]], self.n, axis=1)
         found = self.kernels.begin(np.concatenate([q, v, self.given, self.gravity, step]))
-        at, bodies, free, inertia = found[:7], found[7:28], found[28:34], found[34:]
+        at, bodies, free, inertia = found[:7], found[7:31], found[31:37], found[37:]
         both = np.zeros((self.n + self.fixed.shape[1], TWIST, 2))
         both[: self.n, :6, 0] = bodies[12:18].T
         both[: self.n, :6, 1] = (bodies[12:18] + h * free).T
@@ -277,6 +290,10 @@ class FreeBodyStepper:
         response = rows @ M
         found, _ = ContactProblem(response @ rows.T, order[0], laws).solve(order[1])
         return np.column_stack([found[:m], found[m:].reshape(m, 2)]), (found @ response).reshape(self.n, 6)
+
+    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Forces over a step from a state, as of :meth:`forces_of`."""
+        return self.forces_of(self.step(state, h))
 
     def forces_of(self, step: FreeBodyStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""

@@ -166,7 +166,7 @@ class ShapeTable:
         return self.gaps[self.law[first, second] - 1] + place[one] * count[other] + place[other] + key % MOST_FEATURES
 
     def poses(self, bodies: np.ndarray) -> np.ndarray:
-        """Poses and velocities (24, k) of the parts, by those of the bodies (21, n + 1), the ground last."""
+        """Poses and velocities (24, k) of the parts, by those of the bodies (24, n + 1), the ground last."""
         return free_body_kernels().place(np.concatenate([bodies[:, self.body], self.own, self.centre]))
 
     def near(self, poses: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:

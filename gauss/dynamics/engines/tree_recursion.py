@@ -2,15 +2,12 @@
 
 import numpy as np
 
-from gauss.codegen import Kernel, write
+from gauss.codegen import Kernel
 from gauss.codegen.kernels import CorrectedRecursion
-from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.load_forces import generalised_forces
-from gauss.dynamics.loads import Applied
+from gauss.dynamics.kernel_program import added_forces
 from gauss.dynamics.store import cached_on_disk
-from gauss.dynamics.traced_system import off_unit
 from gauss.dynamics.tree_program import tree_correction
-from gauss.system import State, System
+from gauss.system import System
 
 
 class TreeRecursionKernels:
@@ -49,9 +46,4 @@ def tree_recursion_kernels(system: System) -> TreeRecursionKernels:
 
 def corrected_recursion(system: System, loads) -> CorrectedRecursion:
     """(q, v, τ, t) → as :func:`gauss.dynamics.traced_refinement.refined_once`, of a large tree under loads."""
-
-    def added(q, v, t):
-        motion = Kinematics(system, State(t[0], q, v))
-        return generalised_forces(motion, Applied(motion, loads)), [off_unit(system, q)]
-
-    return CorrectedRecursion(tree_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
+    return CorrectedRecursion(tree_correction(system), added_forces(system, loads))

@@ -1,7 +1,7 @@
-"""Actuators of a MuJoCo model without anybody at the controls: the law of their force, and which of them act.
+"""Actuators of a MuJoCo model: the numbers of their force, which of them act, and their controls.
 
 Force = (g₀ + g₁ l + g₂ l̇) u + b₀ + b₁ l + b₂ l̇ of the length l of what is pulled, for a control u; MuJoCo's documentation,
-"Computation: Actuation model". Nobody gives u, so that it is 0, clamped to its range as MuJoCo clamps it.
+"Computation: Actuation model". Where nobody gives u, it is 0, clamped to its range as MuJoCo clamps it.
 """
 
 import mujoco
@@ -14,6 +14,7 @@ COUNT = (
 )  # from MuJoCo 4 on an actuator has any number of controls
 NO_BIAS, AFFINE = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
 FIXED_GAIN, AFFINE_GAIN = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE)
+STATELESS = int(mujoco.mjtDyn.mjDYN_NONE)
 GROUPS = range(31)  # of actuators, which can be switched off
 
 
@@ -23,9 +24,16 @@ def actuators(model) -> range:
 
 
 def is_switched_off(model, i: int) -> bool:
-    """Whether the group of an actuator is disabled: then it does not pull."""
+    """Whether all actuators, or the group of one, are disabled: then it does not pull."""
+    if is_off(model, "ACTUATION"):
+        return True
     group = int(model.actuator_group[i])
     return group in GROUPS and bool(int(model.opt.disableactuator) >> group & 1)
+
+
+def adheres(model, i: int) -> bool:
+    """Whether it presses a body against those that it touches: without contacts it does nothing."""
+    return int(model.actuator_trntype[i]) == int(mujoco.mjtTrn.mjTRN_BODY)
 
 
 def n_controls(model, i: int) -> int:
@@ -37,7 +45,7 @@ def control(model, i: int) -> float:
     """What an actuator of one control is given when nobody gives anything: 0, or the end of its range that is nearest."""
     if n_controls(model, i) != 1 or is_off(model, "CLAMPCTRL"):
         return 0.0
-    place = int(model.actuator_ctrladr[i]) if COUNT == "nactuator" else i
+    place = control_place(model, i)
     return float(np.clip(0.0, *model.actuator_ctrlrange[place])) if model.actuator_ctrllimited[place] else 0.0
 
 
@@ -46,15 +54,43 @@ def gear(model, i: int) -> np.ndarray:
     return model.actuator_gear[int(model.actuator_outadr[i]) if COUNT == "nactuator" else i]
 
 
+def control_range(model, i: int) -> tuple[float, float] | None:
+    """Least and largest control; None where it is not clamped."""
+    place = control_place(model, i)
+    if is_off(model, "CLAMPCTRL") or n_controls(model, i) != 1 or not model.actuator_ctrllimited[place]:
+        return None
+    low, high = map(float, model.actuator_ctrlrange[place])
+    return low, high
+
+
 def has_affine_force(model, i: int) -> bool:
     """Whether the force is that of the formula above."""
-    gains = (FIXED_GAIN, AFFINE_GAIN) if control(model, i) else (int(model.actuator_gaintype[i]),)
+    gains = (FIXED_GAIN, AFFINE_GAIN)
     return int(model.actuator_biastype[i]) in (NO_BIAS, AFFINE) and int(model.actuator_gaintype[i]) in gains
 
 
-def force_law(model, i: int) -> np.ndarray:
-    """Force, and its derivatives by length and rate, (3,), under the control that there is."""
-    bias = model.actuator_biasprm[i, :3] * (int(model.actuator_biastype[i]) == AFFINE)
-    gain = model.actuator_gainprm[i, :3] * ([1, 1, 1] if int(model.actuator_gaintype[i]) == AFFINE_GAIN else [1, 0, 0])
-    u = control(model, i)
-    return bias + gain * u if u else bias
+def has_state(model, i: int) -> bool:
+    """Whether it acts by an activation, which follows its control by a differential equation and is 0 without control."""
+    return int(model.actuator_dyntype[i]) != STATELESS
+
+
+def bias_of(model, i: int) -> np.ndarray:
+    """Numbers b of the formula (3,)."""
+    return model.actuator_biasprm[i, :3] * float(int(model.actuator_biastype[i]) == AFFINE)
+
+
+def gain_of(model, i: int) -> np.ndarray:
+    """Numbers g of the formula (3,)."""
+    affine = float(int(model.actuator_gaintype[i]) == AFFINE_GAIN)
+    return model.actuator_gainprm[i, :3] * [1.0, affine, affine]
+
+
+def control_place(model, i: int) -> int:
+    """Place of the control of an actuator in ``ctrl``."""
+    return int(model.actuator_ctrladr[i]) if COUNT == "nactuator" else i
+
+
+def controls(model) -> dict[str, int]:
+    """Place in ``ctrl`` of each actuator of one control, by its name."""
+    single = [i for i in actuators(model) if n_controls(model, i) == 1]
+    return {model.actuator(i).name or f"actuator {i}": control_place(model, i) for i in single}

@@ -1,53 +1,102 @@
-"""Actuators of a MuJoCo model, without control: constant efforts, and springs and dampers of what they regulate."""
+"""Actuators of a MuJoCo model as inputs of a scene, and as loads of the force that they have without control.
+
+    F(u, l, l̇) = clip((g₀ + g₁ l + g₂ l̇) u + b₀ + b₁ l + b₂ l̇, F_min, F_max)
+
+The load is F(u₀), u₀ the control that is given when nobody gives any; the input adds F(u) − F(u₀).
+"""
 
 import numpy as np
 
-from gauss.io.mjcf.actuators import force_law, gear
-from gauss.io.mjcf.names import Named
-from gauss.io.mjcf.refused import TRANSMISSION
-from gauss.io.mjcf.tendons import pull, terms
-from gauss.rotations import from_quaternion
+from gauss import math
+from gauss.io.mjcf.actuators import bias_of, control, control_range, gain_of, has_state
+from gauss.io.mjcf.names import SCALAR, Named
+from gauss.io.mjcf.transmissions import JOINT, JOINT_IN_PARENT, ActuatorTransmission, transmission
 from gauss.scene import Scene
 
 
+class ActuatorForce:
+    """Force of one actuator: number, or law, of its control.
+
+    Parameters
+    ----------
+    named : Named
+        The model.
+    i : int
+        Number of the actuator.
+    """
+
+    def __init__(self, named: Named, i: int):
+        model = named.model
+        self.gain = np.zeros(3) if has_state(model, i) else gain_of(model, i)
+        self.bias, self.control = bias_of(model, i), control(model, i)
+        acted = transmission(named, i)
+        assert acted is not None  # see what is refused
+        self.acted: ActuatorTransmission = acted
+        self.ranges = [tuple(model.actuator_forcerange[i])] if model.actuator_forcelimited[i] else []
+        self.ranges += [acted.range] if acted.range is not None else []
+        self.scales = [1.0] * len(self.ranges)
+        if acted.range is not None and int(model.actuator_trntype[i]) in (JOINT, JOINT_IN_PARENT):  # beyond the gear
+            self.scales[-1] = next(iter(acted.acts_on.values()))
+
+    @property
+    def follows(self) -> bool:
+        """Whether it depends on the motion under the control that nobody gives."""
+        return bool((self.gain * self.control + self.bias)[1:].any())
+
+    def of(self, u, motion):
+        """Force for a control, by a view of the mechanism; without a view for a force that does not depend on it."""
+        length, rate = (0.0, 0.0) if motion is None else (self._length(motion), self._rate(motion))
+        g, b = self.gain, self.bias
+        gain = g[0] + (g[1] * length + g[2] * rate if g[1:].any() else 0.0)
+        force = gain * u + b[0] + (b[1] * length + b[2] * rate if b[1:].any() else 0.0)
+        for (low, high), scale in zip(self.ranges, self.scales, strict=True):
+            ends = sorted((float(low) / scale, float(high) / scale)) if scale else (0.0, 0.0)
+            force = math.clip(force, *ends)
+        return force
+
+    def _length(self, motion):
+        depends = self.gain[1] or self.bias[1]
+        return self.acted.length(motion) if depends and self.acted.length is not None else 0.0
+
+    def _rate(self, motion):
+        depends = self.gain[2] or self.bias[2]
+        return self.acted.rate(motion) if depends and self.acted.rate is not None else 0.0
+
+
 def add_actuator(scene: Scene, named: Named, i: int):
-    """Loads of one actuator: its force is b₀ + b₁ l + b₂ l̇, with l the coordinate or length of the tendon times the gear."""
-    model, name, first = named.model, named.name("actuator", i), int(named.model.actuator_trnid[i, 0])
-    b = force_law(model, i).copy()
-    limit = model.actuator_forcerange[i] if model.actuator_forcelimited[i] else None
-    if limit is not None and not b[1:].any():
-        b[0] = np.clip(b[0], *limit)
-    on = int(model.actuator_trntype[i])
-    if on == TRANSMISSION["SITE"]:
-        _push(scene, named, i, name, float(b[0]))
+    """Input of one actuator, and its force without control."""
+    model, name, force = named.model, named.name("actuator", i), ActuatorForce(named, i)
+    name = f"actuator {name}" if name in scene.loads or name in scene.relations or name in scene.contacts else name
+    _add_load(scene, named, i, name, force)
+    if not force.gain.any():
         return
-    ratio = float(gear(model, i)[0])
-    constant, per_length, per_rate = ratio * b[0], ratio**2 * b[1], ratio**2 * b[2]
-    if on == TRANSMISSION["TENDON"]:
-        constant += per_length * model.tendon_length0[first]
-        pull(scene, name, terms(named, first), float(constant), float(per_length), float(per_rate))
+    acts_on, forces, u_0, gain = force.acted.acts_on, force.acted.forces, force.control, float(force.gain[0])
+    effort = None
+    if force.ranges or force.gain[1:].any() or u_0:
+        effort = lambda u, t, motion: force.of(u, motion) - force.of(u_0, motion)  # noqa: E731
+    elif forces and gain != 1.0:
+        effort = lambda u, t, motion: gain * u  # noqa: E731
+    else:
+        acts_on = {joint: factor * gain for joint, factor in acts_on.items()}
+    joint = next(iter(acts_on)) if list(acts_on.values()) == [1.0] else acts_on
+    scene.input(name, joint, control_range(model, i), effort, forces)
+
+
+def _add_load(scene: Scene, named: Named, i: int, name: str, force: ActuatorForce):
+    """Force without control: a constant, a spring and damper of a joint, or a law."""
+    acted, u_0 = force.acted, force.control
+    if not force.follows:
+        constant = float(force.of(u_0, None))
+        if constant:
+            acted.pull(scene, f"bias of {name}", constant)
         return
-    joint, at_rest = named.joints[first], float(model.qpos0[model.jnt_qposadr[first]])
-    law = "torque" if named.kinds[first] == "revolute" else "force"
-    if limit is None or not b[1:].any():
-        scene.drive(joint, name=name, **{law: float(constant)})
-        if b[1:].any():
-            feedback = {"stiffness": -float(per_length), "damping": -float(per_rate), "rest": -at_rest}
-            scene.joint_spring(f"feedback of {name}", joint, **feedback)
+    first, on = int(named.model.actuator_trnid[i, 0]), int(named.model.actuator_trntype[i])
+    if force.ranges or on not in (JOINT, JOINT_IN_PARENT) or named.kinds[first] not in SCALAR:
+        acted.pull(scene, f"bias of {name}", lambda t, motion: force.of(u_0, motion))
         return
-
-    def effort(t, motion):
-        return constant + per_length * (motion.coordinate(joint) + at_rest) + per_rate * motion.rate(joint)
-
-    scene.drive(joint, name=name, **{law: effort}, limit=abs(ratio) * float(limit[1]))
-
-
-def _push(scene: Scene, named: Named, i: int, name: str, effort: float):
-    """Force and moment at a site, along its axes, or along those of a site of the ground."""
-    model = named.model
-    site, other = (int(k) for k in model.actuator_trnid[i])
-    body = named.bodies[int(model.site_bodyid[site])]
-    R = from_quaternion(model.site_quat[site if other < 0 else other])
-    force, moment = (tuple(effort * R @ part) for part in np.split(gear(model, i), 2))
-    axes = "body" if other < 0 else "world"
-    scene.force(name, body, force, moment, at=tuple(model.site_pos[site]), axes=axes)
+    (joint, ratio), b = next(iter(acted.acts_on.items())), force.gain * u_0 + force.bias
+    if ratio * b[0]:
+        acted.pull(scene, f"bias of {name}", float(b[0]))
+    at_rest = float(named.model.qpos0[named.model.jnt_qposadr[first]])
+    feedback = {"stiffness": -float(ratio**2 * b[1]), "damping": -float(ratio**2 * b[2]), "rest": -at_rest}
+    scene.joint_spring(f"feedback of {name}", joint, **feedback)

@@ -9,8 +9,6 @@ from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, Jo
 from gauss.scene.values import rotation_matrix
 from gauss.system.frames import relative
 
-AT_WORLD = "origin of the world"  # a mark that forces in world axes refer to
-
 
 def write_elements(document):
     """Write couplings, relations and loads.
@@ -117,9 +115,7 @@ def _(force: Force, document):
     at = document.scene.bodies[force.body].com if force.at is None else force.at
     target = {"site": document.site(f"{force.name}: {force.body}", force.body, at)}
     if force.axes == "world":
-        if ("site", AT_WORLD) not in document.taken:
-            document.site(AT_WORLD, GROUND, np.zeros(3))
-        target["refsite"] = AT_WORLD
+        target["refsite"] = document.world_site()
     _motor(document, name=force.name, gear=wrench, effort=1.0, **target)
 
 

@@ -30,8 +30,18 @@ RANGES = {"range", "ctrlrange", "forcerange", "actuatorfrcrange"}  # which may b
 FORBIDDEN = ("plugin", "extension")
 
 
-def guarded(path: Path) -> Source:
+MOST_INCLUDES = 1000  # included files, nested ones counted: more is a mistake, or an attack
+
+
+def guarded(path: Path, root_folder: Path | None = None) -> Source:
     """File that may be parsed, with the files that it includes in their places.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    root_folder : Path, optional
+        Folder that named files may lie in, beside that of the file.
 
     Raises
     ------
@@ -39,7 +49,7 @@ def guarded(path: Path) -> Source:
         If it cannot be read, or holds what is refused; the message says where.
     """
     source, home = read_xml(path, ROOTS), path.resolve().parent
-    _include(source, source, home, (path.resolve(),))
+    _Includes(source, home, root_folder).put(source, (path.resolve(),))
     folders = ["", *(element.get(key, "") for element in source.root.iter("compiler") for key in FOLDERS)]
     for element in source.root.iter():
         _require_numbers(source, element)
@@ -48,7 +58,7 @@ def guarded(path: Path) -> Source:
         for named in (element.get(key) for key in FILES):
             if named is not None:
                 for folder in folders:
-                    require_inside(source, element, home, str(Path(folder) / named))
+                    require_inside(source, element, home, str(Path(folder) / named), root_folder)
     return source
 
 
@@ -64,22 +74,36 @@ def _require_numbers(source: Source, element: Element):
             )
 
 
-def _include(whole: Source, part: Source, home: Path, seen: tuple[Path, ...]):
-    """Put the elements of included files in the places of what asks for them."""
-    for element in list(part.root.iter()):
-        for number, child in reversed(list(enumerate(element))):
-            if child.tag != "include":
-                continue
-            named = child.get("file", "")
-            found = {(folder / named).resolve() for folder in (home, part.path.resolve().parent)}
-            for folder in (home, part.path.resolve().parent):
-                require_inside(whole, child, home, str(folder / named))
-            included = min(found, key=lambda file: not file.is_file())
-            if sum(file.is_file() for file in found) > 1:
-                raise FileError(f"{whole.place(child)}: two files are called {named!r}; rename one of them.")
-            if included in seen:
-                raise FileError(f"{whole.place(child)}: includes {included.name}, which includes it again.")
-            inner = read_xml(included, ROOTS)
-            whole.places.update(inner.places)
-            _include(whole, inner, home, (*seen, included))
-            element[number : number + 1] = list(inner.root)
+class _Includes:
+    """Includes of one file."""
+
+    def __init__(self, whole: Source, home: Path, root_folder: Path | None):
+        self.whole, self.home, self.root_folder, self.count = whole, home, root_folder, 0
+
+    def put(self, part: Source, seen: tuple[Path, ...]):
+        """Put the elements of included files in the places of what asks for them."""
+        for element in list(part.root.iter()):
+            for number, child in reversed(list(enumerate(element))):
+                if child.tag == "include":
+                    included = self._file(child, part, seen)
+                    inner = read_xml(included, ROOTS)
+                    self.whole.places.update(inner.places)
+                    self.put(inner, (*seen, included))
+                    element[number : number + 1] = list(inner.root)
+
+    def _file(self, include: Element, part: Source, seen: tuple[Path, ...]) -> Path:
+        """File that an include names."""
+        named, place = include.get("file", ""), self.whole.place(include)
+        self.count += 1
+        if self.count > MOST_INCLUDES:
+            raise FileError(f"{place}: more than {MOST_INCLUDES} files are included; write them into fewer files.")
+        folders = (self.home, part.path.resolve().parent)
+        for folder in folders:
+            require_inside(self.whole, include, self.home, str(folder / named), self.root_folder)
+        found = {(folder / named).resolve() for folder in folders}
+        included = min(found, key=lambda file: not file.is_file())
+        if sum(file.is_file() for file in found) > 1:
+            raise FileError(f"{place}: two files are called {named!r}; rename one of them.")
+        if included in seen:
+            raise FileError(f"{place}: includes {included.name}, which includes it again.")
+        return included

@@ -14,14 +14,18 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
-from gauss.io.mjcf.actuators import actuators, is_switched_off
+from gauss.io.guard import checked_root
+from gauss.io.mjcf.actuators import actuators, adheres, is_switched_off
 from gauss.io.mjcf.drives import add_actuator
 from gauss.io.mjcf.guard import guarded
+from gauss.io.mjcf.medium import add_medium
 from gauss.io.mjcf.names import SITE, Named
-from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, left_out, refused
+from gauss.io.mjcf.passive import add_ball_armature, add_compensation, add_passive, with_armature
+from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, WELD, is_closed, left_out, refused
 from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
-from gauss.io.mjcf.tendons import FIXED, add_tendon, couple_coordinates, ends, kind_of, terms
+from gauss.io.mjcf.tendon_path import TendonPath
+from gauss.io.mjcf.tendons import add_tendon, couple_tendons, hold_tendon
 from gauss.io.mjcf.touching import add_contacts, add_stops
 from gauss.io.numbers import bounds
 from gauss.scene import GROUND, Body, Scene
@@ -30,24 +34,31 @@ from gauss.scene.profiles import Polynomial
 LIMITS = ("start", "stops")
 
 
-def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
+def read_mjcf(
+    path, limits: str = "start", contacts: bool = False, root_folder=None, keyframe: str | int | None = None
+) -> Scene:
     """Scene of a MJCF file.
 
     A body of several joints hangs on bodies without mass in between. Coordinates count from the pose of the file, so that
-    those of a joint with ``ref`` are smaller by it. An actuator is a drive, named like it, of the effort that it has when
-    nobody controls it: under control 0, or the end of its ``ctrlrange`` that is nearest. Armature is a rotor on the ground
-    that turns with its joint. A fixed tendon pulls its joints; a straight one is a spring, a rope, or a distance. A key
-    frame called "start" is where the scene starts.
+    those of a joint with ``ref`` are smaller by it. An actuator is an input, named like it, of its control; the force that
+    it has when nobody controls it, under control 0 or the end of its ``ctrlrange`` that is nearest, is a load. Armature is
+    a rotor on the ground that turns with its joint. A fixed tendon pulls its joints; one between two sites is a spring, a
+    rope, or a distance, one over several sites pulls the bodies of all. A key frame called "start", or another that is
+    asked for, is where the scene starts.
 
     Parameters
     ----------
     path : str or Path
-        The file; files that it names must lie in its folder.
+        The file; files that it names must lie in its folder, or in ``root_folder``.
     limits : str
         "start": limits of joints are kept where a start is assembled; "stops": joints run against them, too.
     contacts : bool
         Whether planes, spheres, capsules and boxes become shapes, and contacts where they may touch; see
         :mod:`gauss.io.mjcf.touching`.
+    root_folder : str or Path, optional
+        Folder in which meshes and included files may lie, beside that of the file.
+    keyframe : str, optional
+        Name of the key frame that the scene starts from, or its number from 0.
 
     Raises
     ------
@@ -63,23 +74,23 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     path = Path(path)
     if limits not in LIMITS:
         raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
-    source = guarded(path)
+    source = guarded(path, checked_root(path, root_folder))
     try:
         model = without_what_is_off(mujoco.MjModel.from_xml_path(str(path)))
     except (ValueError, RuntimeError) as error:
         raise FileError(f"{path}: MuJoCo refuses it: {error}") from error
     named = Named(model, source)
-    against = refused(named)
+    against = refused(named, contacts)
     if against:
         raise FileError(f"{path}: not modelled: {'; '.join(against)}. Remove them from the file, or model them in gauss.")
     try:
-        scene = _MjcfReader(named).scene(path.stem)
+        scene = _MjcfReader(named).scene(path.stem, keyframe, limits == "stops")
         if limits == "stops":
             add_stops(scene, named)
         unlike = add_contacts(scene, named) if contacts else []
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
-    left = left_out(named, limits == "stops", contacts) + unlike
+    left = left_out(named, limits == "stops", contacts, keyframe) + unlike
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=2)
     return scene
@@ -92,20 +103,22 @@ class _MjcfReader:
         self.named, self.model = named, named.model
         self.bodies, self.joints, self.kinds = named.bodies, named.joints, named.kinds
 
-    def scene(self, name: str) -> Scene:
+    def scene(self, name: str, keyframe: str | int | None, stops: bool) -> Scene:
         """Scene of the model."""
         scene = Scene(name, gravity=tuple(self.model.opt.gravity))
         for i in range(1, self.model.nbody):
             self._body(scene, i)
+            add_compensation(scene, self.named, i)
+            add_medium(scene, self.named, i)
         for i in range(self.model.ntendon):
-            add_tendon(scene, self.named, i)
+            add_tendon(scene, self.named, i, stops)
         for i in range(self.model.neq):
             if self.model.eq_active0[i]:
                 self._equality(scene, i)
         for i in actuators(self.model):
-            if not is_switched_off(self.model, i):
+            if not is_switched_off(self.model, i) and not adheres(self.model, i):
                 add_actuator(scene, self.named, i)
-        add_start(scene, self.named)
+        add_start(scene, self.named, keyframe)
         return scene
 
     def _body(self, scene: Scene, i: int):
@@ -133,16 +146,20 @@ class _MjcfReader:
         mass, com = float(model.body_mass[i]), tuple(model.body_ipos[i])
         axes = _matrix(model.body_iquat[i])
         inertia = tuple(model.body_inertia[i]) if mass else (0.0, 0.0, 0.0)
-        return Body(self.bodies[i], mass, inertia, com, **{"inertia_axes": axes, "on": on, **pose})
+        body = Body(self.bodies[i], mass, inertia, com, **{"inertia_axes": axes, "on": on, **pose})
+        return with_armature(self.named, body, i)
 
     def _joint(self, scene: Scene, j: int, parent: str, child: str):
         model, name, kind = self.model, self.joints[j], self.kinds[j]
         if kind == "free":
             scene.free(name, parent, child, at=tuple(model.body_pos[model.jnt_bodyid[j]]))
+            add_passive(scene, self.named, j)
             return
         options: dict[str, Any] = {"at": tuple(model.jnt_pos[j]), "frame": child}
         if kind == "ball":
             scene.joint(name, kind, parent, child, **options)
+            add_passive(scene, self.named, j)
+            add_ball_armature(scene, self.named, j)
             return
         if model.jnt_limited[j]:
             options["limits"] = bounds(*(model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]).tolist())
@@ -174,6 +191,8 @@ class _MjcfReader:
             self._of_joints(scene, name, one, other, data)
         elif kind == TENDON:
             self._of_tendons(scene, name, one, other, data)
+        elif kind == WELD and (not data[10] or not is_closed(self.named, i)):
+            self._weld(scene, name, i, one, other, data)
         elif int(model.eq_objtype[i]) == SITE:
             self._of_sites(scene, name, kind, one, other)
         elif kind == CONNECT:
@@ -193,14 +212,34 @@ class _MjcfReader:
 
     def _of_tendons(self, scene: Scene, name: str, one: int, other: int, data):
         """A tendon that keeps its length, or is as long as another; lengths count from the pose of the file."""
-        if kind_of(self.model, one) != FIXED:
-            length = float(self.model.tendon_length0[one] + data[0])
-            scene.distance(name, **ends(self.named, one)._asdict(), length=length)
+        path = TendonPath(self.named, one)
+        if other < 0:
+            hold_tendon(scene, name, path, float(data[0]))
+        else:
+            couple_tendons(scene, name, path, TendonPath(self.named, other), data[:5].tolist())
+
+    def _weld(self, scene: Scene, name: str, i: int, one: int, other: int, data):
+        """A weld at another pose than that of the file, or of points alone: p₁ = p₂, R₁ R = R₂."""
+        ends = [(body, np.zeros(3), np.eye(3)) for body in (self.bodies[one], self.bodies[other])]
+        if int(self.model.eq_objtype[i]) == SITE:
+            ends = [(self.bodies[int(self.model.site_bodyid[s])], *_site_pose(self.model, s)) for s in (one, other)]
+            data = np.array([*np.zeros(6), 1.0, 0.0, 0.0, 0.0, data[10]])
+        (first, p_1, R_1), (second, p_2, R_2) = ends
+        at, other_at = p_1 + R_1 @ data[3:6], p_2 + R_2 @ data[:3]
+        if not data[10]:  # no torque
+            scene.coincident(name, first, second, tuple(at), tuple(other_at))
             return
-        factors = dict(terms(self.named, one))
-        for joint, factor in terms(self.named, other) if other >= 0 else ():
-            factors[joint] = factors.get(joint, 0.0) - float(data[1]) * factor
-        couple_coordinates(scene, name, [(joint, factor) for joint, factor in factors.items() if factor], float(data[0]))
+        axes = R_1 @ _matrix(data[6:10]) @ R_2.T
+
+        def residual(view):
+            turned = (view.rotation(first) @ axes).T @ view.rotation(second)
+            sines = turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]
+            scale = 0.5 * (
+                1.0 + turned[0, 0] + turned[1, 1] + turned[2, 2]
+            )  # 1 + cos: not zero for half a turn, as a sine is
+            return [*(view.position(second, other_at) - view.position(first, at)), *(sine / scale for sine in sines)]
+
+        scene.constrain(name, residual)
 
     def _of_sites(self, scene: Scene, name: str, kind: int, one: int, other: int):
         bodies = [self.bodies[int(self.model.site_bodyid[site])] for site in (one, other)]
@@ -209,6 +248,11 @@ class _MjcfReader:
             scene.coincident(name, *bodies, *points)
         else:
             scene.fixed(name, bodies[0], bodies[1], points[0], frame=bodies[0])
+
+
+def _site_pose(model, site: int) -> tuple[np.ndarray, np.ndarray]:
+    """Point and axes of a site in its body."""
+    return np.array(model.site_pos[site]), _matrix(model.site_quat[site])
 
 
 def _matrix(quaternion) -> np.ndarray:

@@ -5,16 +5,25 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from gauss.io.mjcf.actuators import actuators, force_law, has_affine_force, is_switched_off, n_controls
+from gauss.io.mjcf.actuators import (
+    actuators,
+    adheres,
+    bias_of,
+    control,
+    gain_of,
+    has_affine_force,
+    has_state,
+    is_switched_off,
+    n_controls,
+)
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
-from gauss.io.mjcf.start import START
-from gauss.io.mjcf.switches import is_off
-from gauss.io.mjcf.tendons import CROSSING, FIXED, OTHER, kind_of, span
+from gauss.io.mjcf.start import START, key_of
+from gauss.io.mjcf.tendon_path import TendonPath
+from gauss.io.mjcf.transmissions import JOINT as ON_JOINT
+from gauss.io.mjcf.transmissions import JOINT_IN_PARENT, ActuatorTransmission, transmission
 
 EQUALITIES = ("CONNECT", "WELD", "JOINT", "TENDON")
 CONNECT, WELD, JOINT, TENDON = (int(getattr(mujoco.mjtEq, f"mjEQ_{name}")) for name in EQUALITIES)
-TRANSMISSION = {name: int(getattr(mujoco.mjtTrn, f"mjTRN_{name}")) for name in ("JOINT", "TENDON", "SITE")}
-STATELESS = int(mujoco.mjtDyn.mjDYN_NONE)
 CURVES = {  # what may depend on deflections and speeds by a polynomial, and of what that is
     "jnt_stiffnesspoly": ("stiffness", "joint"),
     "jnt_springyield": ("yielding spring", "joint"),
@@ -29,16 +38,11 @@ Finding = tuple[str, str, int]  # what is refused, kind and number of the elemen
 WELD_TOLERANCE = 1e-9  # rad, and of the extent of the model: poses of a weld that are those of the file
 
 
-def refused(named: Named) -> list[str]:
+def refused(named: Named, contacts: bool = False) -> list[str]:
     """Everything that moves the mechanism and has no counterpart."""
     model, found = named.model, []
-    if model.opt.density or model.opt.viscosity:
-        found.append(f"a medium (option density, viscosity){named.mark('option', 'density') or named.mark('option')}")
-    if is_off(model, "ACTUATION"):
-        found.append(f"flag actuation that is switched off{named.mark('flag', 'actuation')}")
     found += [f"flexible body {i}" for i in range(model.nflex)]
-    parts = [(f"gravcomp of body {named.bodies[i]!r}", "body", i) for i in np.flatnonzero(model.body_gravcomp).tolist()]
-    parts += [*_of_joints(named), *_curved(named), *_without_counterpart(named)]
+    parts = [*_of_joints(named), *_curved(named), *_without_counterpart(named, contacts)]
     return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
 
 
@@ -60,7 +64,7 @@ def _curved(named: Named) -> Iterator[Finding]:
             yield f"damping of joint {named.joints[i]!r} beyond a constant one", "joint", i
 
 
-def _without_counterpart(named: Named) -> Iterator[Finding]:
+def _without_counterpart(named: Named, contacts: bool) -> Iterator[Finding]:
     model = named.model
     for kind, count, against in (
         ("tendon", model.ntendon, _against_tendon),
@@ -69,34 +73,58 @@ def _without_counterpart(named: Named) -> Iterator[Finding]:
     ):
         for i in range(count):
             why = against(named, i)
-            if why:
+            if why and not (kind == "actuator" and not contacts and adheres(model, i)):
                 yield f"{kind} {named.name(kind, i)!r}: {why}", kind, i
 
 
-def left_out(named: Named, stops: bool = False, contacts: bool = False) -> list[str]:
+def left_out(named: Named, stops: bool = False, contacts: bool = False, keyframe: str | int | None = None) -> list[str]:
     """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
-    model, kept = named.model, _inactive(named)
+    parts = _untouched(named, contacts) + _unlimited(named, stops) + _inactive(named, keyframe) + _uncontrolled(named)
+    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
+
+
+def _untouched(named: Named, contacts: bool) -> list[tuple[str, list[str]]]:
+    """Contacts, and what is on surfaces."""
+    model = named.model
+    if contacts:
+        return [("surface velocity and adhesion of geoms", _sticky(named))]
     touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity).tolist()]
-    limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited).tolist()]
-    pairs = [named.name("pair", i) for i in range(model.npair)]
-    parts = [] if contacts else [("contacts of geoms", touching), ("contacts of pairs", pairs)]
-    parts += [("surface velocity and adhesion of geoms", _sticky(named))] if contacts else []
-    parts += [] if stops else [("limits, kept for the assembly of a start only, of joints", limited)]
-    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts + kept if names]
+    return [("contacts of geoms", touching), ("contacts of pairs", [named.name("pair", i) for i in range(model.npair)])]
 
 
-def _inactive(named: Named) -> list[tuple[str, list[str]]]:
+def _unlimited(named: Named, stops: bool) -> list[tuple[str, list[str]]]:
+    """Limits of joints and tendons."""
+    model = named.model
+    limited = np.flatnonzero(model.jnt_limited).tolist()
+    if stops:
+        return [("limits of ball joints", [named.joints[i] for i in limited if named.kinds[i] not in SCALAR])]
+    tied = [named.name("tendon", i) for i in np.flatnonzero(model.tendon_limited).tolist() if TendonPath(named, i).is_fixed]
+    joints = [named.joints[i] for i in limited]
+    return [("limits, kept for the assembly of a start only, of joints", joints), ("limits of tendons", tied)]
+
+
+def _inactive(named: Named, keyframe: str | int | None) -> list[tuple[str, list[str]]]:
     """Elements that are switched off, stand still, or name other states."""
     model = named.model
     inactive = [named.name("equality", i) for i in range(model.neq) if not model.eq_active0[i]]
-    off = [named.name("actuator", i) for i in actuators(model) if is_switched_off(model, i)]
     standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0).tolist()]
-    keys = [named.name("key", i) for i in range(model.nkey) if model.key(i).name != START]
+    keys = [named.name("key", i) for i in range(model.nkey) if i != key_of(named, keyframe)]
     return [
         ("equalities that are not active:", inactive),
-        ("actuators of groups that are switched off:", off),
         ("what moves mocap bodies, which stand still:", standing),
-        (f"key frames (one called {START!r} would be the start):", keys),
+        (f"key frames (one called {START!r}, or that keyframe= names, would be the start):", keys),
+    ]
+
+
+def _uncontrolled(named: Named) -> list[tuple[str, list[str]]]:
+    """Actuators that do nothing, or that nobody can control."""
+    model = named.model
+    name = lambda i: named.name("actuator", i)  # noqa: E731
+    acting = [i for i in actuators(model) if not is_switched_off(model, i)]
+    return [
+        ("actuators that are switched off:", [name(i) for i in actuators(model) if is_switched_off(model, i)]),
+        ("adhesion, which needs contacts, of actuators", [name(i) for i in acting if adheres(model, i)]),
+        ("controls of actuators with states of their own, which are 0:", [name(i) for i in acting if has_state(model, i)]),
     ]
 
 
@@ -108,57 +136,40 @@ def _sticky(named: Named) -> list[str]:
 
 def _of_joint(named: Named, i: int) -> list[str]:
     """What a ball or free joint has that only a hinge or slide may have."""
-    model, dof = named.model, named.model.jnt_dofadr[i]
-    if named.kinds[i] in SCALAR:
+    model, dof, body = named.model, named.model.jnt_dofadr[i], int(named.model.jnt_bodyid[i])
+    if named.kinds[i] != "free":
         return []
-    having = ("dof_damping", "dof_armature", "dof_frictionloss")
-    found = [what.removeprefix("dof_") for what in having if getattr(model, what)[dof]]
-    found += ["stiffness"] if model.jnt_stiffness[i] else []
-    return found + (["limits"] if model.jnt_limited[i] else [])
+    turned = bool(np.any(model.body_quat[body, 1:]))
+    return ["frictionloss, in axes that are not those of the world,"] if model.dof_frictionloss[dof] and turned else []
 
 
 def _against_tendon(named: Named, i: int) -> str:
     """Why a tendon has no counterpart; empty if it has one."""
-    model, kind = named.model, kind_of(named.model, i)
-    if kind == OTHER:
-        return "it is led over more than two sites, pulleys or geoms"
-    if kind == CROSSING:
-        return "it joins points of one body"
-    for what in ("frictionloss", "armature"):
-        if getattr(model, f"tendon_{what}")[i]:
-            return f"its {what} is not modelled"
-    if model.tendon_stiffness[i] and np.ptp(model.tendon_lengthspring[i]) > 0:
-        return "its spring is slack in a range of lengths"
-    if model.tendon_limited[i] and kind == FIXED:
-        return "its length is limited; limit its joints"
-    return "its length has a lower limit" if model.tendon_limited[i] and model.tendon_range[i, 0] > 0 else ""
+    model, path = named.model, TendonPath(named, i)
+    if not path.is_read:
+        return "it is wrapped around geoms; lead it over sites"
+    if model.tendon_frictionloss[i] and not (path.is_fixed and len(path.terms) == 1):
+        return "its frictionloss is not modelled; give frictionloss of its joints"
+    return ""
 
 
 def _against_equality(named: Named, i: int) -> str:
     """Why an equality has no counterpart; empty if it has one."""
     model = named.model
-    kind, data, ends = int(model.eq_type[i]), model.eq_data[i], (int(model.eq_obj1id[i]), int(model.eq_obj2id[i]))
+    kind, ends = int(model.eq_type[i]), (int(model.eq_obj1id[i]), int(model.eq_obj2id[i]))
     if kind == JOINT:
         scalar = all(named.kinds[j] in SCALAR for j in ends if j >= 0)
         return "" if scalar else "a joint has several freedoms"
     if kind == TENDON:
-        return _against_tendons(model, ends, data)
+        return "" if all(TendonPath(named, j).is_read for j in ends if j >= 0) else "it holds a tendon wrapped around geoms"
     if kind not in (CONNECT, WELD):
         return "only connect, weld, joint and tendon are read"
     if int(model.eq_objtype[i]) not in (BODY, SITE):
         return "it binds neither bodies nor sites"
-    return "" if kind == CONNECT or _is_closed(named, i) else "the welded pose is not that of the file"
+    return ""
 
 
-def _against_tendons(model, ends: tuple[int, int], data) -> str:
-    """Why an equality of tendons has no counterpart."""
-    kinds = [kind_of(model, j) for j in ends if j >= 0]
-    if all(kind == FIXED for kind in kinds) and not data[2:5].any():
-        return ""
-    return "" if len(kinds) == 1 and span(model, ends[0]) is not None else "it couples tendons other than straight lines"
-
-
-def _is_closed(named: Named, i: int) -> bool:
+def is_closed(named: Named, i: int) -> bool:
     """Whether a weld holds what the file shows."""
     data = mujoco.MjData(named.model)
     mujoco.mj_kinematics(named.model, data)
@@ -172,39 +183,43 @@ def _is_closed(named: Named, i: int) -> bool:
 
 def _against_actuator(named: Named, i: int) -> str:
     """Why an actuator has no counterpart; empty if it has one."""
-    model, on, first = named.model, int(named.model.actuator_trntype[i]), int(named.model.actuator_trnid[i, 0])
-    if on not in TRANSMISSION.values() or (on == TRANSMISSION["JOINT"] and named.kinds[first] not in SCALAR):
-        return "only actuators of hinges, slides, tendons and sites are read"
-    if on == TRANSMISSION["TENDON"] and kind_of(model, first) != FIXED:
-        return "it pulls a tendon other than a fixed one"
-    return _against_force(named, i, on, first)
-
-
-def _against_force(named: Named, i: int, on: int, first: int) -> str:
-    """Why the force of an actuator on an element has no counterpart."""
-    model = named.model
-    if int(model.actuator_dyntype[i]) != STATELESS:
-        return "it has states of its own"
+    model, acted = named.model, transmission(named, i)
+    if acted is None:
+        return "only actuators of joints, of tendons over sites, and of sites beside none or one of the ground are read"
     if n_controls(model, i) > 1:
         return "it has several controls"
     if not has_affine_force(model, i):
         return "its force is not affine"
-    law = force_law(model, i)
-    if on == TRANSMISSION["SITE"] and law[1:].any():
-        return "its force at a site depends on the motion"
-    return _against_limits(named, i, on, first, law) if law.any() else ""
+    if has_state(model, i) and control(model, i):
+        return "it has states of its own, and its control may not be 0"
+    return _against_force(named, i, acted)
 
 
-def _against_limits(named: Named, i: int, on: int, first: int, law: np.ndarray) -> str:
-    """Why the limits of the force of an actuator, or its reference, have no counterpart."""
+def _against_force(named: Named, i: int, acted: ActuatorTransmission) -> str:
+    """Why the force of an actuator on an element has no counterpart."""
+    model, numbers = named.model, np.abs(gain_of(named.model, i)) + np.abs(bias_of(named.model, i))
+    if (numbers[1] and acted.length is None) or (numbers[2] and acted.rate is None):
+        return "its force depends on the motion of what has several freedoms, or of a site beside another"
+    on_joint = int(model.actuator_trntype[i]) in (ON_JOINT, JOINT_IN_PARENT)
+    if not on_joint and _reaches_limited(named, acted):
+        return "a joint that it moves limits the sum of its forces (actuatorfrcrange); act on that joint alone"
+    return "" if acted.range is None else _against_range(named, i, acted, on_joint)
+
+
+def _against_range(named: Named, i: int, acted: ActuatorTransmission, on_joint: bool) -> str:
+    """Why the range of the force that a joint or tendon bears has no counterpart."""
     model = named.model
-    limited = model.jnt_actfrclimited if on == TRANSMISSION["JOINT"] else model.tendon_actfrclimited
-    if on != TRANSMISSION["SITE"] and limited[first]:
-        return "what it pulls limits its force (actuatorfrcrange)"
-    if model.actuator_forcelimited[i] and law[1:].any():
-        if on != TRANSMISSION["JOINT"] or model.actuator_forcerange[i].sum():
-            return "its force is limited, and not to the same value both ways along one joint"
-    other = int(model.actuator_trnid[i, 1])
-    if on == TRANSMISSION["SITE"] and other >= 0 and model.site_bodyid[other] != 0:
-        return "it refers to a site of a moving body"
+    if on_joint and model.jnt_actgravcomp[int(model.actuator_trnid[i, 0])]:
+        return "what it pulls limits its force, and gravity compensation with it (actuatorgravcomp)"
+    if on_joint and len(acted.acts_on) != 1:
+        return "what it pulls limits its force (actuatorfrcrange); limit the force of the actuator"
+    ends = [(int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])) for k in actuators(model)]
+    if ends.count(ends[i]) > 1:
+        return "what it pulls limits the sum of its actuators (actuatorfrcrange); limit each actuator"
     return ""
+
+
+def _reaches_limited(named: Named, acted: ActuatorTransmission) -> bool:
+    """Whether an actuator of a tendon or site moves a joint that limits the force of all its actuators."""
+    limited = [named.joints[j] for j in np.flatnonzero(named.model.jnt_actfrclimited).tolist()]
+    return bool(limited) and (bool(acted.forces) or bool(set(limited) & acted.acts_on.keys()))

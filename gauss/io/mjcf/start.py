@@ -1,18 +1,40 @@
-"""The key frame "start" of a MuJoCo model as the start of a scene."""
+"""A key frame of a MuJoCo model as the start of a scene: that which is asked for, else one called "start"."""
 
 import numpy as np
 
 from gauss import rotations
+from gauss.errors import FileError, did_you_mean
 from gauss.io.mjcf.names import SCALAR, Named
 from gauss.scene import Scene
 
 START = "start"
 
 
-def add_start(scene: Scene, named: Named):
-    """Start every joint where the key frame of this name has it, if there is one."""
+def key_of(named: Named, keyframe: str | int | None) -> int | None:
+    """Number of the key frame of a name, or that is called "start"; None if none is asked for and there is none.
+
+    Raises
+    ------
+    FileError
+        If there is no key frame of this name or number.
+    """
     model = named.model
-    key = next((i for i in range(model.nkey) if model.key(i).name == START), None)
+    names = [model.key(i).name for i in range(model.nkey)]
+    wanted = START if keyframe is None else keyframe
+    if wanted in names:
+        return names.index(wanted)
+    if isinstance(wanted, int) and 0 <= wanted < model.nkey:
+        return wanted
+    if keyframe is None:
+        return None
+    raise FileError(
+        f"{named.source.path}: keyframe: no key frame {keyframe!r} among {len(names)}. {did_you_mean(str(keyframe), names)}"
+    )
+
+
+def add_start(scene: Scene, named: Named, keyframe: str | int | None = None):
+    """Start every joint where a key frame has it, if there is one."""
+    model, key = named.model, key_of(named, keyframe)
     if key is None:
         return
     qpos, qvel, at_rest = model.key_qpos[key], model.key_qvel[key], model.qpos0

@@ -1,91 +1,106 @@
-"""Tendons of a MuJoCo model: sums of joint coordinates, and straight lines between two points."""
+"""Springs, dampers, limits, armature and friction of tendons of a MuJoCo model."""
 
-from typing import NamedTuple
-
-import mujoco
 import numpy as np
 
+from gauss import math
 from gauss.io.mjcf.names import Named
-from gauss.scene import Scene
-
-FIXED, STRAIGHT, CROSSING, OTHER = "fixed", "straight", "crossing", "other"
-ON_JOINT, ON_SITE = int(mujoco.mjtWrap.mjWRAP_JOINT), int(mujoco.mjtWrap.mjWRAP_SITE)
+from gauss.io.mjcf.tendon_path import ON_SITE, TendonPath
+from gauss.scene import GROUND, Scene
 
 
-class TendonSpan(NamedTuple):
-    """Ends of a straight tendon: a body and a point of its frame [m], twice."""
-
-    body: str
-    other: str
-    at: tuple
-    other_at: tuple
-
-
-def kind_of(model, i: int) -> str:
-    """Fixed: a sum of coordinates of hinges and slides; straight: a line between points of two bodies; or neither."""
-    wraps = _wraps(model, i)
-    types = [int(model.wrap_type[w]) for w in wraps]
-    if all(kind == ON_JOINT for kind in types):
-        return FIXED
-    if types != [ON_SITE] * 2:
-        return OTHER
-    bodies = {int(model.site_bodyid[model.wrap_objid[w]]) for w in wraps}
-    return STRAIGHT if len(bodies) == 2 else CROSSING
-
-
-def span(model, i: int) -> tuple[int, int] | None:
-    """Sites at the ends of a straight tendon; None of another."""
-    if kind_of(model, i) != STRAIGHT:
-        return None
-    first, last = (int(model.wrap_objid[w]) for w in _wraps(model, i))
-    return first, last
-
-
-def terms(named: Named, i: int) -> list[tuple[str, float]]:
-    """Joints and coefficients of a fixed tendon, whose length is Σ coefficient · coordinate, from the pose of the file."""
-    model = named.model
-    return [(named.joints[model.wrap_objid[w]], float(model.wrap_prm[w])) for w in _wraps(model, i)]
-
-
-def ends(named: Named, i: int) -> TendonSpan:
-    """Ends of a straight tendon, in the frames of their bodies."""
-    model = named.model
-    one, other = (int(model.wrap_objid[w]) for w in _wraps(model, i))
-    body = lambda site: named.bodies[int(model.site_bodyid[site])]  # noqa: E731
-    return TendonSpan(body(one), body(other), tuple(model.site_pos[one]), tuple(model.site_pos[other]))
-
-
-def add_tendon(scene: Scene, named: Named, i: int):
-    """Springs, dampers and ropes that a tendon stands for."""
-    model, name = named.model, named.name("tendon", i)
+def add_tendon(scene: Scene, named: Named, i: int, stops: bool):
+    """What a tendon stands for; limits of fixed ones where stops are asked for, those of spatial ones always."""
+    model, name, path = named.model, named.name("tendon", i), TendonPath(named, i)
     stiffness, damping = float(np.ravel(model.tendon_stiffness[i])[0]), float(np.ravel(model.tendon_damping[i])[0])
-    rest = float(model.tendon_lengthspring[i, 0])
-    if kind_of(model, i) == FIXED:
-        if stiffness or damping:
-            at_rest = float(model.tendon_length0[i])  # lengths count from the pose of the file, as coordinates do
-            pull(scene, name, terms(named, i), -stiffness * (at_rest - rest), -stiffness, -damping)
+    low, high = map(float, model.tendon_lengthspring[i])
+    between = _is_line(path)
+    if (stiffness or damping) and between and low == high:
+        scene.spring(name, **_ends(path), stiffness=stiffness, damping=damping, length=low)
+    elif stiffness or damping:
+        path.pull(scene, name, _resistance(path, stiffness, damping, low, high))
+    if model.tendon_limited[i] and (stops or not path.is_fixed):
+        _limit(scene, named, i, path, name)
+    if model.tendon_armature[i]:
+        _add_armature(scene, name, path, float(model.tendon_armature[i]))
+    if model.tendon_frictionloss[i]:  # of one joint, see what is refused
+        joint, factor = next(iter(path.terms.items()))
+        scene.joint_friction(joint, abs(factor) * float(model.tendon_frictionloss[i]), name=f"friction of {name}")
+
+
+def _is_line(path: TendonPath) -> bool:
+    """Whether a tendon is one straight line between two bodies."""
+    return path.types == [ON_SITE] * 2 and len(path.spans) == 1
+
+
+def _ends(path: TendonPath) -> dict:
+    span = path.spans[0]
+    return {"body": span.first.body, "other": span.second.body, "at": span.first.at, "other_at": span.second.at}
+
+
+def _resistance(path: TendonPath, stiffness: float, damping: float, low: float, high: float):
+    """Law of the force −k (L − L_s) − d L̇, slack between the two lengths of the spring."""
+
+    def force(t, motion):
+        length = path.length(motion)
+        beyond = length - low if low == high else math.maximum(length - high, 0.0) + math.minimum(length - low, 0.0)
+        return -stiffness * beyond - damping * path.rate(motion)
+
+    return force
+
+
+def _limit(scene: Scene, named: Named, i: int, path: TendonPath, name: str):
+    """Largest and least length as ropes and one-sided constraints."""
+    shortest, longest = map(float, named.model.tendon_range[i])
+    if _is_line(path):
+        if longest > 0.0:
+            scene.rope(f"{name} taut" if name in scene.loads else name, **_ends(path), length=longest)
+    else:
+        scene.one_sided(f"{name} taut", lambda at: longest - path.length(at))
+    if path.is_fixed or shortest > 0.0:
+        scene.one_sided(f"{name} at its shortest", lambda at: path.length(at) - shortest)
+
+
+def _add_armature(scene: Scene, name: str, path: TendonPath, inertia: float):
+    """A rotor on the ground that turns by 1 rad for each rad or m of the tendon: it adds its inertia only."""
+    rotor, shaft = f"rotor of {name}", f"shaft of {name}"
+    scene.body(rotor, 1.0, (inertia,) * 3)
+    scene.revolute(shaft, GROUND, rotor)
+    if path.is_fixed and len(path.terms) == 1:
+        joint, factor = next(iter(path.terms.items()))
+        scene.couple(f"armature of {name}", shaft, joint, factor)
         return
-    line = ends(named, i)._asdict()
-    if stiffness or damping:
-        scene.spring(name, **line, stiffness=stiffness, damping=damping, length=rest)
-    if model.tendon_limited[i]:
-        scene.rope(f"{name} taut" if name in scene.loads else name, **line, length=float(model.tendon_range[i, 1]))
+    if path.is_fixed:
+        scene.linear_coupling(f"armature of {name}", path.terms | {shaft: -1.0}, 0.0)
+        return
+    scene.constrain(f"armature of {name}", lambda at: path.length(at) - path.rest - at.coordinate(shaft))
 
 
-def pull(scene: Scene, name: str, terms: list[tuple[str, float]], constant: float, per_length: float, per_rate: float):
-    """Drives of the joints of a fixed tendon under the tension constant + per_length · L + per_rate · L̇."""
+def hold_tendon(scene: Scene, name: str, path: TendonPath, offset: float):
+    """Hold a tendon at its length in the pose of the file, plus an offset."""
+    if not path.is_fixed:
+        if _is_line(path):
+            scene.distance(name, **_ends(path), length=path.rest + offset)
+        else:
+            scene.constrain(name, lambda at: path.length(at) - path.rest - offset)
+        return
+    couple_coordinates(scene, name, list(path.terms.items()), offset)
 
-    def along(share: float):
-        def effort(t, motion):
-            length = sum(factor * motion.coordinate(joint) for joint, factor in terms)
-            rate = sum(factor * motion.rate(joint) for joint, factor in terms)
-            return share * (constant + per_length * length + per_rate * rate)
 
-        return effort if per_length or per_rate else constant * share
+def couple_tendons(scene: Scene, name: str, path: TendonPath, other: TendonPath, polynomial: list[float]):
+    """Let a tendon be a polynomial of another; lengths count from the pose of the file."""
+    if path.is_fixed and other.is_fixed and not any(polynomial[2:]):
+        factors = dict(path.terms)
+        for joint, factor in other.terms.items():
+            factors[joint] = factors.get(joint, 0.0) - polynomial[1] * factor
+        terms = [(joint, factor) for joint, factor in factors.items() if factor]
+        couple_coordinates(scene, name, terms, polynomial[0])
+        return
 
-    for joint, factor in terms:
-        kind = "torque" if scene.joints[joint].kind == "revolute" else "force"
-        scene.drive(joint, name=f"{name} on {joint}" if len(terms) > 1 else name, **{kind: along(factor)})
+    def residual(at):
+        moved = other.length(at) - other.rest
+        return path.length(at) - path.rest - sum(factor * moved**power for power, factor in enumerate(polynomial))
+
+    scene.constrain(name, residual)
 
 
 def couple_coordinates(scene: Scene, name: str, terms: list[tuple[str, float]], constant: float):
@@ -98,7 +113,3 @@ def couple_coordinates(scene: Scene, name: str, terms: list[tuple[str, float]], 
         scene.couple(name, first, terms[1][0], -terms[1][1] / factor, constant / factor)
     else:
         scene.linear_coupling(name, dict(terms), constant)
-
-
-def _wraps(model, i: int) -> range:
-    return range(int(model.tendon_adr[i]), int(model.tendon_adr[i] + model.tendon_num[i]))

@@ -22,7 +22,7 @@ PLANE, SPHERE, CAPSULE, BOX = (
 
 
 def add_stops(scene: Scene, named: Named):
-    """Stops of all joints that are limited."""
+    """Stops of all hinges and slides that are limited."""
     for i in np.flatnonzero(named.model.jnt_limited):
         if named.kinds[i] in SCALAR:
             add_stop(scene, named.joints[i])

@@ -17,6 +17,7 @@ from gauss.dynamics import compile_scene
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError
 from gauss.io.mjcf.contacts import write_contacts
+from gauss.io.mjcf.controls import write_controls
 from gauss.io.mjcf.elements import write_elements
 from gauss.io.mjcf.inertia import inertial
 from gauss.io.mjcf.tree import ElementaryJoint, Limb, joint_frame, limb, mujoco_state, spanning_tree
@@ -25,6 +26,7 @@ from gauss.scene.values import rotation_matrix
 from gauss.system import System
 from gauss.system.frames import relative
 
+AT_WORLD = "origin of the world"  # a mark
 WORLD = "world"  # MuJoCo's name of the ground
 TIMESTEP = 1e-3  # s
 STIFF = {"solref": f"{2 * TIMESTEP:g} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}  # the hardest that MuJoCo takes
@@ -80,6 +82,10 @@ class MjcfDocument:
         self.add(self.bodies[carrier], "site", name=name, pos=position, quat=rotations.to_quaternion(R))
         return name
 
+    def world_site(self) -> str:
+        """Name of the mark that forces in world axes refer to, made when it is first needed."""
+        return AT_WORLD if ("site", AT_WORLD) in self.taken else self.site(AT_WORLD, GROUND, np.zeros(3))
+
     def on_body(self, place: str, position, R) -> tuple[str, np.ndarray, np.ndarray]:
         """Body that carries a body frame or named frame, and a pose given in that frame."""
         frame = self.scene.frames.get(place)
@@ -112,7 +118,7 @@ def to_mjcf(scene: Scene) -> str:
     ----------
     scene : Scene
         Any scene of bodies, joints, couplings, coincidences, distances, springs, constant drives and forces, stops, ropes
-        and contacts without restitution, and joint friction.
+        and contacts without restitution, joint friction, inputs and outputs.
 
     Returns
     -------
@@ -139,6 +145,7 @@ def to_mjcf(scene: Scene) -> str:
         _close(document, joint)
     write_elements(document)
     write_contacts(document)
+    write_controls(document)
     if scene.starts:
         qpos, qvel = mujoco_state(system, document.limbs, kinematics(system, system.initial_state()))
         document.add(document.section("keyframe"), "key", name="start", qpos=qpos, qvel=qvel)

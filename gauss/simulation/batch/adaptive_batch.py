@@ -6,6 +6,7 @@ from threading import Event
 import numpy as np
 
 from gauss.codegen import Kernel, write
+from gauss.codegen.gpu.batches import DeviceAdaptiveLoop, DeviceKernel
 from gauss.codegen.kernels import (
     ENERGY_RECORD,
     MOTION_RECORD,
@@ -25,6 +26,8 @@ from gauss.simulation.compiled_steps.loop_functions import adaptive
 from gauss.simulation.step_limits import BUDGET, LEAST_RESTART_STEP, SMALLEST_STEP, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
 
+DEVICE_BUDGET = 200  # steps of a motion on a device before those that are not at their end are gathered
+
 
 class AdaptiveBatchCode:
     """Machine code of one system and method.
@@ -37,11 +40,17 @@ class AdaptiveBatchCode:
         The method.
     shares : ndarray, optional
         Factors of the tolerance, see :class:`gauss.integrators.Tolerance`.
+    device : str, optional
+        Name of a device; this CPU by default.
     """
 
-    def __init__(self, program: Program, method: ExplicitPair, shares=None):
+    loop: AdaptiveBatchLoop | DeviceAdaptiveLoop
+    start: Kernel | DeviceKernel
+    check: Kernel | DeviceKernel
+
+    def __init__(self, program: Program, method: ExplicitPair, shares=None, device: str | None = None):
         self.evaluations, self.layout = method.evaluations, program.layout
-        self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
+        self.states, written = slice(1, 1 + self.layout.n_q + self.layout.n_v), slice(1, self.layout.row)
         functions = adaptive(program, method, batch=True, shares=shares)
 
         first = ExplicitStages(program, method, batch=True, shares=shares).first(functions.check)
@@ -53,9 +62,13 @@ class AdaptiveBatchCode:
             point, checked, h = np.split(x[0].graph.call(first, given), [size, -1])
             return point, h, [program.residual(state)], checked[CHECK_ERRORS:]
 
-        self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
-        self.check = Kernel(functions.check)
-        self.loop = AdaptiveBatchLoop(functions, self.states)
+        begin = write(start, self.layout.size, 1, 1, 1, name="start")
+        if device is None:
+            self.start, self.check = Kernel(begin), Kernel(functions.check)
+            self.loop = AdaptiveBatchLoop(functions, written)
+        else:
+            self.start, self.check = DeviceKernel(device, begin), DeviceKernel(device, functions.check)
+            self.loop = DeviceAdaptiveLoop(device, functions, written)
 
 
 @dataclass(frozen=True)
@@ -64,8 +77,8 @@ class AdaptiveBatchResult:
 
     Parameters
     ----------
-    samples : ndarray, shape (batch, k, n_q + n_v)
-        States.
+    samples : ndarray, shape (batch, k, n_q + n_v + 3)
+        States and work.
     error : ndarray, shape (batch,)
         Largest error of the accelerations, relative to the largest of them; infinite where a motion failed.
     steps, rejected : ndarray, shape (batch,)
@@ -115,7 +128,7 @@ class AdaptiveBatch:
         )
         self.begun = initial_energy_record(look)
 
-    def _by_lanes(self, kernel: Kernel, columns: np.ndarray) -> np.ndarray:
+    def _by_lanes(self, kernel: Kernel | DeviceKernel, columns: np.ndarray) -> np.ndarray:
         """Outputs for columns, all of them by vector code: scalar code may round differently."""
         count = columns.shape[1]
         return kernel(np.pad(columns, ((0, 0), (0, -count % self.code.loop.width)), mode="edge"))[:, :count]
@@ -128,8 +141,9 @@ class AdaptiveBatch:
         times = np.minimum(times, end)
         begun = int(np.searchsorted(times, 0.0, side="right"))
         grid = np.append(times, np.inf)
-        out = np.empty((count, len(times), len(self.starts)))
-        out[:, :begun] = self.starts.T[:, None]
+        row = self.code.layout.row
+        out = np.empty((count, len(times), row - 1))
+        out[:, :begun] = self.points[1:row].T[:, None]
         motions = np.zeros((self.size + len(MOTION_RECORD), count))
         record = dict(zip(MOTION_RECORD, motions[self.size :], strict=True))
         motions[: self.size] = self.points
@@ -159,17 +173,20 @@ class AdaptiveBatch:
 
     def _until(self, motions: np.ndarray, grid: np.ndarray, out: np.ndarray, settings: dict, threads: int):
         """Move all motions to the end in ``settings``; all arrays are changed."""
-        code, count = self.code, motions.shape[1]
-        share = count if threads == 1 else max(code.loop.width, count // (CHUNKS_PER_THREAD * threads))
+        loop, count = self.code.loop, motions.shape[1]
+        if isinstance(loop, DeviceAdaptiveLoop):
+            loop.until(MotionQueue(columns=count, rows=len(grid) - 1, **settings), motions, grid, out, DEVICE_BUDGET)
+            return
+        share = count if threads == 1 else max(loop.width, count // (CHUNKS_PER_THREAD * threads))
         chunks, stopped = iter(range(0, count, share)), Event()
 
         def work(_):
-            queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), code.loop.lanes()
+            queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), loop.lanes()
             while queue.status == LoopStatus.PAUSED and not stopped.is_set():
                 if queue.following >= queue.last:
                     begin = next(chunks, count)
                     queue.following, queue.last, queue.more = begin, min(begin + share, count), float(begin < count)
-                code.loop(queue, lanes, motions, grid, out, BUDGET)
+                loop(queue, lanes, motions, grid, out, BUDGET)
 
         in_threads(work, range(threads), threads, stopped)
 

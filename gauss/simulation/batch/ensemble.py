@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.codegen import one_tier
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
@@ -15,7 +16,8 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
-from gauss.simulation.batch.rollout import ADAPTIVE, FIXED
+from gauss.simulation.batch.machine_code import FIXED
+from gauss.simulation.batch.rollout import ADAPTIVE
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.energy_balance import shares
@@ -57,7 +59,7 @@ class Ensemble:
         self.family, self.step, self.tolerance = parametrised(pattern, members), step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])
         system = self.family.system
-        self.code: FixedStepBatchLoop | AdaptiveBatchCode
+        self.code: FixedStepBatchLoop | DeviceFixedStepLoop | AdaptiveBatchCode
         if integrator in FIXED:
             self.code = fixed_batch(Program(system, laws, family=self.family), FIXED[integrator])
         else:
@@ -112,9 +114,9 @@ class Ensemble:
             adaptive = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
             found = adaptive.run(times, self.step, threads, switched.times)
             return (
-                found.samples,
+                found.samples[:, :, : len(starts)],
                 ~(found.error <= ACCELERATION_TOLERANCE),
-                shares(system, found.energies, starts, found.samples, duration),
+                shares(system, found.energies, starts, found.samples[:, :, : len(starts)], duration),
             )
         batch = FixedStepBatch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))

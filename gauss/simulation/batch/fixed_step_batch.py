@@ -8,10 +8,12 @@ from threading import Event
 
 import numpy as np
 
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.simulation.step_limits import BUDGET, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
 
+NEVER = 2**52  # steps: beyond the end of any motion
 CHUNKS_PER_THREAD = 4  # of the motions: a delayed thread does not delay the others
 
 
@@ -20,7 +22,7 @@ class FixedStepBatch:
 
     Parameters
     ----------
-    loop : FixedStepBatchLoop
+    loop : FixedStepBatchLoop or DeviceFixedStepLoop
         Compiled loop.
     starts : ndarray, shape (n_q + n_v, batch)
         Initial states, at t = 0.
@@ -28,12 +30,15 @@ class FixedStepBatch:
         Parameters of each motion, of a parametrised system.
     """
 
-    def __init__(self, loop: FixedStepBatchLoop, starts: np.ndarray, parameters: np.ndarray | None = None):
+    def __init__(
+        self, loop: FixedStepBatchLoop | DeviceFixedStepLoop, starts: np.ndarray, parameters: np.ndarray | None = None
+    ):
         self.loop, self.size = loop, starts.shape[1]
         filled = self._filled(starts)
         self.columns = filled.shape[1]
         self.points = np.zeros((loop.size, self.columns))
-        self.points[1 : 1 + len(filled)] = filled
+        self.states = slice(1, 1 + len(starts))
+        self.points[self.states] = filled
         if parameters is not None:
             self.points[loop.size - len(parameters) :] = self._filled(parameters)
         self.worst = np.zeros((len(WORST_RECORD), self.columns))
@@ -60,17 +65,41 @@ class FixedStepBatch:
         return self.worst[2, : self.size]
 
     @property
+    def unsolved(self) -> np.ndarray:
+        """Above 0 where the equations of a step were not solved."""
+        return self.worst[3, : self.size]
+
+    @property
     def energies(self) -> EnergyRecord:
         """Energies (batch,) so far."""
-        return EnergyRecord(*self.worst[3:, : self.size])
+        return EnergyRecord(*self.worst[WORST_RECORD.index("kinetic") :, : self.size])
 
     @property
     def reached(self) -> np.ndarray:
         """States (n_q + n_v, batch) so far."""
-        return self.points[self.loop.written, : self.size]
+        return self.points[self.states, : self.size]
 
-    def run(self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None) -> np.ndarray:
+    def advance(self, done: int, n: int, h: float, threads: int, control: np.ndarray | None = None):
+        """Make n steps of length h [s] after the first ``done``, under inputs (batch, 1, n_u), without samples."""
+        given = [] if control is None else [control]
+        held = {} if control is None else {"hold": NEVER, "motions": len(control), "changes": 1}
+        strips = self.columns // self.loop.width
+        share = -(-strips // (CHUNKS_PER_THREAD * threads) if threads > 1 else -strips) * self.loop.width
+        every, none = steps_per_check(self.loop.evaluations), np.zeros((0, 0, 0))
+
+        def work(begin: int):
+            part = {"begin": begin, "end": min(begin + share, self.columns), "first": done, "last": done + n}
+            span = BatchSpan(columns=self.columns, rows=0, h=h, keep=NEVER, every=every, **held, **part)
+            self.loop(span, self.points, self.worst, none, *given)
+
+        in_threads(work, range(0, self.columns, share), threads, Event())
+
+    def run(
+        self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None, with_work: bool = False
+    ) -> np.ndarray:
         """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps of length h [s].
+
+        On request the work of drives, of forces on bodies and of dampers (3,) follows a state.
 
         Rows of ``control`` (batch, rows, n_u) are held for equally many steps.
         """
@@ -78,8 +107,9 @@ class FixedStepBatch:
         if control is not None:
             given, (motions, changes, _) = [control], control.shape
             held = {"hold": steps // changes, "motions": motions, "changes": changes}
-        rows = np.empty((self.columns, steps // keep + 1, self.loop.written.stop - self.loop.written.start))
-        rows[:, 0] = self.points[self.loop.written].T
+        sample = self.loop.written if with_work else self.states
+        rows = np.empty((self.columns, steps // keep + 1, sample.stop - sample.start))
+        rows[:, 0] = self.points[sample].T
         strips = self.columns // self.loop.width
         share = max(1, min(BUDGET // steps, strips // (CHUNKS_PER_THREAD * threads))) * self.loop.width
         every, stopped = steps_per_check(self.loop.evaluations), Event()
@@ -90,7 +120,8 @@ class FixedStepBatch:
                 if stopped.is_set():
                     return
                 part = {"begin": begin, "end": end, "first": first, "last": min(first + BUDGET, steps)}
-                span = BatchSpan(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **held, **part)
+                sizes = {"columns": self.columns, "rows": rows.shape[1], "row": rows.shape[2]}
+                span = BatchSpan(h=h, keep=keep, every=every, **sizes, **held, **part)
                 self.loop(span, self.points, self.worst, rows, *given)
 
         in_threads(work, range(0, self.columns, share), threads, stopped)

@@ -1,8 +1,7 @@
 """Batch of motions of one system: all steps in machine code, in the lanes of vector registers."""
 
-from collections.abc import Hashable
-from dataclasses import dataclass
 from numbers import Integral
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,65 +9,31 @@ from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
 from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
+from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import BATCHES, method_key
-from gauss.dynamics.rules import Question
-from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
-from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep
-from gauss.shapes import Shaped
+from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
+from gauss.simulation.batch.batch_result import Rollout
+from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
+from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, machine_code
+from gauss.simulation.batch.repeated_motions import repeat
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
-from gauss.simulation.compiled_steps.loop_functions import fixed_batch
-from gauss.simulation.energy_balance import imbalances, shares, warn_of_many
-from gauss.simulation.simulate import simulate
+from gauss.simulation.energy_balance import shares
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
 from gauss.system import State, System, refuse_changed
 
-FIXED = {method.name: method for method in EXPLICIT_FIXED}
 ADAPTIVE = {method.name: method for method in EXPLICIT}
 LARGE_BATCH = 1_000_000  # steps of all motions that take about as long as optimising the code of a robot arm
+T = TypeVar("T")
 ADAPTIVE_STEPS = 100  # number of steps that an adaptive motion is taken to make
-
-
-@dataclass(frozen=True)
-class Rollout:
-    """Motions of a batch.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    t : ndarray, shape (k,)
-        Times [s].
-    q : ndarray, shape (batch, k, n_q)
-        Coordinates.
-    v : ndarray, shape (batch, k, n_v)
-        Rates.
-    repeated : tuple of int
-        Motions repeated by :func:`gauss.simulate`, because a check of the compiled steps failed, or prescribed velocities
-        jump.
-    steps, rejected : ndarray, shape (batch,)
-        Accepted and rejected steps of each motion.
-    diverged : tuple of int
-        Motions under ``control`` that diverged or cannot continue: some of their samples are not finite.
-    """
-
-    system: System
-    t: Shaped[np.ndarray, " k"]
-    q: Shaped[np.ndarray, "batch k nq"]
-    v: Shaped[np.ndarray, "batch k nv"]
-    repeated: tuple[int, ...]
-    steps: Shaped[np.ndarray, " batch"]
-    rejected: Shaped[np.ndarray, " batch"]
-    diverged: tuple[int, ...] = ()
 
 
 @named_arguments
@@ -86,13 +51,15 @@ def rollout(
     atol: float | tuple[float, float] | dict | None = None,
     threads: int | None = 1,
     control=None,
+    device: str | None = None,
 ) -> Rollout:
     """Simulate a batch of initial states.
 
-    With "rk4" and "semi_implicit_euler" all motions make ``steps`` steps of one length; with "dop853" and "dopri5" each has
-    step-size control of its own, by ``rtol`` and ``atol``, and samples at the same ``times`` by dense output. The
+    With "rk4", "semi_implicit_euler" and "time_stepping" all motions make ``steps`` steps of one length; with "dop853" and
+    "dopri5" each has step-size control of its own, by ``rtol`` and ``atol``, and samples at the same ``times`` by dense
+    output. Contacts, stops and friction take "time_stepping", whose motions follow one another in scalar code. The
     accelerations are checked on the way by inverse dynamics, and loops by their constraint residuals. A motion that fails a
-    check is repeated by :func:`gauss.simulate`.
+    check, or with a contact problem that machine code does not solve, is repeated by :func:`gauss.simulate`.
 
     Parameters
     ----------
@@ -101,7 +68,7 @@ def rollout(
     q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
         Initial states, at t = 0.
     integrator : str
-        "rk4", "semi_implicit_euler", "dop853" or "dopri5".
+        "rk4", "semi_implicit_euler", "time_stepping", "dop853" or "dopri5".
     steps : int
         Number of fixed steps.
     step : float
@@ -117,11 +84,14 @@ def rollout(
     control : array_like, shape (batch, k, n_u), optional
         Values of the inputs of the scene [N m, N] for each motion, with fixed steps: k rows, each held for ``steps`` / k
         steps and cut off at the limits of the inputs. They are zero when not given.
+    device : str, optional
+        "cuda" or "cuda:1": a GPU, one motion in a thread, needs cuda-bindings and a driver of NVIDIA. "lanes": the same
+        code on this CPU, one motion after the other, to check what a GPU computes. This CPU, in SIMD lanes, by default.
 
     Returns
     -------
     Rollout
-        All motions.
+        All motions; ``trajectory(k)`` is one of them, ``output(name)`` the values of an output of the scene.
 
     Warns
     -----
@@ -134,6 +104,8 @@ def rollout(
     SimulationError
         If the system cannot be compiled, with the reasons, or a motion without ``control`` diverges; with it, motions that
         diverge are marked in the result, and the others are not affected.
+    DeviceError, MissingPackageError
+        If there is no such device, no driver or no cuda-bindings, or a function has no code for a GPU.
     StateError
         If the initial states have wrong shapes, or violate the constraints.
     """
@@ -144,13 +116,15 @@ def rollout(
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
         _refuse(integrator, "takes no control=: its steps are not those of the samples; use 'rk4'", control=control)
         with one_tier(_tier(q0, ADAPTIVE_STEPS)):
-            return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores())
-    if integrator not in FIXED:
-        raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, FIXED | ADAPTIVE)}")
+            return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores(), device)
+    if integrator not in STEPPED:
+        raise SimulationError(
+            f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, STEPPED | ADAPTIVE)}"
+        )
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
     with one_tier(_tier(q0, steps)):
         keep = 1 if every is None else every
-        return _fixed(system, q0, v0, FIXED[integrator], steps, step, keep, threads or cores(), control)
+        return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)
 
 
 def _tier(q0, steps) -> str:
@@ -160,42 +134,82 @@ def _tier(q0, steps) -> str:
 
 
 def _fixed(
-    system: System, q0, v0, method: FixedStep, steps: int | None, step: float | None, every: int, threads: int, control
+    system: System,
+    q0,
+    v0,
+    method: FixedStep,
+    steps: int | None,
+    step: float | None,
+    every: int,
+    threads: int,
+    control,
+    device: str | None,
 ) -> Rollout:
     """Batch with fixed steps."""
+    steps, step = _checked_steps(steps, step, every)
+    starts = columns(system, q0, v0)
+    control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
+    if not system.n_v:
+        return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
+    batch = _begun(system, starts, method, control is not None, device)
+    times, t = _switching(system, starts, steps * step).times, step * every * np.arange(steps // every + 1)
+    run = {"integrator": method.name, "step": step, "times": t}
+    settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
+    if times.switches.size:  # steps of a batch cannot end there
+        return _singly(system, starts, steps, run, settings, control)
+    samples = batch.run(steps, step, every, threads, control)
+    finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
+    if control is None:
+        _refuse_divergence(solved & ~finite)
+    is_right = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
+    doubtful = np.flatnonzero((finite & ~is_right) | ~solved)
+    warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
+    with np.errstate(invalid="ignore"):
+        share = shares(system, batch.energies, starts, samples, steps * step)
+    share = np.where(finite & solved, share, 0.0)
+    failed, again = repeat(system, starts, samples, share, doubtful, steps * step, run, control)
+    finite[doubtful] = True
+    finite[failed] = False
+    counts = {"steps": np.full(batch.size, steps), "rejected": np.zeros(batch.size, int)}
+    lost, repeated = tuple(map(int, np.flatnonzero(~finite))), tuple(map(int, doubtful))
+    marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again}
+    return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
+
+
+def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[int, float]:
+    """Number and length [s] of fixed steps."""
     if step is None or not np.isfinite(step) or step <= 0:
         raise SimulationError(f"step: expected a positive number, got {step!r}.")
     if steps is None:
         raise SimulationError("steps: expected a positive whole number, got None.")
     _check_counts({"steps": steps, "every": every})
-    starts = columns(system, q0, v0)
-    control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
-    if not system.n_v:
-        return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
-    held = control is not None
-    make = lambda laws: fixed_batch(Program(system, laws, inputs=held), method)  # noqa: E731
-    batch = FixedStepBatch(_machine_code(system, (method_key(method), held), make), starts)
+    return steps, step
+
+
+def _begun(system: System, starts: np.ndarray, method: FixedStep, held: bool, device: str | None):
+    """Batch at its initial states, which meet the constraints and do not penetrate."""
+    kind = FixedStepBatch if device is None else DeviceFixedStepBatch
+    batch = kind(fixed_step_code(system, method, held, device), starts)
     refuse_inconsistent(system, starts, batch.residual)
-    times, t = _switching(system, starts, steps * step).times, step * every * np.arange(steps // every + 1)
-    run = {"integrator": method.name, "step": step, "times": t}
-    if times.switches.size:  # steps of a batch cannot end there
-        return _singly(system, starts, steps * step, steps, run, control)
-    samples = batch.run(steps, step, every, threads, control)
-    finite = np.isfinite(batch.reached).all(axis=0)
-    if not held and not finite.all():
-        broken = np.flatnonzero(~finite)
+    if method.nonsmooth:
+        for start in starts.T:
+            moreau_stepper(system).refuse_penetration(State(0.0, *np.split(start, [system.n_q])))
+    return batch
+
+
+def _refuse_divergence(diverged: np.ndarray):
+    """Raise a SimulationError where motions without inputs diverged."""
+    broken = np.flatnonzero(diverged)
+    if broken.size:
         raise SimulationError(
-            f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
+            f"{broken.size} of {diverged.size} motions diverged, the first is number {broken[0]}; shorten the step."
         )
-    is_right = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
-    doubtful = np.flatnonzero(finite & ~is_right)
-    warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
-    share = np.where(finite, shares(system, batch.energies, starts, samples, steps * step), 0.0)
-    failed = _repeat(system, starts, samples, share, doubtful, steps * step, run, control)
-    finite[failed] = False
-    counts = np.full(batch.size, steps), np.zeros(batch.size, int)
+
+
+def _result(system: System, t: np.ndarray, samples: np.ndarray, **fields) -> Rollout:
+    """Rollout of samples (batch, k, n_q + n_v)."""
     q, v = np.split(samples, [system.n_q], axis=2)
-    return Rollout(system, t, q, v, tuple(map(int, doubtful)), *counts, tuple(map(int, np.flatnonzero(~finite))))
+    return Rollout(system=system, t=t, q=q, v=v, **fields)
 
 
 def _checked_control(system: System, control, batch: int, steps: int) -> np.ndarray:
@@ -221,7 +235,9 @@ def _checked_control(system: System, control, batch: int, steps: int) -> np.ndar
     return found
 
 
-def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, atol, threads: int) -> Rollout:
+def _adaptive(
+    system: System, q0, v0, method: ExplicitPair, times, step, rtol, atol, threads: int, device: str | None
+) -> Rollout:
     """Batch with adaptive steps."""
     if times is None:
         raise SimulationError(f"integrator {method.name!r} chooses its steps: give times= [s] of the samples.")
@@ -234,17 +250,21 @@ def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, a
     if not system.n_v:
         return _constant(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
-    make = lambda laws: AdaptiveBatchCode(Program(system, laws, memory=method_state_size(system)), method, allowed.shares)  # noqa: E731
-    batch = AdaptiveBatch(_machine_code(system, (method_key(method), allowed.key), make), starts, allowed)
+    make = lambda laws: AdaptiveBatchCode(  # noqa: E731
+        Program(system, laws, memory=method_state_size(system)), method, allowed.shares, device
+    )
+    batch = AdaptiveBatch(machine_code(system, method, (allowed.key, device), make), starts, allowed)
     refuse_inconsistent(system, starts, batch.residual)
     switched = _switching(system, starts, t[-1])
     found = batch.run(t, step, threads, switched.times)
     doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(switched.jumps))
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
-    share = shares(system, found.energies, starts, found.samples, t[-1])
-    _repeat(system, starts, found.samples, share, doubtful, t[-1], run)
-    q, v = np.split(found.samples, [system.n_q], axis=2)
-    return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
+    share = shares(system, found.energies, starts, found.samples[:, :, : len(starts)], t[-1])
+    _, again = repeat(system, starts, found.samples[:, :, : len(starts)], share, doubtful, t[-1], run)
+    settings = run | {"duration": t[-1], "evaluations": method.evaluations}
+    counts = {"repeated": tuple(map(int, doubtful)), "steps": found.steps, "rejected": found.rejected}
+    marks = {"errors": found.error, "work": found.samples[:, :, len(starts) :], "again": again}
+    return _result(system, t, found.samples[:, :, : len(starts)], settings=settings, **counts, **marks)
 
 
 def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
@@ -260,56 +280,21 @@ def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
     return switched
 
 
-def _singly(system: System, starts: np.ndarray, duration: float, steps: int, run: dict, control) -> Rollout:
+def _singly(system: System, starts: np.ndarray, steps: int, run: dict, settings: dict, control) -> Rollout:
     """Motions by :func:`gauss.simulate`, one after the other."""
     batch, t = starts.shape[1], run["times"]
-    samples, share = np.empty((batch, t.size, starts.shape[0])), np.zeros(batch)
-    failed = _repeat(system, starts, samples, share, np.arange(batch), duration, run, control)
-    counts = np.full(batch, steps), np.zeros(batch, int)
-    q, v = np.split(samples, [system.n_q], axis=2)
-    return Rollout(system, t, q, v, tuple(range(batch)), *counts, tuple(failed))
+    samples, share = np.empty((batch, t.size, len(starts))), np.zeros(batch)
+    failed, again = repeat(system, starts, samples, share, np.arange(batch), settings["duration"], run, control)
+    counts = {"repeated": tuple(range(batch)), "steps": np.full(batch, steps), "rejected": np.zeros(batch, int)}
+    marks = {"diverged": tuple(failed), "again": again}
+    return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
 
 
 def _constant(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rollout:
     """Motions of a system without degrees of freedom."""
     batch = starts.shape[1]
-    empty = np.zeros((batch, t.size, 0))
-    return Rollout(system, t, empty, empty, (), np.full(batch, steps), np.zeros(batch, int))
-
-
-def _repeat(
-    system: System, starts, samples: np.ndarray, share: np.ndarray, doubtful, duration: float, run: dict, control=None
-) -> list[int]:
-    """Repeat motions by :func:`gauss.simulate` with the settings ``run``, and warn of energy balances.
-
-    Samples and imbalances are changed. Returned are the motions with inputs that cannot continue: their samples are NaN.
-
-    Warns
-    -----
-    BalanceWarning
-        If there are any.
-
-    Raises
-    ------
-    SimulationError
-        If a motion without inputs cannot continue.
-    """
-    failed: list[int] = []
-    for k in doubtful:
-        start = State(0.0, *np.split(starts[:, k], [system.n_q]))
-        held = {} if control is None else {"control": control[k], "rate": control.shape[1] / duration}
-        try:
-            with imbalances() as found:
-                again = simulate(system, duration, state=start, progress=False, **run, **held)
-        except SimulationError as error:
-            if control is None:
-                raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
-            failed.append(int(k))
-            samples[k], share[k] = np.nan, 0.0
-            continue
-        samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share
-    warn_of_many(system, share, lambda k: f"number {k}", run)
-    return failed
+    counts = {"repeated": (), "steps": np.full(batch, steps), "rejected": np.zeros(batch, int)}
+    return _result(system, t, np.zeros((batch, t.size, 0)), work=np.zeros((batch, t.size, 3)), **counts)
 
 
 def _refuse(integrator: str, why: str, **given):
@@ -325,16 +310,3 @@ def _check_counts(counts: dict):
             continue
         if not isinstance(value, Integral) or value <= 0:
             raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
-
-
-def _machine_code(system: System, kind: Hashable, make):
-    """Machine code of the steps, cached with the system.
-
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled.
-    """
-    laws = Laws(system)
-    BATCHES.plan(Question(system, laws))
-    return cached_on_disk(system, (_machine_code, kind, laws.key), lambda: make(laws))

@@ -8,6 +8,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, NativeFunction, Scalar, write
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, CheckedSwitch, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
@@ -167,14 +168,35 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     return Fixed(size, layout.row, step, project, program.point_check, method.evaluations, program.rates)
 
 
-def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
-    """Machine code of a fixed-step method, for a batch of motions."""
+def fixed_batch(program: Program, method: FixedStep, device: str | None = None) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+    """Machine code of a fixed-step method for a batch of motions, of this CPU or of a device."""
+    return batch_loop(program, fixed(program, method), device=device)
+
+
+def batch_loop(
+    program: Program, functions: Fixed, width: int | None = None, device: str | None = None
+) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+    """Machine code of a batch of motions; samples are coordinates, rates and work.
+
+    Parameters
+    ----------
+    program : Program
+        The system.
+    functions : Fixed
+        Functions of the step.
+    width : int, optional
+        Number of motions at a time, 1 for steps of one motion; that of the vector register when not given.
+    device : str, optional
+        Name of a device; this CPU by default.
+    """
     layout = program.layout
 
     def start(x):
         point = layout.point(x)
-        begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state)))
+        begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state), point.method_state))
         return begun, [program.residual(point.state)], program.energies(x)
 
-    states = slice(1, 1 + layout.n_q + layout.n_v)
-    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states, len(program.inputs))
+    begin, written, inputs = write(start, layout.size, name="start"), slice(1, layout.row), len(program.inputs)
+    if device is None:
+        return FixedStepBatchLoop(functions, begin, written, inputs, width)
+    return DeviceFixedStepLoop(device, functions, begin, written, inputs)

@@ -1,4 +1,4 @@
-"""Compiled step of Moreau–Jean time stepping, traced from the equations of one step, for a compiled loop of fixed steps.
+"""Compiled step of Moreau–Jean time stepping, traced from the equations of one step, for compiled loops of fixed steps.
 
 The method state is the contact forces of the last step, from which the solver of the next one starts, and the largest
 residual of the contact and friction laws so far.
@@ -8,10 +8,12 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import write
-from gauss.codegen.kernels import FirstAccepted, Fixed
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
+from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop
 from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
 from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
 from gauss.integrators import Point, method_state_of
+from gauss.simulation.compiled_steps.loop_functions import batch_loop
 from gauss.simulation.moreau.moreau_jean import KnownRates, time_step
 
 
@@ -63,3 +65,15 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
     one, check = write(step, layout.size, *[1] * tried, name="moreau_step"), write(check, layout.size, name="check")
     compiled = one if tried == 1 else FirstAccepted(one, stepper.shares)
     return Fixed(layout.size, layout.row, compiled, program.projection(), check, 1, program.rates)
+
+
+def compiled_batch(
+    stepper: MoreauStepper, program: Program, device: str | None = None
+) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+    """Machine code of a batch of motions: one after the other, for the contact problem is solved motion by motion."""
+    return batch_loop(program, compiled_steps(stepper, program), width=1, device=device)
+
+
+def method_state_size(stepper: MoreauStepper) -> int:
+    """Numbers of the method state."""
+    return stepper.lossy.size + 1

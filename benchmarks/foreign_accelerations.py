@@ -1,0 +1,128 @@
+"""Accelerations of a scene read from a MJCF file against those of MuJoCo, at random states and controls.
+
+    M a + Jᵀ λ = f,   J a + J̇ v = 0
+
+MuJoCo's equalities are soft; the reference takes its M, f and J, and J̇ v by central differences, and keeps them hard.
+"""
+
+import mujoco
+import numpy as np
+
+import gauss
+from gauss import rotations
+from gauss.dynamics.inputs import driven_scene
+from gauss.errors import GaussError
+from gauss.io.guard import Source
+from gauss.io.mjcf.actuators import controls
+from gauss.io.mjcf.names import SCALAR, Named
+from gauss.system import State, random_state
+
+STATES = 3
+SPREAD = 0.5  # of random coordinates where loops are closed from them, relative to those of an open tree
+STEP = 1e-6  # s, of central differences
+OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "WARMSTART")
+EQUALITY = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+
+
+class NotCompared(Exception):
+    """MuJoCo or gauss has no accelerations at the random states."""
+
+
+def deviation(path, scene: gauss.Scene) -> float:
+    """Largest difference of accelerations, relative to the largest acceleration.
+
+    Raises
+    ------
+    NotCompared
+        If there are none to compare, as of a scene of which nothing moves.
+    """
+    model = mujoco.MjModel.from_xml_path(str(path))
+    for name in OFF:
+        model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+    model.opt.jacobian = int(mujoco.mjtJacobian.mjJAC_DENSE)
+    if not model.nv:
+        raise NotCompared("nothing moves")
+    scene.contacts.clear()
+    scene.set_valued.clear()
+    rng, worst = np.random.default_rng(0), 0.0
+    for _ in range(STATES):
+        ctrl = rng.normal(size=model.nu)
+        laws = {name: lambda t, u=ctrl[k]: u for name, k in controls(model).items() if name in scene.inputs}
+        driven = [k for name, k in controls(model).items() if name not in scene.inputs]
+        ctrl[driven] = 0.0
+        system = gauss.compile_scene(driven_scene(scene, laws))
+        try:
+            state = _random(system, rng)
+            found = gauss.solve(gauss.assemble(system, state)).qdd
+        except GaussError as error:
+            raise NotCompared(str(error)) from error
+        ours, theirs = _compared(model, system, state, np.asarray(found), ctrl)
+        worst = max(worst, float(abs(ours - theirs).max() / max(1.0, abs(theirs).max())))
+    return worst
+
+
+def _random(system, rng) -> State:
+    """Random state that satisfies the constraints."""
+    state = random_state(system, rng)
+    scene = system.scene
+    if not (scene.couplings or scene.relations or system.closes or len(scene.joints) > len(scene.bodies)):
+        return state
+    rest = system.reference
+    q = rest.q + SPREAD * (state.q - rest.q) * (not system.quaternions)
+    return system.projected(State(0.0, q, state.v))
+
+
+def _compared(model, system, state: State, qdd: np.ndarray, ctrl: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations of gauss in MuJoCo's rates, and those of MuJoCo."""
+    data = mujoco.MjData(model)
+    named = Named(model, Source(None, None, {}))  # type: ignore[arg-type]  # names need no file
+    ours = np.zeros(model.nv)
+    for j, name in enumerate(named.joints):
+        joint, place, dof = system.joint(name), model.jnt_qposadr[j], model.jnt_dofadr[j]
+        q, v, a = state.q[joint.q], state.v[joint.v], qdd[joint.v]
+        if named.kinds[j] in SCALAR:
+            data.qpos[place] = model.qpos0[place] + q[0]
+        elif named.kinds[j] == "ball":
+            data.qpos[place : place + 4] = q
+        else:
+            Q_0 = model.qpos0[place + 3 : place + 7]
+            R_0 = rotations.from_quaternion(Q_0)
+            data.qpos[place : place + 3] = model.qpos0[place : place + 3] + q[:3]
+            data.qpos[place + 3 : place + 7] = rotations.multiply(q[3:], Q_0)
+            v, a = (np.concatenate([one[:3], R_0.T @ one[3:]]) for one in (v, a))
+        data.qvel[dof : dof + len(v)], ours[dof : dof + len(v)] = v, a
+    data.ctrl[:] = ctrl
+    if not np.isfinite(ours).all():
+        raise NotCompared("no accelerations")
+    return ours, _accelerations(model, data)
+
+
+def _accelerations(model, data) -> np.ndarray:
+    mujoco.mj_forward(model, data)
+    free = data.qacc_smooth.copy()
+    if not model.neq:
+        return free
+    J, bias = _rows(model, data), np.zeros(0)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M) if _takes_data() else mujoco.mj_fullM(model, M, data.qM)
+    moved = mujoco.MjData(model)
+    sides = []
+    for sign in (1.0, -1.0):
+        moved.qpos[:], moved.qvel[:] = data.qpos, data.qvel
+        mujoco.mj_integratePos(model, moved.qpos, data.qvel, sign * STEP)
+        mujoco.mj_fwdPosition(model, moved)
+        sides.append(_rows(model, moved) @ data.qvel)
+    bias = (sides[0] - sides[1]) / (2 * STEP)
+    n = len(J)
+    both = np.block([[M, J.T], [J, np.zeros((n, n))]])
+    return np.linalg.lstsq(both, np.concatenate([M @ free, -bias]), rcond=1e-12)[0][: model.nv]
+
+
+def _rows(model, data) -> np.ndarray:
+    rows = np.array(data.efc_type) == EQUALITY
+    return np.array(data.efc_J).reshape(-1, model.nv)[rows]
+
+
+def _takes_data() -> bool:
+    """Whether mj_fullM takes the data before the matrix, as from MuJoCo 4 on."""
+    return "MjData" in (mujoco.mj_fullM.__doc__ or "").split("->")[0]

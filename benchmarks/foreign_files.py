@@ -1,0 +1,178 @@
+"""Model files of others: how many open, what the others are refused for, and how far accelerations are from MuJoCo's.
+
+Run it with:
+
+    python -m benchmarks.foreign_files FOLDER...
+
+Each folder holds a copy of a public source, as a wheel of the Python package index unpacked (gymnasium, gymnasium-robotics,
+dm_control, brax, robosuite) or a checkout (google-deepmind/mujoco, gazebosim/gz-sim, gazebosim/sdformat). It is the root
+folder of its files. Files that MuJoCo itself refuses, that hold flexible bodies or plugins, or where nothing moves, are
+counted apart, as are SDFormat files with models on a server. Accelerations are compared at random states and controls,
+without contacts, limits and friction.
+"""
+
+import argparse
+import re
+import signal
+import warnings
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+
+import gauss
+from benchmarks.foreign_accelerations import NotCompared, deviation
+from gauss.errors import GaussError
+
+RESULTS = Path(__file__).parent / "results"
+PATIENCE = 120  # s for each file
+AGREED = 1e-9  # relative deviation of accelerations; of closed loops, whose reference is differenced, AGREED_LOOPS
+AGREED_LOOPS = 1e-5
+KINDS = {".xml": "mujoco", ".sdf": "sdf", ".world": "sdf"}
+ON_SERVER = "it is on a server"
+STILL = ("nothing moves", "there is no model in it")
+STATES = ("agreed", "opened", "nothing moves", "differs", "refused", "too slow", "crashed")
+APART = ("model on a server", "refused by MuJoCo", "flex or plugin")
+QUOTED, NUMBER = re.compile(r"'[^']*'"), re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
+
+
+class FileRecord(NamedTuple):
+    """What became of a file: status, reasons of a refusal, deviation of accelerations (nan where not compared)."""
+
+    source: str
+    path: str
+    status: str
+    reasons: tuple[str, ...] = ()
+    deviation: float = float("nan")
+    has_loops: bool = False
+
+
+def records(folder: Path):
+    """What became of every model file below a folder."""
+    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in KINDS and path.is_file()):
+        if root_of(path) == KINDS[path.suffix.lower()]:
+            yield of_file(folder, path)
+
+
+def root_of(path: Path) -> str:
+    """Outermost element of a file; empty where it is no XML."""
+    found = re.search(r"<([A-Za-z_]\w*)", re.sub(r"<!--.*?-->", "", path.read_text(errors="replace"), flags=re.S))
+    return found[1] if found else ""
+
+
+def of_file(folder: Path, path: Path) -> FileRecord:
+    """Open a file and compare its accelerations."""
+    signal.alarm(PATIENCE)
+    try:
+        apart = excluded(path) if path.suffix == ".xml" else ""
+        found = (apart,) if apart else opened(folder, path)
+    except GaussError as error:
+        still = any(words in str(error) for words in STILL)
+        gone = not still and ON_SERVER in str(error)
+        found = ("nothing moves",) if still else ("model on a server",) if gone else ("refused", reasons(str(error)))
+    except TimeoutError:
+        found = ("too slow",)
+    except Exception as error:  # a fault of gauss
+        found = ("crashed", (f"{type(error).__name__}: {error}"[:90],))
+    finally:
+        signal.alarm(0)
+    return FileRecord(folder.name, str(path.relative_to(folder)), *found)
+
+
+def opened(folder: Path, path: Path) -> tuple:
+    """Status, no reasons, deviation of accelerations and whether loops are closed, of a file that opens."""
+    scene = gauss.load(path, root_folder=folder)
+    if all(joint.kind == "fixed" for joint in scene.joints.values()):
+        return ("nothing moves",)
+    if path.suffix != ".xml":
+        return ("opened",)
+    has_loops = bool(scene.relations or scene.couplings) or len(scene.joints) > len(scene.bodies)
+    try:
+        found = deviation(path, scene)
+    except NotCompared:
+        return ("opened",)
+    return "agreed" if found < (AGREED_LOOPS if has_loops else AGREED) else "differs", (), found, has_loops
+
+
+def excluded(path: Path) -> str:
+    """Why a MJCF file is counted apart; empty where it is not."""
+    text = path.read_text(errors="replace")
+    if re.search(r"<(flex|flexcomp|plugin|extension)\b", text):
+        return "flex or plugin"
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, RuntimeError):
+        return "refused by MuJoCo"
+    return "flex or plugin" if model.nflex or model.nplugin else ""
+
+
+def reasons(message: str) -> tuple[str, ...]:
+    """Reasons of a refusal without names, places, numbers and advice."""
+    text = re.sub(r"^\S+?\.(xml|sdf|world)(:\d+)?: (not modelled: )?", "", message).partition(". Remove them")[0]
+    parts = [part.strip("; ").partition("; ")[0].strip() for part in re.split(r"\([^()]*:\d+\)", text)]
+    return tuple(sorted({NUMBER.sub("#", QUOTED.sub("…", part))[:110] for part in parts if part}))
+
+
+def page(found: list[FileRecord]) -> list[str]:
+    """Page of the results."""
+    about = (__doc__ or "").split("\n")[6:]
+    lines = ["# Model files of others", "", *about, f"gauss {gauss.__version__}, MuJoCo {mujoco.__version__}.", ""]
+    lines += [f"| source | files | {' | '.join((*STATES, *APART))} | of those that move, open |"]
+    lines += ["|---" * (3 + len(STATES + APART)) + "|"]
+    lines += [_row(source, [one for one in found if source in (one.source, "all")]) for source in _sources(found)]
+    trees = [one.deviation for one in found if one.status == "agreed" and not one.has_loops]
+    loops = [one.deviation for one in found if one.status == "agreed" and one.has_loops]
+    lines += ["", "Largest relative deviation of accelerations of those that agree: "]
+    lines += [f"{max(trees, default=0.0):.1e} of trees, {max(loops, default=0.0):.1e} of loops (differenced).", ""]
+    return [*lines, *_refusals(found), *_exceptions(found), ""]
+
+
+def _sources(found: list[FileRecord]) -> list[str]:
+    return [*dict.fromkeys(one.source for one in found), "all"]
+
+
+def _row(source: str, own: list[FileRecord]) -> str:
+    count = Counter(one.status for one in own)
+    good = count["agreed"] + count["opened"] + count["differs"]
+    moving = good + count["refused"] + count["too slow"] + count["crashed"]
+    numbers = " | ".join(str(count[status]) for status in (*STATES, *APART))
+    return f"| {source} | {len(own)} | {numbers} | {good} of {moving}: {100 * good / max(moving, 1):.0f} % |"
+
+
+def _refusals(found: list[FileRecord]) -> list[str]:
+    refused = [one.reasons for one in found if one.status == "refused"]
+    alone = Counter(one[0] for one in refused if len(one) == 1)
+    count = Counter(reason for one in refused for reason in one)
+    rows = [f"| {reason.replace('|', '/')} | {number} | {alone[reason]} |" for reason, number in count.most_common()]
+    return ["| refused for | files | alone |", "|---|---|---|", *rows]
+
+
+def _exceptions(found: list[FileRecord]) -> list[str]:
+    odd = [one for one in found if one.status in ("differs", "crashed", "too slow")]
+    rows = [f"| {one.source}/{one.path} | {one.status} | {one.deviation:.1e} {' '.join(one.reasons)} |" for one in odd]
+    return ["", "| file | status | |", "|---|---|---|", *rows] if rows else []
+
+
+def _too_slow(*_):
+    raise TimeoutError
+
+
+def main():
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.foreign_files", description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("folders", nargs="+", type=Path, help="folders of public sources")
+    parser.add_argument("--out", type=Path, default=RESULTS / "foreign_files.md", help="page that is written")
+    parser.add_argument("--list", type=Path, help="file that gets a line for each model file")
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    signal.signal(signal.SIGALRM, _too_slow)
+    found = [one for folder in given.folders for one in records(folder.resolve())]
+    if given.list:
+        given.list.write_text("\n".join("\t".join(map(str, one)) for one in found))
+    given.out.write_text("\n".join(page(found)), encoding="utf-8")
+    print("\n".join(page(found)))
+
+
+if __name__ == "__main__":
+    main()

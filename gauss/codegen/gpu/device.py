@@ -1,0 +1,98 @@
+"""Devices: processors with a memory of their own that run thread code."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from gauss.codegen.gpu.thread_code import ThreadCode
+
+
+class Lowered(NamedTuple):
+    """Thread code for a device: name of its entry, its text, and which of its arguments are arrays."""
+
+    name: str
+    text: str
+    is_array: tuple[bool, ...]
+
+
+class DeviceArray(Protocol):
+    """Array of doubles in the memory of a device.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Its shape; rows are contiguous.
+    """
+
+    shape: tuple[int, ...]
+
+    def numpy(self) -> np.ndarray:
+        """A copy in the memory of this process."""
+
+    def put(self, array: np.ndarray):
+        """Overwrite it with an array of its shape."""
+
+
+class DeviceView(Protocol):
+    """Array of another library in the memory of a device.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Its shape.
+    strides : tuple of int
+        Its strides [bytes].
+    dtype : str
+        Type of its entries, as numpy writes it.
+    """
+
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    dtype: str
+
+    def numpy(self) -> np.ndarray:
+        """A copy in the memory of this process."""
+
+
+class DeviceProgram(Protocol):
+    """Thread code that can be run."""
+
+    def __call__(self, threads: int, arguments: Sequence):
+        """Run a number of threads, and wait for them."""
+
+
+class Device(Protocol):
+    """Processor with a memory of its own.
+
+    Attributes
+    ----------
+    name : str
+        Its name, such as "cuda:0".
+    """
+
+    name: str
+
+    def lowered(self, code: ThreadCode) -> Lowered:
+        """Thread code for this device.
+
+        Raises
+        ------
+        DeviceError
+            If it calls what a GPU does not have.
+        """
+
+    def program(self, lowered: Lowered) -> DeviceProgram:
+        """Thread code, ready to run."""
+
+    def view(self, given) -> "DeviceView | None":
+        """An array of another library on the device, as it is; None if it is none."""
+
+    def put(self, array: np.ndarray) -> DeviceArray:
+        """Copy of an array on the device."""
+
+    def empty(self, shape: tuple[int, ...]) -> DeviceArray:
+        """Array on the device, not initialised."""
+
+    def free_bytes(self) -> int:
+        """Free memory [bytes]."""

@@ -1,0 +1,66 @@
+"""Arrays of doubles handed to other libraries without a copy, by the DLPack protocol (github.com/dmlc/dlpack, version 0)."""
+
+import ctypes
+
+CPU, CUDA = 1, 2  # kinds of memory
+DOUBLE = (2, 64, 1)  # float, bits, lanes
+NAME = b"dltensor"
+
+
+class _Device(ctypes.Structure):
+    _fields_ = (("kind", ctypes.c_int32), ("number", ctypes.c_int32))
+
+
+class _DataType(ctypes.Structure):
+    _fields_ = (("code", ctypes.c_uint8), ("bits", ctypes.c_uint8), ("lanes", ctypes.c_uint16))
+
+
+class _Tensor(ctypes.Structure):
+    _fields_ = (
+        ("data", ctypes.c_void_p),
+        ("device", _Device),
+        ("ndim", ctypes.c_int32),
+        ("dtype", _DataType),
+        ("shape", ctypes.POINTER(ctypes.c_int64)),
+        ("strides", ctypes.POINTER(ctypes.c_int64)),
+        ("byte_offset", ctypes.c_uint64),
+    )
+
+
+class _Managed(ctypes.Structure):
+    pass
+
+
+_DELETER = ctypes.CFUNCTYPE(None, ctypes.POINTER(_Managed))
+_Managed._fields_ = (("tensor", _Tensor), ("context", ctypes.c_void_p), ("deleter", _DELETER))
+_lent: dict[int, tuple] = {}  # what consumers still use, by the address of the tensor
+
+
+@_DELETER
+def _delete(managed):
+    """Called by the consumer when it needs the array no longer."""
+    _lent.pop(ctypes.addressof(managed.contents), None)
+
+
+def capsule(owner, pointer: int, shape: tuple[int, ...], kind: int, number: int):
+    """Capsule of a contiguous array of doubles; the owner of its memory lives as long as the consumer needs it.
+
+    Parameters
+    ----------
+    owner : object
+        Owner of the memory.
+    pointer : int
+        Its address.
+    shape : tuple of int
+        Shape of the array.
+    kind, number : int
+        Kind of memory, CPU or CUDA, and which device.
+    """
+    shape_ = (ctypes.c_int64 * max(len(shape), 1))(*shape)
+    tensor = _Tensor(pointer, _Device(kind, number), len(shape), _DataType(*DOUBLE), shape_, None, 0)
+    managed = _Managed(tensor, None, _delete)
+    address = ctypes.addressof(managed)
+    _lent[address] = owner, shape_, managed
+    new = ctypes.pythonapi.PyCapsule_New
+    new.restype, new.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
+    return new(address, NAME, None)

@@ -1,0 +1,236 @@
+"""Machine code of a system without its contacts, for a step with contacts: poses and Jacobians of bodies, M, τ − h, stops.
+
+    M v̇ + h = τ + Kᵀ f,   K = J_first − J_second from points and normals of the contacts
+
+The mass matrix is that of the spanning tree by composite inertias, τ − h follows from the recursive Newton–Euler algorithm
+(Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 5.3 and 6.2), both of :mod:`gauss.dynamics.state_terms`. Rates of
+bodies at q̈ = 0 are the biases of their accelerations. Stops, ropes and dry friction of joints are rows of the same step.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.codegen import Kernel, as_number, forward, jacobian, write
+from gauss.dynamics.inputs import input_loads
+from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.load_forces import generalised_forces
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.loop_joints import LoopJoint
+from gauss.dynamics.mechanism import loop_constraints
+from gauss.dynamics.state_terms import StateTerms
+from gauss.dynamics.store import cached_on_disk
+from gauss.rotations import cross
+from gauss.scene import ClosedGap, Contact
+from gauss.system import State, System, coordinate_rates, retract, sides
+from gauss.system.relations import place_residuals
+
+GROUND_BODY = np.concatenate([np.eye(3).ravel(), np.zeros(15)])
+BODY = 24  # rotation (9), centre (3), angular velocity, velocity of the centre (6), rates of both where q̈ = 0 (6)
+
+
+class SparseArrays:
+    """Arrays of traced entries, of which constants are kept apart and the others are outputs of a kernel.
+
+    Parameters
+    ----------
+    arrays : sequence of ndarray
+        Numbers and expressions.
+
+    Attributes
+    ----------
+    outputs : list of Expression
+        Entries that are no constants.
+    """
+
+    def __init__(self, arrays):
+        entries = np.concatenate([np.ravel(np.asarray(array, dtype=object)) for array in arrays])
+        numbers = [as_number(entry) for entry in entries]
+        self.flat = np.array([0.0 if number is None else number for number in numbers])
+        self.entries = np.array([k for k, number in enumerate(numbers) if number is None], dtype=int)
+        self.outputs = [entries[k] for k in self.entries]
+        ends = np.cumsum([np.size(array) for array in arrays]).tolist()
+        shapes = [np.shape(array) for array in arrays]
+        self.parts = [(slice(a, b), shape) for a, b, shape in zip([0, *ends], ends, shapes, strict=False)]
+
+    def __getstate__(self) -> dict:
+        return {name: vars(self)[name] for name in ("flat", "entries", "parts")}
+
+    def filled(self, values: np.ndarray) -> list[np.ndarray]:
+        """Arrays with the values of the outputs."""
+        flat = self.flat.copy()
+        flat[self.entries] = values
+        return [flat[part].reshape(shape) for part, shape in self.parts]
+
+
+class MechanismTerms(NamedTuple):
+    """Terms of one state.
+
+    Attributes
+    ----------
+    M : ndarray, shape (n_v, n_v)
+        Mass matrix.
+    tau, power : ndarray, shape (n_v,), (3,)
+        Generalised forces less the bias forces, τ − h; power of drives, of forces on bodies, and of dissipation [W].
+    bodies : ndarray, shape (24, k + 1)
+        Poses, velocities and their rates with q̈ = 0 of the bodies that carry shapes, and of the ground.
+    J : ndarray, shape (k + 1, 6, n_v)
+        Their Jacobians, (angular velocity, velocity of the centre of mass) in world axes.
+    gap, rate, K, bias : ndarray, shape (g,), (r,), (r, n_v), (r,)
+        Gap functions of unilateral constraints that are no contacts of shapes; rates of these and of set-valued elements,
+        their Jacobian, and their derivatives with q̈ = 0.
+    G, gamma : ndarray, shape (l, n_v), (l,)
+        Loop constraints G q̈ = γ.
+    B, beta : ndarray, shape (n_v, n_v), (n_v,)
+        Rates v = B v of all joints by those of the spanning tree, and accelerations of the others where these are zero.
+    """
+
+    M: np.ndarray
+    tau: np.ndarray
+    power: np.ndarray
+    bodies: np.ndarray
+    J: np.ndarray
+    gap: np.ndarray
+    rate: np.ndarray
+    K: np.ndarray
+    bias: np.ndarray
+    G: np.ndarray
+    gamma: np.ndarray
+    B: np.ndarray
+    beta: np.ndarray
+
+
+class MechanismKernels:
+    """Machine code of one system.
+
+    Parameters
+    ----------
+    system : System
+        The system, with its contacts.
+    smooth : System
+        The same without unilateral and set-valued elements.
+    carriers : tuple of int
+        Bodies that carry shapes.
+    inputs : bool
+        Whether the inputs of the scene are the last arguments of forces; otherwise they are zero.
+    """
+
+    def __init__(self, system: System, smooth: System, carriers: tuple[int, ...], inputs: bool = False):
+        self.system, self.smooth, self.carriers = system, smooth, carriers
+        laws = Laws(smooth)
+        self.loads = [*laws.traced, *(input_loads(smooth) if inputs else ())]
+        n_q, n_v = smooth.n_q, smooth.n_v
+
+        def begin(t, q, v):
+            arrays = SparseArrays(self._terms(t[0], q, v))
+            self.layout = arrays
+            return (arrays.outputs,)
+
+        self.begin = Kernel(write(begin, 1, n_q, n_v, name="mechanism"), batch=False)
+        self.forces = Kernel(write(self._forces, 1, n_q, n_v, name="forces"), batch=False)
+        self.move = Kernel(write(lambda q, by: (retract(smooth, q, by),), n_q, n_v, name="move"), batch=False)
+
+    def __getstate__(self) -> dict:
+        return {name: vars(self)[name] for name in ("layout", "begin", "forces", "move")}
+
+    def terms(self, t: float, q: np.ndarray, v: np.ndarray, inputs=()) -> MechanismTerms:
+        """Terms of a state; M, poses, Jacobians and rows."""
+        given = np.concatenate([[t], q, v, inputs])
+        return MechanismTerms(*self.layout.filled(self.begin(given)))
+
+    def _terms(self, t, q, v) -> MechanismTerms:
+        terms = StateTerms(self.smooth, q, v, t)
+        parts = [*(_body(terms, body) for body in self.carriers), GROUND_BODY]
+        bodies = np.array(parts, dtype=object).reshape(len(parts), BODY).T
+        J = [terms.jacobian_of(body, terms.centers[body]) for body in self.carriers] + [np.zeros((6, self.smooth.n_v))]
+        tau, power = self._load_forces(terms, t, q, v)
+        gap, rate, K, bias = self._rows(t, q, v)
+        return MechanismTerms(
+            terms.tree_mass_matrix,
+            tau - terms.tree_bias_forces,
+            np.array(power, dtype=object),
+            bodies,
+            np.array(J, dtype=object).reshape(len(J), 6, self.smooth.n_v),
+            gap,
+            rate,
+            K,
+            bias,
+            *self._loops(t, q, v),
+            *self._dependent(terms),
+        )
+
+    def _forces(self, t, q, v):
+        terms = StateTerms(self.smooth, q, v, t[0])
+        tau, power = self._load_forces(terms, t[0], q, v)
+        return tau - terms.tree_bias_forces, power
+
+    def _load_forces(self, terms: StateTerms, t, q, v):
+        """Generalised forces and power of the loads."""
+        motion = Kinematics(self.smooth, State(t, q, v))
+        applied = Applied(motion, self.loads)
+        return generalised_forces(motion, applied), [applied.driven, applied.loaded, applied.dissipated]
+
+    def _rows(self, t, q, v):
+        """Gap functions, rates, Jacobian and biases of stops, ropes and set-valued elements."""
+        scene, n_v = self.system.scene, self.smooth.n_v
+        gaps = other_gaps(self.system)
+        elements = [*gaps, *scene.set_valued.values()]
+        if not elements:
+            return np.zeros(0), np.zeros(0), np.zeros((0, n_v)), np.zeros(0)
+        values = place_residuals(self.system, elements).values(Kinematics(self.system, State(t, q, v)))
+        gap, rate = values[: len(gaps)], values[len(gaps) :]
+        bias = forward(rate, [t, *q], [1.0, *coordinate_rates(self.system, q, v)])
+        return gap, rate, jacobian(rate, v), bias
+
+    def _loops(self, t, q, v):
+        """Jacobian and bias of loop joints, couplings and relations."""
+        if not self.smooth.has_closures:
+            return np.zeros((0, self.smooth.n_v)), np.zeros(0)
+        if is_coupled_tree(self.smooth):
+            rows = np.zeros((len(self.smooth.scene.couplings), self.smooth.n_v))
+            for row, coupling in zip(rows, self.smooth.scene.couplings.values(), strict=True):
+                row[self.smooth.column(coupling.driven)] = 1.0
+                row[self.smooth.column(coupling.driver)] = -coupling.ratio
+            return rows, np.zeros(len(rows))
+        return loop_constraints(self.smooth, q, v, t)[1:]
+
+    def _dependent(self, terms: StateTerms):
+        """Rates of loop joints by those of the tree."""
+        n_v, in_tree = self.smooth.n_v, {edge.constraint for edge in self.smooth.structure.tree}
+        B, beta = np.eye(n_v, dtype=object), np.zeros(n_v, dtype=object)
+        for index in sorted(set(range(len(self.smooth.joints))) - in_tree):
+            loop_joint, place = LoopJoint(terms.tree, index, terms.q, terms.v), self.smooth.joints[index].v
+            B[place] = jacobian(loop_joint.rates(terms.velocities, still=True), terms.v)
+            beta[place] = loop_joint.rates(terms.biases, still=False)
+        return B, beta
+
+
+def _body(terms: StateTerms, body: int) -> np.ndarray:
+    """Pose, velocities and their rates with q̈ = 0 (24,) of a body in its principal central axes."""
+    tree, link = terms.tree, terms.tree.links[body]
+    R, _ = tree.poses[body]
+    arm = -link.R_central.T @ link.p_central
+    (omega, velocity), (alpha, acceleration) = (np.split(part[body], 2) for part in (terms.velocities, terms.biases))
+    centre = velocity + cross(omega, arm)
+    pull = acceleration + cross(alpha, arm) + cross(omega, cross(omega, arm))
+    parts = R @ omega, R @ centre, R @ alpha, R @ pull
+    return np.concatenate([(R @ link.R_central.T).ravel(), terms.centers[body], *parts])
+
+
+def is_coupled_tree(system: System) -> bool:
+    """Whether couplings of joints are the only constraints beside the joints of the tree."""
+    in_tree = {edge.constraint for edge in system.structure.tree}
+    return not system.relations.placed and len(in_tree) == len(system.joints)
+
+
+def other_gaps(system: System) -> list[ClosedGap]:
+    """Gap functions of unilateral constraints that are no contacts of shapes."""
+    return [side for side in sides(system.scene) if not isinstance(side.whole, Contact)]
+
+
+def mechanism_kernels(system: System, smooth: System, carriers: tuple[int, ...], inputs: bool = False) -> MechanismKernels:
+    """Machine code of a system, cached with it, and by its content on disk."""
+    make: Callable[[], MechanismKernels] = lambda: MechanismKernels(system, smooth, carriers, inputs)  # noqa: E731
+    return cached_on_disk(system, (MechanismKernels, carriers, inputs, Laws(smooth).key), make)

@@ -1,0 +1,75 @@
+"""Elements of SDFormat: what is read, what moves nothing, and what a warning names; all others are refused."""
+
+from xml.etree.ElementTree import Element
+
+from gauss.errors import FileError
+from gauss.io.guard import Source
+from gauss.io.sdf.poses import text
+
+SEVERAL = ("link", "joint", "frame", "model", "collision")  # what is read and may stand in its parent more than once
+READ = {
+    "world": {"gravity", "model", "frame", "joint"},
+    "model": {"pose", "link", "joint", "frame", "model", "static"},
+    "link": {"pose", "inertial", "gravity", "kinematic", "velocity_decay"},
+    "inertial": {"pose", "mass", "inertia", "density"},
+    "joint": {"pose", "parent", "child", "axis", "axis2", "screw_thread_pitch", "thread_pitch"},
+    "axis": {"xyz", "limit", "dynamics", "use_parent_model_frame", "mimic"},
+    "limit": {"lower", "upper", "effort", "velocity", "stiffness", "dissipation"},
+    "dynamics": {"damping", "friction", "spring_reference", "spring_stiffness"},
+    "mimic": {"multiplier", "offset", "reference"},
+}
+READ["axis2"] = READ["axis"]
+STILL = {"visual", "sensor", "light", "self_collide", "enable_wind", "must_be_base_link", "allow_auto_disable", "density"}
+STILL |= {"audio_sink", "audio_source", "projector", "particle_emitter", "material", "gripper", "initial_position"}
+STILL |= {"scene", "gui", "audio", "atmosphere", "magnetic_field", "spherical_coordinates", "road"}
+WARNED = {"collision": "collisions", "plugin": "plugins", "physics": "settings of a solver"}
+WARNED |= {"ball": "damping and friction of ball joints, which have no axis", "wind": "wind"}
+WARNED |= {"actor": "actors, which move as they are told"}
+
+
+def check(source: Source, element: Element, left: set[str]):
+    """Refuse children that are neither read nor known not to move anything, and what is said twice.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    element : Element
+        A world, a model, or a part of one.
+    left : set of str
+        Gets the tags of what a warning is to name.
+
+    Raises
+    ------
+    FileError
+        Naming the first such child, with file and line.
+    """
+    for child in element:
+        if child.tag in READ[element.tag] and child.tag not in SEVERAL and child is not element.find(child.tag):
+            named = f"{element.tag} {element.get('name', '')!r}"
+            raise FileError(f"{source.place(child)}: <{child.tag}> stands twice in {named}; keep one.")
+        if child.tag in WARNED:
+            left.add(child.tag)
+        elif child.tag not in READ[element.tag] | STILL and ":" not in child.tag:
+            what = f"<{child.tag}> of {element.tag} {element.get('name', '')!r}"
+            raise FileError(f"{source.place(child)}: {what} is not modelled; remove it.")
+        elif child.tag in READ:
+            check(source, child, left)
+
+
+def check_link(source: Source, element: Element):
+    """Refuse what moves a link beside its joints and gravity.
+
+    Raises
+    ------
+    FileError
+        With file and line.
+    """
+    moved = []
+    if text(element, "kinematic") not in ("false", "0", ""):
+        moved.append(element.find("kinematic"))
+    decay = element.find("velocity_decay")
+    moved += [one for one in ([] if decay is None else decay) if (one.text or "").strip().strip("0.") != ""]
+    for one in moved:
+        tag = "" if one is None else one.tag
+        raise FileError(f"{source.place(one)}: <{tag}> of link {element.get('name')!r} is not modelled; remove it.")

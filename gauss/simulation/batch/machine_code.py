@@ -1,0 +1,62 @@
+"""Machine code of batches of one system: fixed steps of smooth systems and of contacts."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from gauss.codegen.gpu.batches import DeviceFixedStepLoop
+from gauss.codegen.kernels import FixedStepBatchLoop
+from gauss.dynamics.conditions import smooth_question
+from gauss.dynamics.contact.moreau_step import moreau_stepper
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.plan import BATCHES, method_key
+from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.traced_system import Program
+from gauss.integrators import EXPLICIT_FIXED, FixedStep, Integrator
+from gauss.simulation.compiled_steps.loop_functions import fixed_batch
+from gauss.simulation.moreau.compiled_step import compiled_batch, method_state_size
+from gauss.simulation.moreau.moreau_jean import NONSMOOTH
+from gauss.system import System
+
+T = TypeVar("T")
+FIXED = {method.name: method for method in EXPLICIT_FIXED}
+STEPPED = FIXED | {method.name: method for method in NONSMOOTH}
+
+
+def contact_state_size(system: System) -> int:
+    """Numbers of the method state of time stepping."""
+    return method_state_size(moreau_stepper(system))
+
+
+def fixed_step_code(
+    system: System, method: FixedStep, held: bool, device: str | None = None
+) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+    """Machine code of fixed steps of a batch, cached with the system; with inputs that are held in each step, or without.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled.
+    """
+
+    def make(laws: Laws) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+        if not method.nonsmooth:
+            return fixed_batch(Program(system, laws, inputs=held), method, device)
+        stepper, smooth = moreau_stepper(system), smooth_question(Question(system, laws)).laws
+        program = Program(stepper.smooth, smooth, memory=method_state_size(stepper), inputs=held)
+        return compiled_batch(stepper, program, device)
+
+    return machine_code(system, method, (held, device), make)
+
+
+def machine_code(system: System, method: Integrator, kind: tuple, make: Callable[[Laws], T]) -> T:
+    """Machine code of the steps, cached with the system.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled.
+    """
+    laws = Laws(system)
+    BATCHES.plan(Question(system, laws, method=method))
+    return cached_on_disk(system, (machine_code, method_key(method), kind, laws.key), lambda: make(laws))

@@ -1,0 +1,245 @@
+"""Batch of simulators: motions that Python advances together, in SIMD code, each with inputs of its own."""
+
+import numpy as np
+
+from gauss.arguments import named_arguments
+from gauss.codegen import Kernel, one_tier
+from gauss.dynamics.compile_scene import compile_scene
+from gauss.dynamics.conditions import smooth_question
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.outputs import output_function, shape_of, split
+from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.traced_system import Program
+from gauss.errors import SimulationError, StateError, did_you_mean, require
+from gauss.scene import Scene
+from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
+from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
+from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code
+from gauss.simulation.simulator import Simulator, SimulatorState, checked_count
+from gauss.simulation.tolerances import check_tolerances
+from gauss.system import State, System, retract
+
+
+class SimulatorBatch:
+    """Motions of a scene in fixed steps, all in one call; see :class:`gauss.Simulator`.
+
+    Parameters
+    ----------
+    scene : Scene or System
+        Scene, or a compiled one. Its inputs are set by :meth:`step`.
+    step : float
+        Step [s].
+    batch : int
+        Number of motions.
+    integrator : str, optional
+        "rk4", "semi_implicit_euler" or "time_stepping"; the last for scenes with contacts, friction or limited forces, "rk4"
+        for all others when not given.
+    threads : int
+        Threads that share the motions; the results do not depend on it.
+
+    Attributes
+    ----------
+    system : System
+        The system.
+    step_size : float
+        Step [s].
+    inputs, output_names : tuple of str
+        Names of the inputs and of the outputs of the scene.
+    diverged : ndarray of bool, shape (batch,)
+        Motions that diverged or cannot continue; their states are not finite until they begin anew.
+    unconfirmed : ndarray of bool, shape (batch,)
+        Motions whose accelerations or loop constraints a check did not confirm: the step is too long for them.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such method, or the scene cannot be compiled, with the reasons.
+
+    Examples
+    --------
+    >>> import gauss, numpy as np
+    >>> scene = gauss.load("cart_pole")
+    >>> scene.input("push", "rail", limits=10.0).name
+    'push'
+    >>> many = gauss.SimulatorBatch(scene, step=1e-3, batch=3)
+    >>> many.step([[-1.0], [0.0], [1.0]], n=100)
+    >>> np.sign(many.v[:, 0])
+    array([-1.,  0.,  1.])
+    """
+
+    @named_arguments
+    def __init__(self, scene: Scene | System, step: float, batch: int, integrator: str | None = None, threads: int = 1):
+        require(scene, (Scene, System), "SimulatorBatch")
+        check_tolerances(step=step)
+        self.system = system = compile_scene(scene) if isinstance(scene, Scene) else scene
+        whole, self.step_size, self.threads = system.scene, float(step), checked_count("threads", threads)
+        self.inputs, self.output_names = tuple(whole.inputs), tuple(whole.outputs)
+        self.integrator = integrator or ("time_stepping" if whole.nonsmooth else "rk4")
+        if self.integrator not in STEPPED:
+            raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(self.integrator, STEPPED)}")
+        method = STEPPED[self.integrator]
+        with one_tier():
+            self._loop = fixed_step_code(system, method, bool(self.inputs))
+            self._measure = _outputs(system, bool(self.inputs), method.nonsmooth)
+        self._start, self._size = system.initial_state(), checked_count("batch", batch)
+        self._u = np.zeros((self._size, 1, len(self.inputs)))
+        self._alone: Simulator | None = None
+        self.reset()
+
+    @property
+    def has_time_laws(self) -> bool:
+        """Whether loads or constraints of the scene have laws, which may depend on time."""
+        return bool(Laws(self.system).functions) or self.system.relations.asks_time
+
+    def __len__(self):
+        return self._size
+
+    def reset(self, q=None, v=None, *, seed: int | None = None, spread: float = 0.05):
+        """Begin all motions anew; inputs are zero until the next step.
+
+        Parameters
+        ----------
+        q, v : array_like, shape (batch, n_q), (batch, n_v), optional
+            Initial states that meet the constraints; those of the scene when not given.
+        seed : int, optional
+            Seed of random changes of these states: displacements and rates are uniform up to ``spread``.
+        spread : float
+            Largest random change of coordinates [rad, m] and of rates [rad/s, m/s].
+
+        Raises
+        ------
+        StateError
+            If the states have wrong shapes, or violate the constraints.
+        """
+        starts = columns(self.system, *(_tiled(*pair, self._size) for pair in ((self._start.q, q), (self._start.v, v))))
+        if starts.shape[1] != self._size:
+            raise StateError(f"reset: expected the states of {self._size} motions, got {starts.shape[1]}.")
+        if seed is not None:
+            rng = np.random.default_rng(seed)
+            starts = np.array([self._changed(start, rng, spread) for start in starts.T]).T
+        self._batch, self._steps = FixedStepBatch(self._loop, starts), 0
+        refuse_inconsistent(self.system, starts, self._batch.residual)
+        self._u[:] = 0.0
+        self.diverged, self.unconfirmed = np.zeros((2, self._size), dtype=bool)
+
+    def restart(self, which, q, v):
+        """Begin some motions anew, of a scene without laws of time.
+
+        Parameters
+        ----------
+        which : array_like of int or bool
+            Motions.
+        q, v : array_like, shape (k, n_q), (k, n_v)
+            Their initial states, consistent.
+        """
+        if self.has_time_laws:
+            raise SimulationError(f"scene {self.system.scene.name!r} has laws of time or state; reset all motions.")
+        starts, chosen = columns(self.system, q, v), np.arange(self._size)[which]
+        fresh = FixedStepBatch(self._loop, starts)
+        refuse_inconsistent(self.system, starts, fresh.residual)
+        fresh.points[0] = self.t
+        self._batch.points[:, chosen] = fresh.points[:, : starts.shape[1]]
+        self.diverged[chosen] = self.unconfirmed[chosen] = False
+
+    def _changed(self, start: np.ndarray, rng: np.random.Generator, spread: float) -> np.ndarray:
+        """Random neighbour (n_q + n_v,) of a state that meets the constraints."""
+        (q, v), change = np.split(start, [self.system.n_q]), rng.uniform(-spread, spread, (2, self.system.n_v))
+        state = self.system.projected(State(0.0, retract(self.system, q, change[0]), v + change[1]))
+        return np.concatenate([state.q, state.v])
+
+    def step(self, u=None, n: int = 1):
+        """Make steps of all motions under values of the inputs.
+
+        Parameters
+        ----------
+        u : array_like, shape (batch, n_u), optional
+            Values of the inputs of each motion [N m, N], cut off at their limits; the last ones when not given.
+        n : int
+            Number of steps.
+
+        Raises
+        ------
+        SimulationError
+            If a value is not finite, or a shape is wrong; nothing changes.
+        """
+        n = checked_count("n", n)
+        if u is not None:
+            self._set(u)
+        batch, before = self._batch, self._batch.points.copy() if self.system.nonsmooth else None
+        batch.worst[:] = 0.0
+        batch.advance(self._steps, n, self.step_size, self.threads, self._u if self.inputs else None)
+        self._steps += n
+        finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
+        confirmed = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
+        if before is None:
+            self.unconfirmed |= finite & ~confirmed
+        else:
+            for k in map(int, np.flatnonzero((finite & ~confirmed) | ~solved)):
+                finite[k] = not self.diverged[k] and self._repeated(k, before[:, k], n)
+        self.diverged |= ~finite
+
+    def _set(self, u):
+        given = np.asarray(u, dtype=float)
+        if given.shape != (self._size, len(self.inputs)) or not np.isfinite(given).all():
+            raise SimulationError(
+                f"u: expected finite numbers of shape ({self._size} motions, {len(self.inputs)} inputs), got {given.shape}."
+            )
+        self._u[:, 0] = given
+
+    def _repeated(self, k: int, before: np.ndarray, n: int) -> bool:
+        """Whether a simulator makes the steps of a motion whose contact problem the batch does not solve."""
+        if self._alone is None:
+            self._alone = Simulator(self.system, self.step_size, self.integrator)
+        alone = self._alone
+        alone.reset()
+        alone.restore(SimulatorState(before.tobytes(), alone.snapshot().control, 0.0, self._steps - n))
+        try:
+            alone.step(self._u[k, 0] if self.inputs else None, n)
+        except SimulationError:
+            self._batch.points[1:, k] = np.nan
+            return False
+        self._batch.points[:, k] = np.frombuffer(alone.snapshot().point)
+        return True
+
+    @property
+    def t(self) -> float:
+        """Time [s]."""
+        return self._steps * self.step_size
+
+    @property
+    def q(self) -> np.ndarray:
+        """Coordinates (batch, n_q), a copy."""
+        return self._batch.reached[: self.system.n_q].T.copy()
+
+    @property
+    def v(self) -> np.ndarray:
+        """Rates (batch, n_v), a copy."""
+        return self._batch.reached[self.system.n_q :].T.copy()
+
+    @property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """Values (batch, …) of the outputs of the scene."""
+        outputs, found = self.system.scene.outputs, split(self.output_vectors(), self.system.scene)
+        return {name: values.reshape(-1, *shape_of(outputs[name], self.system)) for name, values in found.items()}
+
+    def output_vectors(self) -> np.ndarray:
+        """Values (batch, m) of all outputs in a row."""
+        points = self._batch.points.copy()
+        points[len(points) - len(self.inputs) :, : self._size] = self._u[:, 0].T
+        return self._measure(points)[:, : self._size].T
+
+
+def _tiled(own: np.ndarray, given, batch: int):
+    return np.tile(own, (batch, 1)) if given is None else given
+
+
+def _outputs(system: System, held: bool, nonsmooth: bool) -> Kernel:
+    """Machine code of points → values of all outputs; accelerations of contacts are means over the last step."""
+    ask = smooth_question(Question(system, Laws(system))) if nonsmooth else Question(system, Laws(system))
+    memory = contact_state_size(system) if nonsmooth else 0
+    program = Program(ask.system, ask.laws, memory=memory, inputs=held)
+    make = lambda: Kernel(output_function(program, system.scene, nonsmooth))  # noqa: E731
+    return cached_on_disk(ask.system, (_outputs, ask.laws.key, held, nonsmooth), make, system)
