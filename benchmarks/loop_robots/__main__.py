@@ -130,11 +130,15 @@ def _motion(robot: Robot, seconds: float) -> dict:
     system = gauss.compile_scene(scene)
     times, begin = np.linspace(0.0, seconds, SAMPLES), time.process_time()
     start = robot.instants()[0].state
-    motion = gauss.simulate(system, seconds, state=start, times=times, rtol=1e-10, progress=False)
+    try:
+        motion = gauss.simulate(system, seconds, state=start, times=times, rtol=1e-10, progress=False)
+    except gauss.SimulationError as error:
+        print(robot.name, error, flush=True)
+        motion = error.trajectory
     spent = time.process_time() - begin
     states = [system.state(q, v) for q, v in zip(motion.q, motion.v, strict=True)]
     residuals = [relative(system, position_residual_of(system, state)) for state in states]
-    return {"drift": max(residuals), "motion": spent}
+    return {"drift": max(residuals), "moved_until": float(motion.t[-1]), "motion": spent}
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from math import inf
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.builder import SceneBuilder, name_of
-from gauss.scene.joint import Joint
 from gauss.scene.loads import Drive, Force
 
 # What an output measures → the kind of element that it is measured of, and the number of its values; 0: that of the element.
