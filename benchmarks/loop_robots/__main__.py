@@ -49,7 +49,7 @@ TIMEOUT = 300  # s of a process
 MOVED = (  # robots whose motion is followed
     *("four_bar", "planar_leg_linkage", "revolute_rotor_chain", "mini_cheetah_leg", "mit_humanoid_leg"),
     *(
-        "four_bar_branch_1_1",
+        "Explicit/depth5/loop_size6",
         "revolute_rotor_branch_1_2",
         "Implicit/depth5/loop_size5",
         "5bar_linkage",
