@@ -6,6 +6,7 @@ import pytest
 
 import gauss
 from benchmarks.foreign_accelerations import deviation
+from gauss.codegen.content_digest import content_digest
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError, NotImportedWarning
 from gauss.simulation.held_inputs import driven_as
@@ -117,6 +118,14 @@ def test_elements_accelerate_as_in_mujoco(tmp_path, name):
 def test_held_tendons_accelerate_as_in_mujoco(tmp_path, name):
     path = _file(tmp_path, *HELD[name])
     assert deviation(path, quietly(path)) < CLOSED
+
+
+@pytest.mark.parametrize("name", ELEMENTS | HELD)
+def test_machine_code_of_elements_is_kept_by_their_content(tmp_path, name):
+    """Laws that hold the model of MuJoCo would have no digest, and be compiled in every process."""
+    path = _file(tmp_path, *(ELEMENTS | HELD)[name])
+    one, other = content_digest(quietly(path)), content_digest(quietly(path))
+    assert one is not None and one == other
 
 
 def test_friction_of_balls_and_free_joints_is_read(tmp_path):

@@ -24,7 +24,7 @@ from gauss.io.mjcf.passive import add_ball_armature, add_compensation, add_passi
 from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, WELD, is_closed, left_out, refused
 from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
-from gauss.io.mjcf.tendon_path import TendonPath
+from gauss.io.mjcf.tendon_path import tendon_path
 from gauss.io.mjcf.tendons import add_tendon, couple_tendons, hold_tendon
 from gauss.io.mjcf.touching import add_contacts, add_stops
 from gauss.io.numbers import bounds
@@ -212,11 +212,11 @@ class _MjcfReader:
 
     def _of_tendons(self, scene: Scene, name: str, one: int, other: int, data):
         """A tendon that keeps its length, or is as long as another; lengths count from the pose of the file."""
-        path = TendonPath(self.named, one)
+        path = tendon_path(self.named, one)
         if other < 0:
             hold_tendon(scene, name, path, float(data[0]))
         else:
-            couple_tendons(scene, name, path, TendonPath(self.named, other), data[:5].tolist())
+            couple_tendons(scene, name, path, tendon_path(self.named, other), data[:5].tolist())
 
     def _weld(self, scene: Scene, name: str, i: int, one: int, other: int, data):
         """A weld at another pose than that of the file, or of points alone: p₁ = p₂, R₁ R = R₂."""

@@ -18,7 +18,7 @@ from gauss.io.mjcf.actuators import (
 )
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
 from gauss.io.mjcf.start import START, key_of
-from gauss.io.mjcf.tendon_path import TendonPath
+from gauss.io.mjcf.tendon_path import tendon_path
 from gauss.io.mjcf.transmissions import JOINT as ON_JOINT
 from gauss.io.mjcf.transmissions import JOINT_IN_PARENT, ActuatorTransmission, transmission
 
@@ -98,7 +98,7 @@ def _unlimited(named: Named, stops: bool) -> list[tuple[str, list[str]]]:
     limited = np.flatnonzero(model.jnt_limited).tolist()
     if stops:
         return [("limits of ball joints", [named.joints[i] for i in limited if named.kinds[i] not in SCALAR])]
-    tied = [named.name("tendon", i) for i in np.flatnonzero(model.tendon_limited).tolist() if TendonPath(named, i).is_fixed]
+    tied = [named.name("tendon", i) for i in np.flatnonzero(model.tendon_limited).tolist() if tendon_path(named, i).is_fixed]
     joints = [named.joints[i] for i in limited]
     return [("limits, kept for the assembly of a start only, of joints", joints), ("limits of tendons", tied)]
 
@@ -145,7 +145,7 @@ def _of_joint(named: Named, i: int) -> list[str]:
 
 def _against_tendon(named: Named, i: int) -> str:
     """Why a tendon has no counterpart; empty if it has one."""
-    model, path = named.model, TendonPath(named, i)
+    model, path = named.model, tendon_path(named, i)
     if not path.is_read:
         return "it is wrapped around geoms; lead it over sites"
     if model.tendon_frictionloss[i] and not (path.is_fixed and len(path.terms) == 1):
@@ -161,7 +161,7 @@ def _against_equality(named: Named, i: int) -> str:
         scalar = all(named.kinds[j] in SCALAR for j in ends if j >= 0)
         return "" if scalar else "a joint has several freedoms"
     if kind == TENDON:
-        return "" if all(TendonPath(named, j).is_read for j in ends if j >= 0) else "it holds a tendon wrapped around geoms"
+        return "" if all(tendon_path(named, j).is_read for j in ends if j >= 0) else "it holds a tendon wrapped around geoms"
     if kind not in (CONNECT, WELD):
         return "only connect, weld, joint and tendon are read"
     if int(model.eq_objtype[i]) not in (BODY, SITE):
