@@ -78,6 +78,15 @@ ELEMENTS = {
     "at a ball": acting('<motor name="m" joint="B" gear="0.1 0.2 0.3"/>', FREE.format("", "")),
     "of the name of a tendon": acting('<motor name="t" joint="h"/>', more=PATH.format('stiffness="2"', "")),
     "two at one joint": acting('<motor name="m" joint="h"/><position name="n" joint="h" kp="2"/>'),
+    "no passive forces": (
+        arm(a=' gravcomp="1"', h=f" {SOFT}"),
+        "",
+        '<option density="1.2" wind="1 2 3"><flag spring="disable" damper="disable"/></option>',
+    ),
+    "gravcomp by actuators": (
+        arm(a=' gravcomp="1"', b=' gravcomp="1"', h=' actuatorgravcomp="true"'),
+        '<actuator><motor name="m" joint="h"/></actuator>',
+    ),
     "a switch": (*acting('<motor name="m" joint="h"/>'), '<option><flag actuation="disable"/></option>'),
 }
 WELD = '<equality><weld body1="a" body2="w" {}/></equality>'

@@ -18,6 +18,7 @@ from gauss.io.mjcf.actuators import (
 )
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
 from gauss.io.mjcf.start import START, key_of
+from gauss.io.mjcf.switches import is_off
 from gauss.io.mjcf.tendon_path import tendon_path
 from gauss.io.mjcf.transmissions import JOINT as ON_JOINT
 from gauss.io.mjcf.transmissions import JOINT_IN_PARENT, ActuatorTransmission, transmission
@@ -42,8 +43,18 @@ def refused(named: Named, contacts: bool = False) -> list[str]:
     """Everything that moves the mechanism and has no counterpart."""
     model, found = named.model, []
     found += [f"flexible body {i}" for i in range(model.nflex)]
+    found += _compensated(named)
     parts = [*_of_joints(named), *_curved(named), *_without_counterpart(named, contacts)]
     return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
+
+
+def _compensated(named: Named) -> list[str]:
+    """Gravity compensation that MuJoCo counts to the actuators of a joint, and then does not apply, or not in full."""
+    model = named.model
+    counted = np.flatnonzero(model.jnt_actgravcomp) if model.body_gravcomp.any() else np.zeros(0, dtype=int)
+    silent = not len(actuators(model)) or is_off(model, "ACTUATION")
+    lost = [named.joints[j] for j in counted.tolist() if silent or model.jnt_actfrclimited[j]]
+    return [f"gravity compensation that counts to the actuators (actuatorgravcomp) of joint {name!r}" for name in lost]
 
 
 def _of_joints(named: Named) -> Iterator[Finding]:
@@ -188,6 +199,8 @@ def _against_actuator(named: Named, i: int) -> str:
         return "only actuators of joints, of tendons over sites, and of sites beside none or one of the ground are read"
     if n_controls(model, i) > 1:
         return "it has several controls"
+    if np.any(getattr(model, "actuator_delay", np.zeros(i + 1))[i]):
+        return "its control is delayed"
     if not has_affine_force(model, i):
         return "its force is not affine"
     if has_state(model, i) and control(model, i):
