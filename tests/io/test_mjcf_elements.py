@@ -93,6 +93,10 @@ WELD = '<equality><weld body1="a" body2="w" {}/></equality>'
 POINT = '<body name="w" pos="1 0 1"><freejoint/><geom size="0.1" pos="0.1 0 0"/></body>'
 HELD = {
     "weld at another pose": (arm() + POINT, WELD.format('relpose="0.7 0.1 0.3 0.8 0.6 0 0" anchor="0.1 0.2 0"')),
+    "weld of sites, at another pose": (
+        arm() + POINT.replace("<freejoint", '<site name="e" pos="0 0 0.1" euler="10 0 0"/><freejoint'),
+        '<equality><weld site1="r" site2="e"/></equality>',
+    ),
     "weld without torque": (arm() + POINT, WELD.format('torquescale="0"')),
     "path": (arm(), PATH.format("", "") + '<equality><tendon tendon1="t" polycoef="0.05 0 0 0 0"/></equality>'),
     "path by a sum": (

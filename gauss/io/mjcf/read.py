@@ -220,10 +220,11 @@ class _MjcfReader:
 
     def _weld(self, scene: Scene, name: str, i: int, one: int, other: int, data):
         """A weld at another pose than that of the file, or of points alone: p₁ = p₂, R₁ R = R₂."""
-        ends = [(body, np.zeros(3), np.eye(3)) for body in (self.bodies[one], self.bodies[other])]
         if int(self.model.eq_objtype[i]) == SITE:
             ends = [(self.bodies[int(self.model.site_bodyid[s])], *_site_pose(self.model, s)) for s in (one, other)]
             data = np.array([*np.zeros(6), 1.0, 0.0, 0.0, 0.0, data[10]])
+        else:
+            ends = [(self.bodies[body], np.zeros(3), np.eye(3)) for body in (one, other)]
         (first, p_1, R_1), (second, p_2, R_2) = ends
         at, other_at = p_1 + R_1 @ data[3:6], p_2 + R_2 @ data[:3]
         if not data[10]:  # no torque
