@@ -66,7 +66,7 @@ def main():
     given = parser.parse_args()
     if given.report:
         path = RESULTS / "maros_meszaros.csv"
-        write_page(_read(path), header_of(path), given.most)
+        write_page(read_pairs(path), header_of(path), given.most)
         return
     theirs = published(given.folder / "results" / "qpbenchmark_results.csv")
     solvers = sorted(set(contestants()) & {solver for solver, *_ in theirs})
@@ -110,7 +110,7 @@ def verdicts(path: Path) -> list[dict]:
     return [_judged(row | {"outcome": "answered", "error": np.nan, "backend": row["solver"]}) for row in read_table(path)]
 
 
-def _read(path: Path) -> list[tuple[dict, dict]]:
+def read_pairs(path: Path) -> list[tuple[dict, dict]]:
     """Rows of the table that was written, ours beside the published ones."""
     rows = []
     for row in read_table(path):

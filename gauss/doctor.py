@@ -5,14 +5,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from gauss.analysis.crosscheck import crosscheck
 from gauss.backends import available
 from gauss.backends.backend import BACKENDS
 from gauss.bench.machine import header
 from gauss.codegen import cache_size, file_trust, object_cache, trace
 from gauss.codegen.cpython_layout import is_known
+from gauss.codegen.gpu.cuda import device_names
+from gauss.codegen.gpu.devices import device
 from gauss.codegen.machine import width
 from gauss.codegen.optimiser import OPTIMISER
+from gauss.errors import DeviceError, MissingPackageError
 from gauss.io import load
 from gauss.simulation import simulate
 from gauss.versions import DISTRIBUTION, version_of
@@ -26,6 +31,7 @@ EXTRAS = {
     "sweep": ("zarr", "loky"),
     "cluster": ("distributed",),
     "docs": ("pdoc",),
+    "cuda": ("cuda-bindings",),
     "robots": ("example-robot-data",),
     "mjcf": ("mujoco",),
     "peers": ("scikit-sundae", "mujoco"),
@@ -58,7 +64,8 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Look at everything; a check that raises is a finding, not an error."""
-    checks = {"machine code": _machine_code, "calls": _calls, "cache": _cache, "solvers": _solvers, "a motion": _motion}
+    checks = {"machine code": _machine_code, "calls": _calls, "cache": _cache, "GPU": _gpu}
+    checks |= {"solvers": _solvers, "a motion": _motion}
     return [*_environment(), *(_tried(name, check) for name, check in checks.items()), *_extras()]
 
 
@@ -129,6 +136,19 @@ def _solvers() -> Finding:
     missing = [name for name in SOLVERS if name not in found]
     text = f"{len(BACKENDS)} methods of gauss; {len(found)} QP solvers: {', '.join(found)}"
     return Finding("solvers", text, f"for {', '.join(missing)}: pip install 'qpsolvers[NAME]'" if missing else "")
+
+
+def _gpu() -> Finding:
+    try:
+        names = device_names()
+    except (DeviceError, MissingPackageError) as error:
+        return Finding("GPU", f"none: {error}")
+    if not names:
+        return Finding("GPU", "none: the driver of NVIDIA has no device")
+    found = device("cuda").put(np.ones(1)).numpy()
+    if found != [1.0]:
+        return Finding("GPU", f"{', '.join(names)}: numbers do not come back", "restart the driver of NVIDIA", False)
+    return Finding("GPU", ", ".join(f"cuda:{number} {name}" for number, name in enumerate(names)))
 
 
 def _motion() -> Finding:

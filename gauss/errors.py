@@ -133,6 +133,10 @@ class PainleveWarning(UserWarning):
     """Rigid bodies with Coulomb friction have no accelerations, or several (Painlevé): the motion is one of many."""
 
 
+class ContactLawWarning(UserWarning):
+    """Steps with contacts did not meet the laws of contact and friction to the tolerance."""
+
+
 def did_you_mean(name: str, existing: Iterable[str]) -> str:
     """Sentence that helps with an unknown name: the nearest one, then all that exist."""
     from difflib import get_close_matches  # few runs need it

@@ -20,5 +20,6 @@ Settings of the peers:
   error control, ``target_accuracy`` from 1e-3 on, steps of up to a tenth of the duration; laws of drives as its symbolic
   expressions; balls by roll, pitch and yaw. Trees only: in continuous time it has no constraints.
 * heyoka: Taylor's method in double precision, on the accelerations as gauss traces them, without projection; straight-line
-  code where these are short. Its time is that of ``propagate_until`` alone, that of gauss a whole ``gauss.simulate``.
+  code where these are short. Its time is that of ``propagate_until`` alone, that of gauss a whole ``gauss.simulate``, or, of
+  methods marked "prepared", a call of what ``gauss.prepare`` returns.
 """

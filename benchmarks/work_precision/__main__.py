@@ -10,7 +10,7 @@ import time  # noqa: E402
 import benchmarks.work_precision as work_precision  # noqa: E402
 import gauss  # noqa: E402
 from benchmarks.command import RESULTS, about  # noqa: E402
-from benchmarks.work_precision import peers, report  # noqa: E402
+from benchmarks.work_precision import peers, prepared, report  # noqa: E402
 from benchmarks.work_precision.reference import find  # noqa: E402
 from benchmarks.work_precision.scenes import CASES, TimedScene  # noqa: E402
 from gauss.bench.precision import attempts  # noqa: E402
@@ -44,11 +44,14 @@ def _measure(case: TimedScene, table: "report.AttemptTable", patience: float):
     methods = [*METHODS, *SUNDIALS] if system.n_v <= WIDE else EXPLICIT
     wanted = [method for method in methods if not table.has_method(case.name, "gauss", method)]
     lacking = [engine for engine, (_, _, own) in peers.ENGINES.items() if not table.has_method(case.name, engine, own[-1])]
-    if not wanted and not lacking:
+    ready = [one for one in prepared.METHODS if not table.has_method(case.name, "gauss", prepared.name_of(one))]
+    if not (wanted or lacking or ready):
         return
     against = find(case, system)
     for method in wanted:
         table.add(case.name, list(attempts(system, case.duration, against, [method], patience)), against.source)
+    for one in prepared.attempts(case, system, against, patience, ready):
+        table.add(case.name, [one], against.source)
     known = lambda engine, method, setting: table.has_method(case.name, engine, method)  # noqa: E731
     for one in peers.attempts(case, system, against, patience, known):
         table.add(case.name, [one], against.source)

@@ -44,7 +44,7 @@ def section(scenes: dict[str, list[Attempt]], header: list[str]) -> str:
     return "\n".join([BEGIN, "", *(f"- {line}" for line in header), "", *beaten(scenes), "", END])
 
 
-def rewrite(readme: Path, text: str):
-    """Put a section where the marks are."""
-    before, rest = readme.read_text(encoding="utf-8").split(BEGIN)
-    readme.write_text(before + text + rest.split(END)[1], encoding="utf-8")
+def rewrite(readme: Path, text: str, begin: str = BEGIN, end: str = END):
+    """Put a section where its marks are."""
+    before, rest = readme.read_text(encoding="utf-8").split(begin)
+    readme.write_text(before + text + rest.split(end)[1], encoding="utf-8")

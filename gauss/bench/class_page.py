@@ -5,7 +5,7 @@ import numpy as np
 from gauss.bench.classes import problems_of, story_of
 from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, is_answered, of_special_form, special_cells
 from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
-from gauss.bench.markdown import head, number, share, table
+from gauss.bench.markdown import count_of, head, number, share, table
 from gauss.bench.measure import OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
@@ -145,7 +145,8 @@ def _special_board(rows: list[dict], named: list[str], solvable: bool) -> list[s
     if not rows:
         return []
     mine, overall, panels = ordered(cells(rows)), *fronts(rows)[1:]
-    title = f"Leaderboard of the {len(set(row['problem'] for row in rows))} problems that solvers of a special form take"
+    taken = count_of(len({row["problem"] for row in rows}), "problem")
+    title = f"Leaderboard of the {taken} that solvers of a special form take"
     return _board(title, mine, solvable) + _sentences(named, mine, overall, panels)[2:]
 
 

@@ -5,15 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.bench.instances import GROUPS, Instance, group_of, of_selection
+from gauss.bench.instances import GROUPS, MAIN_FORM, Instance, group_of, of_selection
+from gauss.bench.levels import MAIN_LEVEL
 from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
-from gauss.bench.qp import NAME, compare
+from gauss.bench.qp import NAME, compare, quick_backends
 from gauss.bench.suite import CLASSES, recipes
 from gauss.bench.suite_instances import SUITE, of_suite, suite_class
 from gauss.bench.table import ResultTable
 
-FEW = 8  # problems of a class in a quick run, evenly spread
+FEW = 8  # problems of a class in a quick run, and of levels other than the main one, evenly spread
+OTHER_LEVELS = ("low", "mid")
+LARGE = "large"  # class whose problems take solvers seconds each
 TOGETHER = {"friction": ("cones", "coulomb")}  # names of several classes
 STORIES = {
     "equality": "Accelerations of open and closed mechanisms: equality rows alone.",
@@ -23,7 +26,16 @@ STORIES = {
 
 
 def compare_class(
-    folder: Path, kind: str, *, problems: Iterable[str] | None = None, quick: bool = False, **how
+    folder: Path,
+    kind: str,
+    *,
+    problems: Iterable[str] | None = None,
+    quick: bool = False,
+    backends: Iterable[str] | None = None,
+    forms: Iterable[str] | None = None,
+    levels: Iterable[str] | None = None,
+    fresh: bool = False,
+    **how,
 ) -> ResultTable:
     """Measure a class of the selection or of the suite, and return its table, ``qp_<class>.csv``.
 
@@ -37,8 +49,15 @@ def compare_class(
         Only these of its problems.
     quick : bool
         No more than eight problems, unless they are named.
+    backends, forms : sequence of str, optional
+        As for :func:`gauss.bench.qp.compare`; when not given, the form of the pages, and in classes of the suite no solvers
+        that compile for every size of problem.
+    levels : sequence of str, optional
+        When not given, level high of all problems, and low and mid of eight; of "large" high alone.
+    fresh : bool
+        Measure again what has been measured.
     **how
-        Backends, forms, levels, solvers, workers, fresh and progress, as for :func:`gauss.bench.qp.compare`.
+        Solvers, workers and progress, as for :func:`gauss.bench.qp.compare`.
 
     Raises
     ------
@@ -48,9 +67,14 @@ def compare_class(
     chosen([kind], (*GROUPS, *SUITE), "class")
     names = problems_of(kind)
     wanted = chosen(problems, names, f"problem of class {kind!r}")
-    if quick and not problems:
-        wanted = spread(wanted)
-    return compare(folder, instances=_instances(kind, wanted), name=name_of(kind), **how)
+    few = wanted if problems else spread(wanted)
+    how |= {"forms": forms or (MAIN_FORM,), "backends": backends or (quick_backends() if kind in SUITE else None)}
+    how |= {"name": name_of(kind)}
+    main = few if quick else wanted
+    table = compare(folder, instances=_instances(kind, main), levels=levels or (MAIN_LEVEL,), fresh=fresh, **how)
+    if levels is None and kind != LARGE:
+        table = compare(folder, instances=_instances(kind, few), levels=OTHER_LEVELS, **how)
+    return table
 
 
 def classes_named(kinds: Iterable[str]) -> list[str]:

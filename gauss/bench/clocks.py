@@ -107,7 +107,7 @@ def median_times(times: list[Times], seconds: list[float]) -> dict:
 
 # Solvers whose libraries report no time of their own; that around the call of the library, as qpsolvers takes it, stands
 # for it.
-AROUND = ("cvxopt", "gurobi", "highs", "jaxopt_osqp", "kvxopt", "qpax", "qtqp", "quadprog", "sip")
+AROUND = ("cvxopt", "gurobi", "highs", "kvxopt", "qpax", "qtqp", "quadprog", "sip")
 COMPILING = ("jaxopt_osqp", "qpax")  # solvers that compile for every size of problem in their first call
 UNITS = {"proxqp": 1e-6, "scs": 1e-3}  # of the times that are reported, where these are not seconds
 

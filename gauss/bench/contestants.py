@@ -11,7 +11,7 @@ import qpsolvers
 
 from gauss.backends import qpsolvers_
 from gauss.backends.programme import Outcome, Programme, Programmed, checked_outcome
-from gauss.bench import casadi_, clocks, conic, coulomb, mujoco_
+from gauss.bench import casadi_, clocks, conic, coulomb, jaxopt_, mujoco_
 from gauss.bench.instances import FILE, Instance
 from gauss.bench.levels import settings
 from gauss.bench.ready import Ready
@@ -57,6 +57,8 @@ def ready(solver: str, programme: Programme, level: str) -> Ready:
     if solver in (*casadi_.SOLVERS, *casadi_.STAGEWISE):
         return casadi_.ready(solver, programme, chosen)
     problem = qpsolvers_.converted(programme, solver)
+    if solver == jaxopt_.SOLVER:
+        return jaxopt_.ready(problem, chosen)
     return Ready(
         lambda: qpsolvers.solve_problem(problem, solver, **chosen),
         lambda found: _read(found, solver, problem, chosen),

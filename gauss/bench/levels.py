@@ -77,12 +77,14 @@ class SolverPolicy:
 # tolerances of feasibility, and those of Clarabel, QTQP and Fatrop, are of residuals divided by the norms of the data. The
 # clocks of PIQP and ProxQP run only if a setting asks for it. Those of HPIPM are tolerances of stationarity, of the
 # dynamics, of bounds and of complementarity row by row; Fatrop's is of all of these, scaled. Solvers of MuJoCo have a
-# tolerance of second order, of the cost; quadprog, qpOASES and Newton's method of gauss's time stepping have none to set.
+# tolerance of second order, of the cost; quadprog, qpOASES and Newton's method of gauss's time stepping have none to set,
+# and qpbenchmark sets none for COPT and MOSEK.
 POLICIES = {
     "admm": SolverPolicy({"iterations": FIRST_ORDER, "seconds": LIMIT}, ("tolerance",), has_gap=True),
     "clarabel": SolverPolicy(
         {"time_limit": WALL_LIMIT, "max_iter": INTERIOR_POINT}, beyond=("time_limit",), has_gap=True, is_relative=True
     ),
+    "copt": SolverPolicy(has_tolerance=False),
     "cvxopt": SolverPolicy({"maxiters": INTERIOR_POINT}, beyond=("abstol", "reltol"), has_gap=True, is_relative=True),
     "daqp": SolverPolicy({"time_limit": WALL_LIMIT, "iter_limit": ACTIVE_SET}, beyond=("time_limit",)),
     "ecos": SolverPolicy(
@@ -95,6 +97,7 @@ POLICIES = {
     "hpipm": SolverPolicy({"iter_max": INTERIOR_POINT}, ("res_g_max", "res_b_max", "res_d_max", "res_m_max")),
     "jaxopt_osqp": SolverPolicy({"maxiter": FIRST_ORDER}),
     "kvxopt": SolverPolicy({"maxiters": INTERIOR_POINT}, beyond=("abstol", "reltol"), has_gap=True, is_relative=True),
+    "mosek": SolverPolicy(has_tolerance=False),
     "mujoco_cg": SolverPolicy({"iterations": ACTIVE_SET}, has_tolerance=False),
     "mujoco_newton": SolverPolicy({"iterations": ACTIVE_SET}, has_tolerance=False),
     "mujoco_pgs": SolverPolicy({"iterations": ACTIVE_SET}, has_tolerance=False),

@@ -45,6 +45,11 @@ def number(value: float) -> str:
     return f"{value:.0e}" if np.isfinite(value) else "–"
 
 
+def count_of(number: int, noun: str) -> str:
+    """Number of things: "1 problem", "2 problems"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def share(value: float) -> str:
     """Share in percent."""
     return f"{value:.0%}" if np.isfinite(value) else ""

@@ -34,6 +34,7 @@ FINEST = 1e-14
 STEPS = 2**14  # of the finest run from which time stepping is extrapolated
 AUTO = "auto"  # gauss's own choice among the backends
 SENTENCE = 120  # letters of a reason, at most
+FEWEST, SLOW = 3, 10.0  # settings of a backend, and times of the limit that one of these may take
 REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the least time counts
 
 
@@ -141,6 +142,8 @@ def attempts(
 ) -> Iterator[Attempt]:
     """Motions by all methods with settings from coarse to fine, until a run takes longer than ``time_limit`` [s].
 
+    Backends get three settings at least, so that there is a curve, unless a run takes ten times as long.
+
     Parameters
     ----------
     scene : Scene or System
@@ -169,10 +172,10 @@ def attempts(
     against = reference(system, duration) if against is None else against
     methods = methods or usual(system)[: 1 if backends else None]
     for method, backend in product(methods, backends or (None,)):
-        for setting in settings(method, duration):
+        for count, setting in enumerate(settings(method, duration), start=1):
             found = attempt(system, duration, method, setting, against, time_limit, backend)
             yield found
-            if found.seconds > time_limit:
+            if found.seconds > time_limit * (1.0 if backend is None or count >= FEWEST else SLOW):
                 break
 
 

@@ -49,7 +49,7 @@ PACKAGES = tuple(
 
 
 def quick_backends() -> list[str]:
-    """Backends of a quick comparison: those that do not compile for every problem."""
+    """Backends of a quick comparison and of classes of the suite: those that do not compile for every size of problem."""
     return [name for name in (AUTO, *BACKENDS, *everyone()) if name not in COMPILING]
 
 

@@ -4,16 +4,23 @@ import numpy as np
 import qpsolvers
 
 from gauss.backends.accuracy import DEFAULT_TOLERANCE, KEPT, own_settings
-from gauss.bench import casadi_, coulomb, mujoco_
+from gauss.bench import casadi_, coulomb, jaxopt_, mujoco_
 from gauss.bench.clocks import AROUND
 from gauss.bench.contestants import contestants
 from gauss.bench.levels import LIMIT, LOOSEST, OF_ANYBODY, POLICIES, WALL_LIMIT, promise, settings
 from gauss.bench.markdown import table
 
 COMPARED = ("backend", "called through", "matrices", "the library reports", "promised", "settings")
+NOTES = {
+    "ecos": "ECOS measures its residuals on the cone programme that it gets, the epigraph of the objective; it is held to "
+    "those of the problem itself.",
+    "highs": "HiGHS regularises every problem by default, which its claim of stationarity does not count.",
+    "jaxopt_osqp": "jaxopt's OSQP and qpax compile in the first call for a problem, which is their cold call.",
+}
 WAYS = {  # of solvers that are not called through qpsolvers: through what, its matrices, what the library reports
     **dict.fromkeys(("qpoases", "qrqp"), ("CasADi", "sparse", "around its call")),
     **dict.fromkeys(("fatrop", "hpipm"), ("CasADi", "stages", "around its call")),
+    jaxopt_.SOLVER: ("jaxopt", "dense", "nothing"),
     **dict.fromkeys(mujoco_.SOLVERS, ("MuJoCo", "dense", "nothing")),
     **dict.fromkeys(coulomb.SOLVERS, ("gauss", "dense", "nothing")),
 }
@@ -47,6 +54,7 @@ def compared_lines(solvers: list[str], level: str) -> list[str]:
         "claim is held to, rows, stationarity and duality gap; relative: to the two-norms of data and answer, as the solver "
         f"measures it; none: it takes no tolerance, and is held to {LOOSEST:g} in rows and stationarity.",
         "",
+        *(line for name, note in NOTES.items() if name in solvers for line in (note, "")),
         *table(COMPARED, (_compared(name, level) for name in solvers)),
         "",
     ]

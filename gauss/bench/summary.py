@@ -16,6 +16,7 @@ import numpy as np
 from gauss.bench import compiled
 from gauss.bench.instances import FILE
 from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.markdown import count_of
 from gauss.bench.measure import NOT_ASKED, OURS, WRONG, middle
 from gauss.bench.problems import SOLVABLE, UNKNOWN
 from gauss.bench.suite.instance import INFEASIBLE
@@ -110,7 +111,7 @@ def not_asked(rows) -> list[str]:
     solvers: dict[tuple[str, int], list[str]] = {}
     for (reason, solver), problems in count.items():
         solvers.setdefault((reason, len(problems)), []).append(solver)
-    found = [f"* {', '.join(names)}, {many} problems: {reason}." for (reason, many), names in solvers.items()]
+    found = [f"* {', '.join(names)}, {count_of(many, 'problem')}: {reason}." for (reason, many), names in solvers.items()]
     return ["Not asked:", "", *found, ""] if found else []
 
 

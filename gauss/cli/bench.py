@@ -36,10 +36,15 @@ def qp(
         list[str] | None, typer.Option(help="This problem (see `gauss problems list`); may be repeated; all if not given.")
     ] = None,
     form: Annotated[
-        list[str] | None, typer.Option(help="This form, F1, F2, F2s or F3; may be repeated; F2 and F2s if not given.")
+        list[str] | None,
+        typer.Option(help="This form, F1, F2, F2s or F3; may be repeated; F2 and F2s if not given, of classes F2s."),
     ] = None,
     level: Annotated[
-        list[str] | None, typer.Option(help="At low, mid, high or tightest accuracy; may be repeated; all if not given.")
+        list[str] | None,
+        typer.Option(
+            help="At low, mid, high or tightest accuracy; may be repeated; all if not given, of classes high and, of eight "
+            "problems, low and mid."
+        ),
     ] = None,
     group: Annotated[
         list[str] | None,
@@ -73,7 +78,7 @@ def qp(
 ):
     """Compare QP backends and gauss's own methods: time, error, residuals, claims. Goes on where it was interrupted."""
     from gauss.bench.publish import publish
-    from gauss.bench.qp import QUICK, compare
+    from gauss.bench.qp import FORMS, QUICK, compare
     from gauss.bench.reuse import compare_reuse
 
     given, usual = _instances(scene, problems), list(QUICK) if quick else None
@@ -82,7 +87,8 @@ def qp(
         _compare_classes(output, group, problems=problem, quick=quick, **chosen)
         if given is None:
             return
-    table = compare(output, problems=problem or usual, instances=given, **chosen)
+    forms = chosen.pop("forms") or FORMS
+    table = compare(output, problems=problem or usual, instances=given, forms=forms, **chosen)
     along = motions and given is None and not quick
     again = compare_reuse(output, fresh=fresh).path if along else None
     _report(table, publish(output, table.path, again))
@@ -92,11 +98,11 @@ def _selection(backend, form, level, solver, quick: bool) -> dict:
     """Backends, forms, levels and solvers of the user, with the usual ones where there are none."""
     from gauss.bench.instances import MAIN_FORM
     from gauss.bench.levels import MAIN_LEVEL
-    from gauss.bench.qp import FORMS, quick_backends
+    from gauss.bench.qp import quick_backends
 
     if solver:
         _import_from_here()
-    forms, levels = ([MAIN_FORM], [MAIN_LEVEL]) if quick else (FORMS, None)
+    forms, levels = ([MAIN_FORM], [MAIN_LEVEL]) if quick else (None, None)
     return {
         "backends": backend or (quick_backends() if quick else None),
         "forms": form or forms,
@@ -216,7 +222,12 @@ def chart(
         typer.Option(help="A curve with this backend for the first of the integrators, or each given; may be repeated."),
     ] = None,
     time_limit: Annotated[
-        float, typer.Option("--time-limit", "--patience", help="Settings get finer until a run takes so long [s].")
+        float,
+        typer.Option(
+            "--time-limit",
+            "--patience",
+            help="Settings get finer until a run takes so long [s]; three with each backend at least.",
+        ),
     ] = 0.5,
     output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),
     root: Root = "fixed",

@@ -4,7 +4,7 @@ from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.device_module import DeviceModule, vector_width
-from gauss.codegen.disk_cache import from_disk
+from gauss.codegen.disk_cache import from_disk, is_noted, note
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Entry, Expression, Graph, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
@@ -74,6 +74,8 @@ __all__ = [
     "forward",
     "fresh_symbols",
     "from_disk",
+    "is_noted",
+    "note",
     "gc_pause",
     "graph_of",
     "intrinsic",

@@ -53,7 +53,7 @@ class PinnedObjects:
     """
 
     def __init__(self, fallback, over_limit):
-        self.pinned = {"ndarray": np.ndarray, "float": float, "none": None}
+        self.pinned: dict[str, object] = {"ndarray": np.ndarray, "float": float, "none": None}
         self.pinned |= {"out": sys.intern("out"), "fallback": fallback, "over_limit": over_limit}
 
     def addresses(self) -> ctypes.Array:

@@ -44,6 +44,19 @@ def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None)
     return found
 
 
+def is_noted(content: tuple, first: bytes | None = None) -> bool:
+    """Whether a content was noted, by this process or another one; content and ``first`` as of :func:`from_disk`."""
+    name = _name(content, first)
+    return name is not None and object_cache.read(name) is not None
+
+
+def note(content: tuple, first: bytes | None = None):
+    """Note a content: a fact, as that a function of a system has passed a test; it holds for this version of the sources."""
+    name = _name(content, first)
+    if name is not None:
+        object_cache.write(name, b"")
+
+
 def _name(content: tuple, first: bytes | None = None) -> str | None:
     """Name of an entry in the cache; None if the content has no digest, or nothing is cached."""
     if object_cache.folder() is None:

@@ -39,6 +39,10 @@ class Kernel:
     def _bind(self):
         self._run = self.code.entry("run", SIGNATURE)
 
+    def address(self) -> int:
+        """Address of ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, in the present tier."""
+        return self._run.address()
+
     def __getstate__(self) -> dict:
         return {name: value for name, value in vars(self).items() if name != "_run"}
 

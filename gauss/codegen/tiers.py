@@ -153,7 +153,7 @@ class MachineCode:
         self.key, self.tier, self.source, self.offer = key, tier, source, 0
         self._engines = [engine]  # the quick one stays: calls in progress may be in it
         self._users: weakref.WeakSet[CodeUser] = weakref.WeakSet()
-        self._is_last = tier == OPTIMISED  # whether users are connected to the last engine
+        self.is_last = tier == OPTIMISED  # whether users are connected to the last engine
 
     def address(self, name: str) -> int:
         """Address of a function, in the newest code."""
@@ -173,7 +173,7 @@ class MachineCode:
         """Connect a user to optimised code, now or once runs take it."""
         with _lock:
             self._users.add(user)
-            if self._is_last:
+            if self.is_last:
                 user.connect(self._engines[-1])
 
     def offer_optimised(self, engine: "llvm.ExecutionEngine"):
@@ -188,7 +188,7 @@ class MachineCode:
 
     def connect_users(self):
         """Let all users take the newest code, under the lock."""
-        self._is_last = True
+        self.is_last = True
         for user in self._users:
             user.connect(self._engines[-1])
 
@@ -218,6 +218,15 @@ class EntryPoint:
         if run is not None:
             run.is_quick = True
         return self._first(*args)
+
+    def address(self) -> int:
+        """Address of the function in the tier of the run in progress."""
+        run, offer = _current.get(), self.code.offer
+        if self.code.is_last or (offer and (run is None or run.number > offer)):
+            return self.code.address(self._name)
+        if run is not None:
+            run.is_quick = True
+        return self.code.first_address(self._name)
 
     def connect(self, engine: "llvm.ExecutionEngine"):
         """Call the function of optimised code directly from now on."""

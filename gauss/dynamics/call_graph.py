@@ -130,7 +130,7 @@ class CallGraph:
         self._eliminate()
         self._loop_wrenches()
         self._delassus()
-        self.factors = {mu: BlockLDLT(self.recorder, self.S, mu) for mu in (MU, DAMPED)}
+        self.factors = {MU: BlockLDLT(self.recorder, self.S, MU)}
 
     def _kinematics(self):
         self.omega, self.kinematics, self.bias, self.gyro = {GROUND: np.zeros(3)}, {}, {}, {}
@@ -193,8 +193,12 @@ class CallGraph:
 
     # --- sections evaluated on the factorisation
 
+    def factor_damped(self):
+        """Record the factorisation of S + DAMPED, which only checks need."""
+        self.factors[DAMPED] = BlockLDLT(self.recorder, self.S, DAMPED)
+
     def multipliers(self, residual, mu: float = MU) -> np.ndarray:
-        """Record (S + μ 1)⁻¹ residual, with scaled rows; μ is MU or DAMPED."""
+        """Record (S + μ 1)⁻¹ residual, with scaled rows; μ is MU, or that of :meth:`factor_damped`."""
         found = self.factors[mu].solve({i: part for i, part in self._rows_of(residual).items() if part.size})
         return self._joined(found[index] for index in self.loops if index in found)
 

@@ -22,7 +22,7 @@ MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per b
 WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
-MOST_CONTACT_OPERATIONS = 8_000  # of the gap functions up to which it is: more take seconds to compile
+MOST_CONTACT_OPERATIONS = 3_000  # of the gap functions up to which it is: more take longer to compile than kernels of pairs
 CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordinates of the scene, measured
     ("HalfSpace", "Sphere"): 122,
     ("Sphere", "Sphere"): 661,
@@ -183,23 +183,9 @@ def takes_pair_kernels(ask: Question) -> list[str]:
         return found
     if not system.Phi.any() or system.dynamics is None:
         found.append("it was built without machine code")
-    n_v, closing = system.n_v, _loop_joints(system)
+    n_v = system.n_v
     found += [f"{n_v} rates beside contacts are more than {WIDEST_MECHANISM}"] if n_v > WIDEST_MECHANISM else []
-    found += [f"{load!r} acts on joints that close loops" for load in _acting_on(scene, closing)]
     return found + (["a constraint depends on the time"] if system.relations.asks_time else [])
-
-
-def _loop_joints(system: System) -> set[str]:
-    """Names of the joints outside the spanning tree."""
-    in_tree = {edge.constraint for edge in system.structure.tree}
-    return {joint.name for k, joint in enumerate(system.joints) if k not in in_tree}
-
-
-def _acting_on(scene, joints: set[str]) -> list[str]:
-    """Loads, stops and friction of some joints."""
-    elements = {**scene.loads, **scene.contacts, **scene.set_valued, **scene.inputs}
-    acted = {name: str(getattr(one, "joint", "")) for name, one in elements.items()}
-    return [name for name, joint in acted.items() if joints & {joint, joint.rpartition(".")[0]}]
 
 
 def are_free_in_contact(system: System) -> bool:

@@ -14,6 +14,7 @@ from gauss.system import System
 COSTS = {  # s, and s per body, of an evaluation by a driver and a kind of dynamics
     ("compiled loop", "compiled"): (1e-6, 3e-7),
     ("compiled loop", "tree recursion"): (1e-6, 3e-7),
+    ("compiled loop", "call graph"): (1e-6, 1e-7),
     ("Python loop", "compiled"): (5e-4, 3e-6),
     ("Python loop", "tree recursion"): (5e-4, 3e-6),
     ("Python loop", "call graph"): (5e-4, 4e-6),

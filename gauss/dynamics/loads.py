@@ -12,6 +12,9 @@ from gauss.rotations import cross
 from gauss.scene import GROUND, Drive, ElasticLink, Force, Input, JointSpring, Slipping, Spring
 from gauss.scene.values import as_function, evaluated
 
+NO_FORCE = np.zeros(3)
+NO_FORCE.flags.writeable = False  # one array for all bodies without loads
+
 
 class Applied:
     """Sum of applied loads, without gravity.
@@ -36,7 +39,7 @@ class Applied:
     def __init__(self, motion: Kinematics, loads=None):
         system = motion.system
         places = system.structure.n_bodies + 1  # with the ground
-        self.F, self.M = ([np.zeros(3) for _ in range(places)] for _ in range(2))
+        self.F, self.M = [NO_FORCE] * places, [NO_FORCE] * places
         self.P = np.zeros(system.n_v, dtype=motion.state.v.dtype)
         self.driven = self.loaded = self.dissipated = 0.0
         for bound in system.loads if loads is None else loads:

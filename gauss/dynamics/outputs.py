@@ -9,17 +9,21 @@ import numpy as np
 from gauss.codegen import Function, write
 from gauss.dynamics.inverse_dynamics_residual import outward_accelerations
 from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.sample_multipliers import are_unique, multipliers_of, sample_multipliers
 from gauss.dynamics.traced_system import Program
+from gauss.errors import SimulationError
 from gauss.rotations import cross
 from gauss.scene import Output, Scene
-from gauss.system import System
+from gauss.system import System, sides
 
 INERTIAL = ("acceleration", "accelerometer")  # kinds that depend on the accelerations
+OF_JOINTS = {"joint_moment": slice(0, 3), "joint_force": slice(3, 6)}  # rows of a joint, with the forces −λ
+FORCES = (*OF_JOINTS, "contact_force")
 
 
 def shape_of(output: Output, system: System) -> tuple[int, ...]:
     """Shape of the values of an output; () for a number."""
-    size = output.size(system.scene.joints)
+    size = output.size(system.scene)
     return (3, 3) if output.kind == "rotation" else () if size == 1 else (size,)
 
 
@@ -27,7 +31,7 @@ def split(vector: np.ndarray, scene: Scene) -> dict[str, np.ndarray]:
     """Outputs (…, m) by name in a vector (…, n) of the values of all outputs."""
     found, place = {}, 0
     for name, output in scene.outputs.items():
-        size = output.size(scene.joints)
+        size = output.size(scene)
         found[name], place = vector[..., place : place + size], place + size
     return found
 
@@ -43,17 +47,61 @@ def output_function(program: Program, scene: Scene, of_step: bool = False) -> Fu
         Scene with the outputs.
     of_step : bool
         Whether the accelerations are those that the point holds, of a step of contacts, instead of those of its state.
+
+    Raises
+    ------
+    SimulationError
+        If forces of an output are not unique, or not known in this motion.
     """
     outputs = tuple(scene.outputs.values())
     asked = not of_step and any(output.kind in INERTIAL for output in outputs)
+    joints, gaps = program.system.structure.constraints, [side.name for side in sides(scene)]
+    loaded = any(output.kind in OF_JOINTS for output in outputs)
+    for output in outputs:
+        _refuse_unknown(output, program.system, of_step)
+
+    def value(output: Output, motion: Kinematics, acceleration, multipliers, contacts):
+        if output.kind in OF_JOINTS:
+            rows = next(constraint.rows for constraint in joints if constraint.name == output.of)
+            return -multipliers[rows][OF_JOINTS[output.kind]]
+        if output.kind == "contact_force":
+            return contacts[[gaps.index(side) for side in scene.contacts[output.of].sides(scene)]]
+        return measured(output, motion, acceleration)
 
     def values(x):
         point = program.layout.point(x)
         rates = program.evaluate(point.state) if asked else point.rates
-        motion = kinematics(program.system, point.state)
-        return tuple(measured(output, motion, rates.acceleration) for output in outputs)
+        state, motion = point.state, kinematics(program.system, point.state)
+        known = multipliers_of(program.system, program.loads, state.q, state.v, [state.t])[0] if loaded else ()
+        return tuple(value(output, motion, rates.acceleration, known, point.method_state) for output in outputs)
 
     return write(values, program.layout.size, name="outputs")
+
+
+def _refuse_unknown(output: Output, system: System, of_step: bool):
+    """Raise a SimulationError for forces that are not unique, or that a motion of this kind does not know."""
+    if output.kind in OF_JOINTS:
+        if of_step:
+            raise SimulationError(f"output {output.name!r}: beside contacts, forces of joints come from gauss.reactions.")
+        if not are_unique(system):
+            raise SimulationError(f"output {output.name!r}: redundant constraints leave the force of {output.of!r} open.")
+    elif output.kind == "contact_force" and not of_step:
+        raise SimulationError(f"output {output.name!r}: steps of integrator='time_stepping' alone know forces of contacts.")
+
+
+def joint_forces(output: Output, system: System, t, q, v) -> np.ndarray:
+    """Values (k, 3) of an output that is a force or moment of a joint, at k states.
+
+    Raises
+    ------
+    SimulationError
+        If they are not certain.
+    """
+    found = sample_multipliers(system, t, q, v)
+    if found is None or not found[1].all():
+        raise SimulationError(f"output {output.name!r}: the forces of {output.of!r} are not certain; use gauss.reactions.")
+    rows = next(constraint.rows for constraint in system.structure.constraints if constraint.name == output.of)
+    return -found[0][:, rows][:, OF_JOINTS[output.kind]]
 
 
 def measured(output: Output, motion: Kinematics, acceleration=None) -> np.ndarray:

@@ -70,12 +70,12 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         return given if any(not isinstance(entry, float) for entry in given.flat) else given.astype(float)
 
     ignore = lambda word: None  # noqa: E731
-    scene = _changed(system.scene, {"gravity": tuple(give(np.array(system.scene.gravity)))})
+    scene = changed(system.scene, {"gravity": tuple(give(np.array(system.scene.gravity)))})
     moved = _mapped([getattr(system, name) for name in SYSTEM_FIELDS], give, ignore)
     loads = _mapped([bound.load for bound in system.loads], give, ignore)
     loads = tuple(BoundLoad(load, _laws(load)) for load in loads)
     subsystems = tuple(
-        _changed(
+        changed(
             written,
             zip(SUBSYSTEM_FIELDS, _mapped([getattr(written, name) for name in SUBSYSTEM_FIELDS], give, ignore), strict=True),
         )
@@ -83,7 +83,7 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
     )
     stages = (Stage("parameters stand for numbers", (), subsystems),)
     others = {"scene": scene, "loads": loads, "dynamics": dynamics, "reduction": stages, "scale": system.scale}
-    return _changed(system, dict(zip(SYSTEM_FIELDS, moved, strict=True)) | others)
+    return changed(system, dict(zip(SYSTEM_FIELDS, moved, strict=True)) | others)
 
 
 def _laws(load) -> tuple[Callable, ...]:
@@ -110,7 +110,7 @@ def _mapped(thing, take: Callable, say: Callable):
         return type(thing)(*made) if hasattr(thing, "_fields") else type(thing)(made)
     if is_dataclass(thing):
         names = [f.name for f in fields(thing)]
-        return _changed(thing, {name: _mapped(getattr(thing, name), take, say) for name in names})
+        return changed(thing, {name: _mapped(getattr(thing, name), take, say) for name in names})
     say(_key(thing))
     return thing
 
@@ -129,7 +129,7 @@ def _key(thing):
     return thing
 
 
-def _changed(thing, changes):
+def changed(thing, changes):
     """Copy of a frozen dataclass with other fields, without its checks: they may be expressions."""
     made = copy(thing)
     for name, value in dict(changes).items():

@@ -64,10 +64,11 @@ def sample_multipliers(system: System, t, q, v) -> tuple[np.ndarray, np.ndarray]
 
 def _written(system: System, laws: Laws) -> Function:
     """Function (q, v, t) → multipliers (r,), and measures of their error."""
-    return write(partial(_multipliers, system, laws.traced), system.n_q, system.n_v, 1, name="multipliers")
+    return write(partial(multipliers_of, system, laws.traced), system.n_q, system.n_v, 1, name="multipliers")
 
 
-def _multipliers(system: System, loads, q, v, t):
+def multipliers_of(system: System, loads, q, v, t):
+    """Multipliers (r,) of all constraints in a state, over symbols, and measures of their error."""
     motion = kinematics(system, State(t[0], q, v))
     applied = Applied(motion, loads)
     mechanism = Mechanism(system, q, v, t[0], (whole(system),))

@@ -18,6 +18,7 @@ from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import inverse_dynamics, loop_constraint_scales, loop_constraints, loop_residual
 from gauss.dynamics.mobility import mobility
+from gauss.dynamics.parameter_terms import accelerations_by_parameter, inverse_dynamics_by_parameter, size_of
 from gauss.dynamics.projection import fixed_columns
 from gauss.dynamics.state_terms import REFERENCES, StateTerms
 from gauss.dynamics.store import cached, cached_on_disk
@@ -55,12 +56,13 @@ class Term(NamedTuple):
     arguments : str
         Its arguments, of q, v, a (acceleration), l (load).
     shapes : tuple of str
-        Shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints.
+        Shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints; p: values
+        of the parameter.
     trace : callable
         (terms, request, acceleration or load) → its results.
-    of_frame, has_reference, is_reduced, has_loads : bool
+    of_frame, has_reference, is_reduced, has_loads, of_parameter : bool
         Whether it is a function of a frame; in axes to be chosen; whether it exists for independent coordinates; whether it
-        depends on the loads of the scene.
+        depends on the loads of the scene; whether it is the derivative by a parameter.
     """
 
     arguments: str
@@ -70,10 +72,11 @@ class Term(NamedTuple):
     has_reference: bool = False
     is_reduced: bool = True
     has_loads: bool = False
+    of_parameter: bool = False
 
 
 class Request(NamedTuple):
-    """A term, with the name of its frame, and its axes."""
+    """A term, with the name of its frame or parameter, and its axes."""
 
     name: str
     frame: str = ""
@@ -93,6 +96,14 @@ def _slopes(function: Callable) -> Callable:
     )
 
 
+def _by_parameter(function: Callable) -> Callable:
+    """Derivatives of a function of the loaded system by a parameter."""
+    return lambda terms, one, given: function(
+        terms.system, _traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given, one.frame
+    )
+
+
+BY_PARAMETER = {"is_reduced": False, "has_loads": True, "of_parameter": True}
 TERMS = {
     "mass_matrix": Term("q", ("vv",), lambda terms, *_: terms.mass_matrix),
     "bias_forces": Term("qv", ("v",), lambda terms, *_: terms.bias_forces),
@@ -116,6 +127,8 @@ TERMS = {
     "acceleration_derivatives": Term(
         "qvl", ("VV", "VV", "VV"), _slopes(acceleration_derivatives), is_reduced=False, has_loads=True
     ),
+    "inverse_dynamics_by": Term("qva", ("Vp",), _by_parameter(inverse_dynamics_by_parameter), **BY_PARAMETER),
+    "accelerations_by": Term("qvl", ("Vp",), _by_parameter(accelerations_by_parameter), **BY_PARAMETER),
     "loop_constraints": Term(
         "qv",
         ("r", "rV", "r"),
@@ -189,10 +202,13 @@ def _request(system: System, name: str, reference: str) -> Request:
     if own not in TERMS:
         raise ArgumentError(f"no function {own!r} of a state. {did_you_mean(str(own), TERMS)}")
     term = TERMS[own]
-    if term.of_frame != bool(frame):
-        words = f"expected the name of a frame, as in '{own}:name'" if term.of_frame else f"takes no frame, got {frame!r}"
+    if (term.of_frame or term.of_parameter) != bool(frame):
+        words = "a frame, as in '{}:name'" if term.of_frame else "a parameter, as in '{}:mass:body'"
+        words = f"takes no frame, got {frame!r}" if frame else f"expected the name of {words.format(own)}"
         raise ArgumentError(f"{own}: {words}.")
-    if frame:
+    if term.of_parameter:
+        size_of(system, frame)  # raises
+    elif frame:
         system.frame(frame)  # raises
     return Request(own, frame, reference if term.has_reference else "")
 
@@ -294,8 +310,12 @@ def _traced(term: Term, terms: StateTerms, one: Request, arguments: dict):
 def _shapes(system: System, requests, columns) -> tuple[tuple[int, ...], ...]:
     """Shapes of the results of requests."""
     sizes = {"V": system.n_v, "v": system.n_v if columns is None else len(columns), "r": whole(system).n_loop_constraints}
-    shapes = [shape for one in requests for shape in TERMS[one.name].shapes]
-    return tuple(tuple(sizes[one] if one in sizes else int(one) for one in shape) for shape in shapes)
+    shapes = [(one, shape) for one in requests for shape in TERMS[one.name].shapes]
+
+    def length(one: Request, letter: str) -> int:
+        return size_of(system, one.frame) if letter == "p" else sizes[letter] if letter in sizes else int(letter)
+
+    return tuple(tuple(length(one, letter) for letter in shape) for one, shape in shapes)
 
 
 def _errors(terms: StateTerms, given) -> list:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
-from gauss.codegen import compile_notice, content_digest, from_disk, gc_pause
+from gauss.codegen import compile_notice, content_digest, from_disk, gc_pause, is_noted, note
 from gauss.system import System
 
 T = TypeVar("T")
@@ -79,5 +79,18 @@ def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> 
     *beside
         What else the entry depends on, where the system is a part of another.
     """
-    digest = lambda: cached(system, (content_digest,), lambda: content_digest(system))  # noqa: E731
-    return cached(system, key, lambda: from_disk((system, *key, *beside), make, digest()))
+    return cached(system, key, lambda: from_disk((system, *key, *beside), make, _digest(system)))
+
+
+def is_noted_on_disk(system: System, key: Key, *beside) -> bool:
+    """Whether a fact about a system was noted, by this process or another one; arguments as of :func:`cached_on_disk`."""
+    return is_noted((system, *key, *beside), _digest(system))
+
+
+def note_on_disk(system: System, key: Key, *beside):
+    """Note a fact about a system; arguments as of :func:`cached_on_disk`."""
+    note((system, *key, *beside), _digest(system))
+
+
+def _digest(system: System) -> bytes | None:
+    return cached(system, (content_digest,), lambda: content_digest(system))

@@ -138,7 +138,7 @@ class Program:
         return write(self._monitored_rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
     @cached_property
-    def projected_rates(self) -> Function:
+    def projected_rates(self) -> "Function | RowFunction":
         """Function (t, q, v) → (q, v) on the constraints, q̈ and power there, singularity of S, position residual.
 
         The singularity is 1 plus the sum of the inverse pivots of S, a bound of its least eigenvalue: where all rows of a

@@ -26,7 +26,6 @@ def write_npz(trajectory: Trajectory, path: Path) -> Path:
 def arrays(trajectory: Trajectory) -> dict[str, Any]:
     """Arrays of a motion by name."""
     system = trajectory.system
-    positions = [[motion.position(name) for name in system.structure.bodies] for motion in trajectory.motions]
     return {
         "scene": np.array(system.scene.name),
         "t": trajectory.t,
@@ -35,7 +34,7 @@ def arrays(trajectory: Trajectory) -> dict[str, Any]:
         "work": trajectory.work,
         "coordinates": np.array(system.coordinates),
         "bodies": np.array(system.structure.bodies),
-        "positions": np.array(positions),
+        "positions": trajectory.poses()[0],
         "event_t": np.array([event.t for event in trajectory.events]),
         "event_kind": np.array([event.kind for event in trajectory.events], dtype=str),
         "event_gaps": np.array([", ".join(event.gaps) for event in trajectory.events], dtype=str),

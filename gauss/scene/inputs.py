@@ -13,10 +13,9 @@ from math import inf
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.builder import SceneBuilder, name_of
-from gauss.scene.joint import Joint
 from gauss.scene.loads import Drive, Force
 
-# What an output measures → the kind of element that it is measured of, and the number of its values; 0: that of the joint.
+# What an output measures → the kind of element that it is measured of, and the number of its values; 0: that of the element.
 SENSORS = {
     "coordinate": ("joint", 0),
     "rate": ("joint", 0),
@@ -27,6 +26,9 @@ SENSORS = {
     "acceleration": ("frame", 3),
     "accelerometer": ("frame", 3),
     "gyroscope": ("frame", 3),
+    "joint_force": ("joint", 3),
+    "joint_moment": ("joint", 3),
+    "contact_force": ("contact", 0),
 }
 
 
@@ -121,9 +123,11 @@ class Output:
     kind : str
         "coordinate" [rad, m] or "rate" [rad/s, m/s] of a joint; of a point of a body or frame, in world axes, "position"
         (3,) [m], "rotation" (3, 3) row by row, "velocity" (3,) [m/s], "angular_velocity" (3,) [rad/s] or "acceleration" (3,)
-        [m/s²]; in its own axes, "accelerometer" (3,), acceleration less gravity [m/s²], or "gyroscope" (3,) [rad/s].
+        [m/s²]; in its own axes, "accelerometer" (3,), acceleration less gravity [m/s²], or "gyroscope" (3,) [rad/s]. Of the
+        parent on the child of a joint, in world axes, "joint_force" (3,) [N] and "joint_moment" (3,) about the joint point
+        [N m]. "contact_force" [N, N m], one value for each gap of a contact, stop or rope.
     of : str
-        Joint, or body or frame.
+        Joint; body or frame; contact, stop or rope.
     at : array_like, shape (3,)
         Point in the body or frame [m].
     """
@@ -141,12 +145,14 @@ class Output:
         values.text(self.of, f"{what}: of")
         values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
 
-    def size(self, joints: Mapping[str, Joint]) -> int:
-        """Number of its values, given the joints of the scene."""
-        fixed = SENSORS[self.kind][1]
+    def size(self, scene) -> int:
+        """Number of its values in a scene."""
+        measured, fixed = SENSORS[self.kind]
         if fixed:
             return fixed
-        pair = joints[self.of].pair
+        if measured == "contact":
+            return len(scene.contacts[self.of].sides(scene))
+        pair = scene.joints[self.of].pair
         return pair.n_q if self.kind == "coordinate" else pair.n_v
 
 
@@ -184,5 +190,5 @@ class InputBuilder(SceneBuilder):
         return self.add(Input(name, name_of(joint), limits, effort, forces))
 
     def output(self, name: str, kind: str, of, at=(0.0, 0.0, 0.0)) -> Output:
-        """Measure a joint, body or frame; see :class:`gauss.scene.Output` for the kinds."""
+        """Measure a joint, body, frame or contact; see :class:`gauss.scene.Output` for the kinds."""
         return self.add(Output(name, kind, name_of(of), at))

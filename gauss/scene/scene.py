@@ -367,8 +367,12 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
     def _place_output(self, output: Output):
         what = f"output {output.name!r}"
         self._require_new(output.name, "output", self.outputs)
-        if SENSORS[output.kind][0] == "joint":
+        measured = SENSORS[output.kind][0]
+        if measured == "joint":
             self.require_joint(output.of, what)
+        elif measured == "contact":
+            if output.of not in self.contacts:
+                raise SceneError(f"{what}: no contact {output.of!r}. {did_you_mean(output.of, self.contacts)}")
         else:
             self._require_place(output.of, what)
         self.outputs[output.name] = output

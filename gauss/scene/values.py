@@ -119,7 +119,7 @@ def evaluated(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
         As :func:`returned`, or if it returns numbers that are not finite.
     """
     entries = returned(law, given, what, size)
-    if entries.dtype == float and not np.isfinite(entries).all():
+    if entries.dtype == float and not (math.isfinite(entries[0]) if size == 1 else np.isfinite(entries).all()):
         raise _refused(what, given[0], entries.tolist(), size)
     return entries
 
@@ -147,6 +147,8 @@ def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
         value = branches(lambda: law(*given)) if isinstance(given[0], Expression) else law(*given)
     except Exception as error:  # a law may fail in any way
         raise SceneError(f"{what}: at {_when(given[0])} its law raised {type(error).__name__}: {error}") from error
+    if type(value) is float and size == 1:  # the usual case, quickly
+        return np.array([value])
     entries = _entries(value)
     if entries.size == size and (entries.dtype == float or all(map(is_scalar, entries))):
         return entries

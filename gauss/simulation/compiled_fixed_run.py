@@ -1,17 +1,21 @@
 """A motion by a compiled loop of fixed steps on a grid, interrupted where prescribed velocities jump."""
 
+import ctypes
 from bisect import bisect_right
 from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus
+from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus, address
 from gauss.dynamics.plan import method_key
 from gauss.integrators import FixedStep, Point
 from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import fixed
 from gauss.simulation.grid import grid_of, with_samples
 from gauss.simulation.step_limits import steps_per_check
+
+HELD_SAMPLES = 256  # samples of a control law between two looks at the progress
+PAIR_BYTES = 16  # of a time of the grid and its :class:`Due`
 
 
 class CompiledFixedRun(CompiledRun):
@@ -82,6 +86,9 @@ class CompiledFixedRun(CompiledRun):
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         """Run the steps of the grid up to the next interruption."""
         control = self.control
+        if self.holds and not (self.renewed or self.crossings):
+            self._advance_held(pairs, out)
+            return
         if int(control.sample) in self.crossings:
             self._cross(pairs, self.crossings.pop(int(control.sample)))
         done = int(control.sample)
@@ -96,6 +103,26 @@ class CompiledFixedRun(CompiledRun):
             rates = self.evaluated(point.state)
             self.point = self._pack(replace(point, rates=rates, method_state=rates.acceleration))
         if control.status == LoopStatus.DONE and control.sample < len(pairs):
+            control.status = LoopStatus.PAUSED
+
+    def _advance_held(self, pairs: np.ndarray, out: np.ndarray):
+        """Run the steps of the grid up to some further samples of the control law, without Python beside the law."""
+        control, count = self.control, len(pairs)
+        arrays = (address(array) for array in (self.point, self.confirmed, pairs, out))
+        given, (point, confirmed, grid, rows) = ctypes.byref(control), arrays
+        first = bisect_right(self.stops, int(control.sample))
+        for until in (*self.stops[first : first + HELD_SAMPLES], count)[:HELD_SAMPLES]:
+            while control.sample < until and control.rows < len(out):
+                done = int(control.sample)
+                steps = min(until - done, len(out) - int(control.rows))
+                self.loop.entry.call(given, point, confirmed, grid + PAIR_BYTES * done, rows, steps)
+                if control.status != LoopStatus.DONE:
+                    return
+            if control.sample < until:
+                break
+            if until in self.holds:
+                self._hold(self.holds[until])
+        if control.sample < count:
             control.status = LoopStatus.PAUSED
 
     def _cross(self, pairs: np.ndarray, after: float):

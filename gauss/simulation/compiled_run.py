@@ -17,7 +17,7 @@ from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.inputs import InputForces
-from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.store import cached_on_disk, is_noted_on_disk, note_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import ExplicitPair, FixedStep, Point, Rates, Taylor
@@ -123,10 +123,9 @@ class CompiledRun:
     def _hold(self, k: int):
         """Set the inputs of the sample k of the control law, at the present point."""
         assert self.held is not None
-        n_q, end = self.system.n_q, 1 + self.system.n_q + self.system.n_v
-        t, q, v = float(self.point[0]), self.point[1 : 1 + n_q].copy(), self.point[1 + n_q : end].copy()
-        self.inputs = self.held.at(k, t, q, v)
-        self.point[-self.inputs.size :] = self.inputs
+        n_q, point = 1 + self.layout.n_q, self.point
+        self.inputs = self.held.at(k, float(point[0]), point[1:n_q].copy(), point[n_q : n_q + self.layout.n_v].copy())
+        point[-self.inputs.size :] = self.inputs
 
     def _certified_rates(self, state: State, inputs: np.ndarray) -> Rates:
         """Rates by the certified recursion; the power of the inputs is counted."""
@@ -190,8 +189,9 @@ class CompiledRun:
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion confirms the accelerations at the end.
 
-        It is used for large trees and systems with loop, coupling or relation constraints: at both ends of the first run,
-        and later where the check fails. Other systems are checked body by body in machine code, at their last point, too.
+        It is used for large trees and systems with loop, coupling or relation constraints: at both ends of the first run of
+        this machine code, which is noted on disk, and later where the check fails. Other systems are checked body by body in
+        machine code, at their last point, too.
         """
         if self.program.checks_bodies:
             return True
@@ -207,7 +207,8 @@ class CompiledRun:
         error = self._certified_error(packed)
         self.control.worst = max(self.control.worst, error)
         if error <= ACCELERATION_TOLERANCE:
-            self._certified_loops().add(self.kind)
+            self._certified_loops()[self.kind] = True
+            note_on_disk(self.system, (CompiledRun, self.kind, self.key), *self._beside())
         return error <= ACCELERATION_TOLERANCE
 
     def _certified_error(self, packed: np.ndarray) -> float:
@@ -222,12 +223,19 @@ class CompiledRun:
 
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
-        known = self.program.checks_bodies or self.kind in self._certified_loops()
+        known = self.program.checks_bodies or self._is_certified()
         return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECK_ERRORS])
 
-    def _certified_loops(self) -> set[Hashable]:
-        """Kinds of step loops that were confirmed at both ends of a run."""
-        return self._on_demand((set,), set)
+    def _is_certified(self) -> bool:
+        """Whether this kind of step loop was confirmed at both ends of a run, of this process or another one."""
+        found = self._certified_loops()
+        if self.kind not in found:
+            found[self.kind] = is_noted_on_disk(self.system, (CompiledRun, self.kind, self.key), *self._beside())
+        return found[self.kind]
+
+    def _certified_loops(self) -> dict[Hashable, bool]:
+        """Whether kinds of step loops were confirmed."""
+        return self._on_demand((dict,), dict)
 
     def trajectory(self) -> Trajectory:
         """Motion so far."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import trace
-from gauss.codegen.kernels import initial_energy_record, updated_energy_record
+from gauss.codegen.kernels import recorded_energies
 from gauss.dynamics.energies import look_at_energies
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.store import cached_on_disk
@@ -240,10 +240,7 @@ def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
 def _record(trajectory: Trajectory) -> EnergyRecord:
     """Energies of all samples."""
     energies = _energies(trajectory)
-    record = initial_energy_record(energies[0])
-    for t, entry in zip(trajectory.t[1:], energies[1:], strict=True):
-        record = updated_energy_record(record, t, entry)
-    return EnergyRecord(*(float(value) for value in record))
+    return EnergyRecord(*map(float, recorded_energies(trajectory.t, energies)))
 
 
 def _energies(trajectory: Trajectory) -> np.ndarray:
@@ -270,7 +267,8 @@ def _rests(system: System, begin: np.ndarray, states: np.ndarray, duration: floa
     """Whether samples (…, k, n_q + n_v) of motions equal their initial states (…, n_q + n_v) to rounding."""
     motion = kinematics(system, State(0.0, *np.split(np.ravel(begin)[: system.n_q + system.n_v], [system.n_q])))
     places, Phi = np.reshape(motion.x[: system.structure.n_bodies], (-1, 3)), np.reshape(system.Phi, (-1, 6))
-    size = max(np.ptp(places, axis=0).max(), np.sqrt(Phi[:, :3].sum(axis=1) / Phi[:, 3]).max())  # of the scene [m]
+    heavy = Phi[Phi[:, 3] > 0.0]  # a body without mass has no radius of gyration
+    size = max(np.ptp(places, axis=0).max(), np.sqrt(heavy[:, :3].sum(axis=1) / heavy[:, 3]).max(initial=0.0))  # [m]
     units = np.array([size if unit == "m" else 1.0 for unit in coordinate_units(system).values()])
     rates = np.array([size if unit == "m/s" else 1.0 for unit in rate_units(system).values()])
     q, v = np.split(states, [system.n_q], axis=-1)

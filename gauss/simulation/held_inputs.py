@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable
+from math import isfinite
 
 import numpy as np
 
@@ -119,6 +120,8 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     SimulationError
         If they are not a finite number for each input.
     """
+    if type(value) is np.ndarray and value.dtype == float and value.shape == (len(names),) and isfinite(value @ value):
+        return value.copy()  # the usual case, quickly
     found = _numbers(value)
     if found is None or found.size != len(names):
         expected = f"expected {len(names)} number(s) ({', '.join(names)})" if names else "the scene declares none"

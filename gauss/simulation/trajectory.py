@@ -11,7 +11,7 @@ import numpy as np
 from gauss import rotations
 from gauss.codegen import content_key, trace
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.dynamics.outputs import INERTIAL, measured, shape_of
+from gauss.dynamics.outputs import FORCES, INERTIAL, OF_JOINTS, joint_forces, measured, shape_of
 from gauss.dynamics.rules import Plan
 from gauss.errors import StateError, did_you_mean
 from gauss.shapes import Shaped
@@ -327,7 +327,11 @@ class Trajectory:
         if name not in outputs:
             raise StateError(f"no output {name!r}. {did_you_mean(name, outputs)}")
         output = outputs[name]
-        if output.kind in INERTIAL:
+        if output.kind in FORCES:
+            if output.kind not in OF_JOINTS:
+                raise StateError(f"output {name!r}: forces along a motion come from gauss.contact_forces.")
+            found = joint_forces(output, self.system, self.t, self.q, self.v)
+        elif output.kind in INERTIAL:
             rates = [self.system.accelerations(self.state(k)) for k in range(len(self))]
             found = np.array([measured(output, *pair) for pair in zip(self.motions, rates, strict=True)])
         else:

@@ -48,11 +48,11 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     _check_inertia(system)
     if scene.set_valued:
         system = replace(system, set_valued=place_relations(system, scene.set_valued.values()))
-    _judge_gap_functions(system)
+    _check_gap_functions(system)
     return replace(system, written=written) if (written := written_laws(system)) else system
 
 
-def _judge_gap_functions(system: System):
+def _check_gap_functions(system: System):
     """Trace the gap functions of the user; those of shapes and joints are traced when they are asked for."""
     own = [side for side in sides(system.scene) if isinstance(side.whole, OneSidedConstraint)]
     if own:

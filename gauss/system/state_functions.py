@@ -23,6 +23,8 @@ call. A function that is kept, ``f = system.mass_matrix``, is called by Python w
 | accelerations | ``forward_dynamics(q, v, load)`` | ``aba`` | ``mj_forward`` |
 | efforts | ``inverse_dynamics(q, v, acceleration)`` | ``rnea`` | ``mj_inverse`` |
 | ∂q̈/∂(q, v, τ) | ``acceleration_derivatives(q, v, load)`` | ``computeABADerivatives`` | – |
+| ∂q̈/∂p | ``parameter_derivatives("mass:arm")(q, v, load)`` | – | – |
+| ∂τ/∂p | ``function("inverse_dynamics_by:mass:arm")(q, v, acceleration)`` | ``computeJointTorqueRegressor`` | – |
 | ∂τ/∂(q, v) | ``inverse_dynamics_derivatives(q, v, acceleration)`` | ``computeRNEADerivatives`` | – |
 
 Where joints close loops, coordinates and rates of all joints are arguments, terms are those of the spanning tree, and
@@ -175,6 +177,29 @@ class StateFunctions:
         By displacements along the rates and by rates; that by accelerations is the mass matrix.
         """
         return self.function("inverse_dynamics_derivatives")
+
+    def parameter_derivatives(self, *parameters: str) -> Callable:
+        """Compiled function ``f(q, v, load, out=None, t=0.0)``: derivatives of the accelerations by parameters.
+
+        Parameters
+        ----------
+        *parameters : str
+            "mass:body" (1), "com:body" (3) in the body frame, "inertia:body" (6: xx, yy, zz, xy, xz, yz) about the centre of
+            mass in the axes of the body frame, "gravity" (3); any number of a load, as "stiffness:spring" (1); of trees,
+            lengths: "parent_at:joint" and "child_at:joint" (3), the joint point in the frame of either body.
+
+        Returns
+        -------
+        callable
+            An array (…, n_v, k) for each parameter of k values, at fixed coordinates and rates; with loops along the
+            constraints. Those of inverse dynamics, the regressor, are ``function("inverse_dynamics_by:mass:body", …)``.
+
+        Raises
+        ------
+        ArgumentError, StateError
+            If there is no such parameter, or no derivative.
+        """
+        return self.function(*(f"accelerations_by:{parameter}" for parameter in parameters))
 
     def function(
         self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None, device: str | None = None

@@ -246,7 +246,7 @@ def test_solvers_are_not_asked_for_what_they_do_not_take():
     assert row["outcome"] == NOT_ASKED and not row["claimed"]
     rows = [GOOD, GOOD | row | {"backend": "two"}, GOOD | {"backend": "two", "problem": "b"}, GOOD | {"problem": "b"}]
     assert list(complete(asked(rows), ["a", "b"], "F2s")) == [("one", "high")]
-    assert any("two, 1 problems: takes dense matrices" in line for line in not_asked(rows))
+    assert any("two, 1 problem: takes dense matrices" in line for line in not_asked(rows))
 
 
 def test_classes_choose_problems():

@@ -9,6 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from typer.testing import CliRunner
 
 import gauss
+from benchmarks import qp_numbers
 from benchmarks.work_precision import beaten, report
 from benchmarks.work_precision.scenes import CASES
 from gauss.bench import precision
@@ -176,6 +177,16 @@ def test_a_refusal_is_told_once_with_all_whom_it_stops():
     assert refusals(found) == {"no": ["a", "b (1 of 2)"], "x": ["other"]}
 
 
+@pytest.mark.parametrize(
+    ("backends", "time_limit", "count"), [(["recursion"], 1.0, precision.FEWEST), (["recursion"], 0.1, 1), (None, 1.0, 1)]
+)
+def test_backends_have_curves(monkeypatch, backends, time_limit, count):
+    """Three points though each takes longer than allowed, but for runs that take far too long."""
+    monkeypatch.setattr(precision, "attempt", lambda *given: Attempt("gauss", given[2], given[3], 1.0, 2.0))
+    system, against = _pendulum(), precision.ReferencePositions(np.zeros((1, 3)), 0.0, "none")
+    assert len(list(attempts(system, DURATION, against, ["dop853"], time_limit, backends))) == count
+
+
 def test_unknown_backends_are_named():
     with pytest.raises(BackendError, match="recursion"):
         list(attempts(_pendulum(), DURATION, backends=["recursio"]))
@@ -187,6 +198,11 @@ def test_ladder_reference_data():
     found = centres(gauss.simulate(gauss.load("n_four_bar", n=1), 0.1, times=[0.1]))
     theta = data["1"]["theta"][1]
     assert found[0] == pytest.approx([np.sin(theta) / 2, np.cos(theta) / 2, 0.0], abs=1e-10)
+
+
+def test_readme_has_the_numbers_of_the_tables_of_qp_solvers():
+    """Written by ``python -m benchmarks.qp_numbers`` when tables have been measured."""
+    assert qp_numbers.section() in (BENCHMARKS / "README.md").read_text(encoding="utf-8")
 
 
 def test_readme_names_where_others_are_faster_as_the_table_has_it(tmp_path):

@@ -4,6 +4,7 @@ import csv
 import os
 import subprocess
 import sys
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,12 +17,12 @@ from scipy import io
 import gauss
 from gauss.backends import make
 from gauss.backends.programme import FORMS
-from gauss.bench.classes import compare_class
+from gauss.bench.classes import FEW, compare_class, problems_of
 from gauss.bench.export import TEST_SET, along, export, without_inequalities
-from gauss.bench.instances import of_arrays
+from gauss.bench.instances import FILE, of_arrays
 from gauss.bench.levels import POLICIES
 from gauss.bench.problems import INCONSISTENT, SELECTION, make_problem
-from gauss.bench.qp import compare
+from gauss.bench.qp import compare, quick_backends
 from gauss.bench.reference import reference
 from gauss.bench.summary import shifted_mean
 from gauss.bench.table import ResultTable, read_table
@@ -174,6 +175,15 @@ def test_rows_of_other_settings_or_numbers_are_measured_again(tmp_path, monkeypa
     (second,) = seconds(1.0)
     assert [second] != first and seconds(1.0) == [second] and seconds(2.0) != [second]
     assert len(read_table(tmp_path / "mine.csv")) == 1
+
+
+@pytest.mark.slow
+def test_classes_are_asked_at_high_and_a_few_of_their_problems_at_low_and_mid(tmp_path):
+    table = compare_class(tmp_path, "infeasible", backends=["clarabel"], progress=False)
+    count = Counter(row["level"] for row in table.rows.values())
+    assert count == {"high": len(problems_of("infeasible")), "low": FEW, "mid": FEW}
+    (form,) = {row["form"] for row in table.rows.values()}
+    assert form == FILE and not {"qpax", "jaxopt_osqp"} & set(quick_backends())
 
 
 def test_tables_do_not_mix_machines(tmp_path):

@@ -16,9 +16,12 @@ from gauss.backends import make
 from gauss.backends.accuracy import KEPT, OWN, own_settings
 from gauss.bench import casadi_
 from gauss.bench.contestants import contestants, everyone
+from gauss.bench.instances import of_problem
 from gauss.bench.levels import LEVELS, LOOSEST, POLICIES, WALL_LIMIT, as_qpbenchmark_sets, promise, settings
+from gauss.bench.measure import measure
 from gauss.bench.problems import make_problem
 from gauss.bench.settings_report import settings_lines
+from gauss.bench.summary import is_right
 
 NAMES = {"low": "low_accuracy", "mid": "mid_accuracy", "high": "high_accuracy"}  # of qpbenchmark
 
@@ -138,6 +141,14 @@ def test_casadi_knows_the_options_that_are_set():
     for solver in casadi_.SOLVERS:
         words = casadi.doc_conic(solver)
         assert all(f"| {name} " in words for name in settings(solver, "high"))
+
+
+@pytest.mark.peer
+def test_jaxopts_osqp_is_called_as_it_is_meant_to_be():
+    """Compiled once for a problem, in double precision; with the multipliers of both kinds of rows."""
+    pytest.importorskip("jaxopt")
+    row = measure(of_problem(make_problem("three stops")), "jaxopt_osqp", "F2s", "high") | {"level": "high"}
+    assert row["claimed"] and is_right(row) and row["iterations"] > 0
 
 
 @pytest.mark.peer

@@ -72,6 +72,12 @@ def _mesh() -> Scene:
     return gauss.load("n_four_bar", n=50)
 
 
+def _driven_mesh() -> Scene:
+    scene = _mesh()
+    scene.drive("A0", torque=lambda t: float(t))
+    return scene
+
+
 # scene, arguments → driver, dynamics, what was rejected
 CASES = {
     "nothing moves": (_still, {}, ("constant", "none"), []),
@@ -93,7 +99,8 @@ CASES = {
         ("samples", "compiled"),
         ["events", "events"],
     ),
-    "many loops": (_mesh, {}, ("Python loop", "call graph"), ["compiled loop"]),
+    "many loops": (_mesh, {}, ("compiled loop", "call graph"), ["compiled loop"]),
+    "many loops, an opaque law": (_driven_mesh, {}, ("Python loop", "call graph"), ["compiled loop"] * 2),
     "a library": (lambda: mechanisms.rods(2), {"integrator": "scipy_dop853"}, ("library", "compiled"), []),
     "a library, a law": (_opaque, {"integrator": "scipy_dop853"}, ("library", "certified"), ["library"]),
     "contacts": (lambda: gauss.load("newtons_cradle"), {}, ("events", "compiled"), []),

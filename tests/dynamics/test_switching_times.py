@@ -149,3 +149,42 @@ def test_jumps_of_opaque_laws_are_located(places):
     law = lambda t, motion: sum(1.0 for place in apart if t > place)  # noqa: E731
     found = sampled_times(law, None, 0.0, 10.0).switches
     assert found == pytest.approx(apart, abs=1e-13)
+
+
+# Laws of states that are zero but for rounding.
+
+
+def swing(law):
+    """A body drawn far from the origin and turned, whose position and rates cancel at rest."""
+    scene = gauss.Scene("swing", gravity=(0, 0, 0))
+    scene.body("a", 1.0, (0.1, 0.2, 0.3), position=(0.1, 1.7, 0.3), rotation=(0.3, -1.1, 2.0))
+    scene.body("b", 1.0, (0.1, 0.2, 0.3), position=(1.3, 0.7, -0.9), rotation=(1.3, 0.1, 0.7))
+    scene.revolute("A", "ground", "a", at=(0.3, 0.1, 0.2), axis=(1, 2, 3))
+    scene.revolute("B", "a", "b", at=(0.7, 1.1, -0.2), axis=(3, -2, 1))
+    scene.force("push", "b", law)
+    return gauss.compile_scene(scene)
+
+
+def test_a_law_whose_terms_cancel_is_traced():
+    begin = swing(lambda t: (0.0, 0.0, 0.0)).scene.bodies["b"].position
+    system = swing(lambda t, motion: motion.position("b") - np.array(begin))
+    assert not Laws(system).called
+
+
+def test_a_law_that_depends_on_the_type_of_its_argument_is_called():
+    system = swing(lambda t, motion: (1.0 if isinstance(t, float) else t, 0.0, 0.0))
+    assert Laws(system).called
+
+
+def _share(system, q, v):
+    """Share of a step of a millisecond between two states at rest but for small coordinates and rates, and its crossings."""
+    watch = switching(system, Laws(system), system.initial_state(), 1.0).watch
+    begin, end = ([*q[k], *v[k], 0.0, 0.0] for k in (0, 1))
+    return watch(np.array([0.0, *begin, 1e-3, *end]))
+
+
+def test_rates_of_rounding_switch_nothing():
+    system = swing(lambda t, motion: (gm.maximum(motion.rate("A"), 0.0), gm.maximum(motion.rate("B"), 0.0), 0.0))
+    noise = np.array([[1e-19, -1e-19], [-1e-19, 1e-19]])
+    assert _share(system, np.zeros((2, 2)), noise)[0] == 1.0
+    assert _share(system, np.zeros((2, 2)), 1e10 * noise)[0] < 1.0  # both laws switch: that is looked at

@@ -9,6 +9,7 @@ import pytest
 import gauss
 from gauss import math as gm
 from gauss.analysis import warn_of_balance
+from gauss.codegen.kernels import initial_energy_record, recorded_energies, updated_energy_record
 from gauss.dynamics.energies import kinetic_energy_of_bodies, look_at_energies, potential_energy
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import BalanceWarning
@@ -263,6 +264,20 @@ def test_a_report_looks_at_every_sample(swinging):
     assert not _told(lambda: warn_of_balance(good))
     (said,) = _told(lambda: warn_of_balance(bad))
     assert said.filename == __file__
+
+
+@pytest.mark.parametrize("spoilt", [None, np.nan, np.inf, 1.7e308])
+@pytest.mark.parametrize("count", [1, 2, 3, 50])
+def test_a_record_of_all_samples_is_that_of_one_after_the_other(count, spoilt):
+    rng = np.random.default_rng(count)
+    times, samples = np.sort(rng.random(count)), rng.standard_normal((count, 4))
+    if spoilt is not None:
+        samples[count // 2, 2], samples[-1, 0] = spoilt, spoilt
+    expected = initial_energy_record(samples[0])
+    with np.errstate(invalid="ignore", over="ignore"):
+        for t, sample in zip(times[1:], samples[1:], strict=True):
+            expected = updated_energy_record(expected, t, sample)
+        np.testing.assert_array_equal(recorded_energies(times, samples), expected)
 
 
 def _hanging(system):

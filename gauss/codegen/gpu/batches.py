@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.codegen.function import Function
 from gauss.codegen.gpu.batch_threads import adaptive_threads, fixed_step_threads
-from gauss.codegen.gpu.device import Device, DeviceArray, Lowered, Program
+from gauss.codegen.gpu.device import Device, DeviceArray, DeviceProgram, Lowered
 from gauss.codegen.gpu.devices import device
 from gauss.codegen.gpu.thread_code import states_code
 from gauss.codegen.kernels.adaptive import Adaptive
@@ -32,7 +32,7 @@ class OnDevice:
 
     def __init__(self, name: str, lowered: Lowered):
         self.device_name, self.lowered = name, lowered
-        self._program: Program | None = None
+        self._program: DeviceProgram | None = None
 
     def __getstate__(self) -> dict:
         return vars(self) | {"_program": None}

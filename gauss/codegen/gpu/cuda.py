@@ -20,7 +20,7 @@ NEWEST_CAPABILITY = 90  # PTX for it runs on later devices, too
 LOG_BYTES = 8192  # of the messages of the driver's compiler
 
 
-class Driver:
+class CudaDriver:
     """Functions of the CUDA driver: a status that is no success is a DeviceError.
 
     Raises
@@ -61,9 +61,9 @@ class Driver:
 
 
 @cache
-def driver() -> Driver:
+def driver() -> CudaDriver:
     """The driver, initialised once."""
-    return Driver()
+    return CudaDriver()
 
 
 def device_names() -> list[str]:

@@ -55,7 +55,7 @@ class DeviceView(Protocol):
         """A copy in the memory of this process."""
 
 
-class Program(Protocol):
+class DeviceProgram(Protocol):
     """Thread code that can be run."""
 
     def __call__(self, threads: int, arguments: Sequence):
@@ -82,7 +82,7 @@ class Device(Protocol):
             If it calls what a GPU does not have.
         """
 
-    def program(self, lowered: Lowered) -> Program:
+    def program(self, lowered: Lowered) -> DeviceProgram:
         """Thread code, ready to run."""
 
     def view(self, given) -> "DeviceView | None":

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.codegen.gpu.device import DeviceView
 from gauss.codegen.gpu.rows import RowsOnDevice
 from gauss.codegen.python_wrapper import Interface
 from gauss.errors import GaussError, StateError
@@ -41,20 +42,14 @@ class DeviceFunction:
         DeviceError
             If the device has not enough memory.
         """
-        names, device = list(self.interface.vectors), self.rows.device
-        if len(vectors) != len(names):
-            raise StateError(f"{self.__name__}: expected {', '.join(names)}, got {len(vectors)} arguments.")
+        device = self.rows.device
         views = [device.view(given) for given in vectors]
-        arrays = [view or _rows(name, given, size) for (name, size), given, view in self._arguments(vectors, views)]
-        counts = {array.shape[0] for array in arrays}
-        if len(counts) != 1:
-            shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(names, arrays, strict=True))
-            raise StateError(f"{self.__name__}: batches of different lengths: {shapes}.")
-        (count,) = counts
+        arrays = self._arrays(vectors, views)
+        count = arrays[0].shape[0]
         held = [array if view else device.put(array) for array, view in zip(arrays, views, strict=True)]
         strides = [array.strides for array in arrays]
-        numbers = np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
         table = [(array, *(step // 8 for step in apart)) for array, apart in zip(held, strides, strict=True)]
+        numbers = np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
         found, marked = self.rows(count, table, device.put(numbers))
         if marked:
             self._repair(arrays, numbers, found)
@@ -64,15 +59,17 @@ class DeviceFunction:
         results = found if any(views) else [array.numpy() for array in found]
         return results[0] if len(results) == 1 else tuple(results)
 
-    def _arguments(self, vectors, views):
-        for (name, size), given, view in zip(self.interface.vectors.items(), vectors, views, strict=True):
-            if view is not None:
-                fits = view.dtype == "<f8" and len(view.shape) == 2 and view.shape[1] == size
-                if not fits or any(step % 8 for step in view.strides):
-                    raise StateError(
-                        f"{name}: expected doubles (n, {size}) on the device, got {view.dtype} of shape {view.shape}."
-                    )
-            yield (name, size), given, view
+    def _arrays(self, vectors, views) -> list:
+        """Arguments as arrays of doubles (n, k), those of the device as they are."""
+        names = list(self.interface.vectors)
+        if len(vectors) != len(names):
+            raise StateError(f"{self.__name__}: expected {', '.join(names)}, got {len(vectors)} arguments.")
+        given = zip(self.interface.vectors.items(), vectors, views, strict=True)
+        arrays = [_rows(name, x, size) if view is None else _fitting(name, view, size) for (name, size), x, view in given]
+        if len({array.shape[0] for array in arrays}) > 1:
+            shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(names, arrays, strict=True))
+            raise StateError(f"{self.__name__}: batches of different lengths: {shapes}.")
+        return arrays
 
     def _repair(self, arrays, numbers: np.ndarray, found):
         """Replace the results of rows that exceed a limit by those of the function on this CPU."""
@@ -99,3 +96,11 @@ def _rows(name: str, given, size: int) -> np.ndarray:
     if array.ndim != 2 or array.shape[1] != size:
         raise StateError(f"{name}: expected rows of {size} numbers (n, {size}), got {np.shape(given)}.")
     return array
+
+
+def _fitting(name: str, view: DeviceView, size: int) -> DeviceView:
+    """Array of another library, if it can be read where it is."""
+    fits = view.dtype == "<f8" and len(view.shape) == 2 and view.shape[1] == size
+    if not fits or any(step % 8 for step in view.strides):
+        raise StateError(f"{name}: expected doubles (n, {size}) on the device, got {view.dtype} of shape {view.shape}.")
+    return view

@@ -65,11 +65,16 @@ class RowsOnDevice(OnDevice):
         Its inputs are the vectors and the number, concatenated; its outputs the results and the limited quantities.
     interface : Interface
         Arguments, results and limits.
+
+    Attributes
+    ----------
+    operations : int
+        Operations of one evaluation.
     """
 
     def __init__(self, name: str, function: Function, interface: Interface):
         super().__init__(name, device(name).lowered(rows_code(function, interface)))
-        self.sizes = interface.result_sizes(len(function.outputs))
+        self.sizes, self.operations = interface.result_sizes(len(function.outputs)), sum(function.operations().values())
 
     def __call__(self, count: int, vectors: Sequence, numbers: DeviceArray) -> tuple[list[DeviceArray], bool]:
         """Results (count, size) of all rows, the limited quantities last, and whether a row exceeds a limit.

@@ -10,13 +10,21 @@ from gauss.codegen.kernels.column_pivoting import Pivots
 from gauss.codegen.kernels.compiled_loop import Loop, address
 from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
-from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record, updated_energy_record
+from gauss.codegen.kernels.energy_record import (
+    ENERGY_RECORD,
+    ENERGY_SAMPLE,
+    initial_energy_record,
+    recorded_energies,
+    updated_energy_record,
+)
 from gauss.codegen.kernels.explicit import ExplicitTrial, Interpolation, stride
 from gauss.codegen.kernels.first_accepted import FirstAccepted
 from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
+from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction
 from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
@@ -50,6 +58,9 @@ __all__ = [
     "RecordedCalls",
     "RecordedSections",
     "SectionCode",
+    "NearPairs",
+    "CompiledMechanismStep",
+    "StepFunctions",
     "Newton",
     "FirstAccepted",
     "Pivots",
@@ -72,6 +83,7 @@ __all__ = [
     "Vector",
     "WORST_RECORD",
     "initial_energy_record",
+    "recorded_energies",
     "stride",
     "updated_energy_record",
 ]

@@ -52,7 +52,7 @@ class Loop:
         """
         arrays = point, confirmed, grid, out
         for array in arrays:
-            if array.dtype is not FLOAT or not array.flags.c_contiguous:
+            if (array.dtype is not FLOAT and array.dtype != FLOAT) or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
         self._run.call(ctypes.byref(control), *map(address, arrays), budget)
 

@@ -41,6 +41,26 @@ def updated_energy_record(record, t, sample, where=np.where) -> list:
     ]
 
 
+def recorded_energies(times: np.ndarray, samples: np.ndarray) -> list:
+    """Record after energy samples (k, 4) at times (k,) [s]: of finite ones as by :func:`updated_energy_record`, in one pass.
+
+    NaN propagates to every entry that it reaches; there the samples are taken one by one.
+    """
+    record = initial_energy_record(samples[0])
+    with np.errstate(over="ignore", invalid="ignore"):
+        balance = np.concatenate([[0.0], samples[1:, 2] - samples[0, 2]])
+        changes = np.abs(np.diff(balance, prepend=0.0))
+    if not (np.isfinite(samples).all() and np.isfinite(changes).all()):
+        for t, sample in zip(times[1:], samples[1:], strict=True):
+            record = updated_energy_record(record, t, sample)
+        return record
+    last = int(np.argmax(changes))
+    kinetic, potential, _, magnitude = samples.T
+    when = times[last] if changes[last] > 0.0 else 0.0
+    peaks = np.abs(balance).max(), changes[last]
+    return [kinetic.max(), potential.min(), potential.max(), magnitude.max(), record[4], balance[-1], *peaks, when]
+
+
 def update() -> Function:
     """Traced function (record, t, sample) → record."""
 

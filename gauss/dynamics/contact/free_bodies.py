@@ -10,7 +10,7 @@ from functools import cache
 
 import numpy as np
 
-from gauss.codegen import Kernel, from_disk, write
+from gauss.codegen import Function, Kernel, from_disk, write
 from gauss.dynamics.contact.pair_kernels import POSE
 from gauss.rotations import cross
 from gauss.scene.pairs import PAIRS
@@ -88,6 +88,11 @@ def _place(R, x, W, u, spin, pull, own, centre):
     return R @ own.reshape(3, 3), x + arm, W, u + turning, spin, pull + cross(spin, arm) + cross(W, turning)
 
 
+def place_function() -> Function:
+    """Traced function of :attr:`FreeBodyKernels.place`."""
+    return write(_place, 9, 3, 3, 3, 3, 3, 9, 3, name="place")
+
+
 class FreeBodyKernels:
     """Machine code over columns, one for each body or shape.
 
@@ -104,7 +109,7 @@ class FreeBodyKernels:
     def __init__(self):
         self.begin = Kernel(write(_begin, 7, 6, CONSTANTS, 3, 2, name="begin"))
         self.end = Kernel(write(_end, 7, 6, CONSTANTS, 6, 2, name="end"))
-        self.place = Kernel(write(_place, 9, 3, 3, 3, 3, 3, 9, 3, name="place"))
+        self.place = Kernel(place_function())
         assert (self.begin.n_out, self.place.n_out) == (BEGUN, POSE)
 
 

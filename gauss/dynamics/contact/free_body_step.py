@@ -30,6 +30,7 @@ from gauss.dynamics.contact.moreau_step import (
     least_rate,
 )
 from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts
+from gauss.dynamics.contact.paradox import Paradox
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
@@ -67,6 +68,8 @@ class FreeBodyStep(NamedTuple):
         Mean power of drives, of forces on bodies, and of dissipation, which is that of contacts [W].
     error : float or None
         Error of the laws, relative; None for the convex relaxation.
+    paradoxes : list of Paradox
+        None: contacts of many free bodies are not examined for Painlevé's paradox.
     """
 
     q: np.ndarray
@@ -75,6 +78,7 @@ class FreeBodyStep(NamedTuple):
     force: np.ndarray
     power: np.ndarray
     error: float | None
+    paradoxes: list[Paradox]
 
 
 class _Begun(NamedTuple):
@@ -186,7 +190,7 @@ class FreeBodyStepper:
         end = self.kernels.end(np.concatenate([begun.q, begun.v[self.v_places], self.given, change, step]))
         found[0][self.q_places], found[1][self.v_places] = end[:7], end[7:]
         lost = -0.5 * (force * (known[..., 0] + rates(near, after[..., None])[..., 0])).sum()
-        return FreeBodyStep(*found, near, force, np.array([0.0, 0.0, lost]), error)
+        return FreeBodyStep(*found, near, force, np.array([0.0, 0.0, lost]), error, [])
 
     def _begin(self, state: State, h: float, share: float) -> _Begun:
         q, v = state.q[self.q_places], state.v[self.v_places]

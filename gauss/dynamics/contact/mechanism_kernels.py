@@ -18,6 +18,7 @@ from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_forces import generalised_forces
 from gauss.dynamics.loads import Applied
+from gauss.dynamics.loop_joints import LoopJoint
 from gauss.dynamics.mechanism import loop_constraints
 from gauss.dynamics.state_terms import StateTerms
 from gauss.dynamics.store import cached_on_disk
@@ -26,6 +27,7 @@ from gauss.scene import ClosedGap, Contact
 from gauss.system import State, System, coordinate_rates, retract, sides
 from gauss.system.relations import place_residuals
 
+GROUND_BODY = np.concatenate([np.eye(3).ravel(), np.zeros(15)])
 BODY = 24  # rotation (9), centre (3), angular velocity, velocity of the centre (6), rates of both where q̈ = 0 (6)
 
 
@@ -44,26 +46,23 @@ class SparseArrays:
     """
 
     def __init__(self, arrays):
-        self.fixed, self.places, self.outputs, begin = [], [], [], 0
-        for array in arrays:
-            numbers = [as_number(entry) for entry in np.ravel(np.asarray(array, dtype=object))]
-            varying = [k for k, number in enumerate(numbers) if number is None]
-            self.fixed.append(np.array([0.0 if x is None else x for x in numbers]).reshape(np.shape(array)))
-            self.outputs += [np.ravel(array)[k] for k in varying]
-            self.places.append((np.array(varying, dtype=int), slice(begin, begin + len(varying))))
-            begin += len(varying)
+        entries = np.concatenate([np.ravel(np.asarray(array, dtype=object)) for array in arrays])
+        numbers = [as_number(entry) for entry in entries]
+        self.flat = np.array([0.0 if number is None else number for number in numbers])
+        self.entries = np.array([k for k, number in enumerate(numbers) if number is None], dtype=int)
+        self.outputs = [entries[k] for k in self.entries]
+        ends = np.cumsum([np.size(array) for array in arrays]).tolist()
+        shapes = [np.shape(array) for array in arrays]
+        self.parts = [(slice(a, b), shape) for a, b, shape in zip([0, *ends], ends, shapes, strict=False)]
 
     def __getstate__(self) -> dict:
-        return {"fixed": self.fixed, "places": self.places}
+        return {name: vars(self)[name] for name in ("flat", "entries", "parts")}
 
     def filled(self, values: np.ndarray) -> list[np.ndarray]:
         """Arrays with the values of the outputs."""
-        found = []
-        for fixed, (places, values_of) in zip(self.fixed, self.places, strict=True):
-            array = fixed.copy()
-            array.reshape(-1)[places] = values[values_of]
-            found.append(array)
-        return found
+        flat = self.flat.copy()
+        flat[self.entries] = values
+        return [flat[part].reshape(shape) for part, shape in self.parts]
 
 
 class MechanismTerms(NamedTuple):
@@ -72,18 +71,20 @@ class MechanismTerms(NamedTuple):
     Attributes
     ----------
     M : ndarray, shape (n_v, n_v)
-        Mass matrix; lower triangle.
+        Mass matrix.
     tau, power : ndarray, shape (n_v,), (3,)
         Generalised forces less the bias forces, τ − h; power of drives, of forces on bodies, and of dissipation [W].
-    bodies : ndarray, shape (24, k)
-        Poses, velocities and their rates with q̈ = 0 of the bodies that carry shapes.
-    J : ndarray, shape (k, 6, n_v)
+    bodies : ndarray, shape (24, k + 1)
+        Poses, velocities and their rates with q̈ = 0 of the bodies that carry shapes, and of the ground.
+    J : ndarray, shape (k + 1, 6, n_v)
         Their Jacobians, (angular velocity, velocity of the centre of mass) in world axes.
     gap, rate, K, bias : ndarray, shape (g,), (r,), (r, n_v), (r,)
         Gap functions of unilateral constraints that are no contacts of shapes; rates of these and of set-valued elements,
         their Jacobian, and their derivatives with q̈ = 0.
     G, gamma : ndarray, shape (l, n_v), (l,)
         Loop constraints G q̈ = γ.
+    B, beta : ndarray, shape (n_v, n_v), (n_v,)
+        Rates v = B v of all joints by those of the spanning tree, and accelerations of the others where these are zero.
     """
 
     M: np.ndarray
@@ -97,6 +98,8 @@ class MechanismTerms(NamedTuple):
     bias: np.ndarray
     G: np.ndarray
     gamma: np.ndarray
+    B: np.ndarray
+    beta: np.ndarray
 
 
 class MechanismKernels:
@@ -139,14 +142,13 @@ class MechanismKernels:
 
     def _terms(self, t, q, v) -> MechanismTerms:
         terms = StateTerms(self.smooth, q, v, t)
-        parts = [_body(terms, body) for body in self.carriers]
+        parts = [*(_body(terms, body) for body in self.carriers), GROUND_BODY]
         bodies = np.array(parts, dtype=object).reshape(len(parts), BODY).T
-        J = [terms.jacobian_of(body, terms.centers[body]) for body in self.carriers]
+        J = [terms.jacobian_of(body, terms.centers[body]) for body in self.carriers] + [np.zeros((6, self.smooth.n_v))]
         tau, power = self._load_forces(terms, t, q, v)
         gap, rate, K, bias = self._rows(t, q, v)
-        G, gamma = self._loops(t, q, v)
         return MechanismTerms(
-            np.tril(terms.tree_mass_matrix),
+            terms.tree_mass_matrix,
             tau - terms.tree_bias_forces,
             np.array(power, dtype=object),
             bodies,
@@ -155,8 +157,8 @@ class MechanismKernels:
             rate,
             K,
             bias,
-            G,
-            gamma,
+            *self._loops(t, q, v),
+            *self._dependent(terms),
         )
 
     def _forces(self, t, q, v):
@@ -193,6 +195,16 @@ class MechanismKernels:
                 row[self.smooth.column(coupling.driver)] = -coupling.ratio
             return rows, np.zeros(len(rows))
         return loop_constraints(self.smooth, q, v, t)[1:]
+
+    def _dependent(self, terms: StateTerms):
+        """Rates of loop joints by those of the tree."""
+        n_v, in_tree = self.smooth.n_v, {edge.constraint for edge in self.smooth.structure.tree}
+        B, beta = np.eye(n_v, dtype=object), np.zeros(n_v, dtype=object)
+        for index in sorted(set(range(len(self.smooth.joints))) - in_tree):
+            loop_joint, place = LoopJoint(terms.tree, index, terms.q, terms.v), self.smooth.joints[index].v
+            B[place] = jacobian(loop_joint.rates(terms.velocities, still=True), terms.v)
+            beta[place] = loop_joint.rates(terms.biases, still=False)
+        return B, beta
 
 
 def _body(terms: StateTerms, body: int) -> np.ndarray:

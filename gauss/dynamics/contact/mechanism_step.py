@@ -12,8 +12,10 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from gauss.codegen.kernels.mechanism_step import FINISHED, IMPACT
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
+from gauss.dynamics.contact.compiled_mechanism_step import CompiledStepMemory
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.free_body_step import ATTEMPTS, REACH_MARGIN
@@ -33,7 +35,9 @@ from gauss.dynamics.contact.moreau_step import (
     is_impact,
     least_rate,
 )
-from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts
+from gauss.dynamics.contact.near_contacts import NearContacts
+from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.paradox import Paradox, sliding, sliding_above, undetermined_sliding
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale, centrifugal_scale
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
@@ -55,25 +59,28 @@ class MechanismStep(NamedTuple):
     ----------
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates at its end.
-    contacts : NearContacts
-        Near contacts.
-    force : ndarray, shape (m, 3)
+    contacts : NearContacts or None
+        Near contacts; None of a step by machine code.
+    force : ndarray, shape (m, 3), or None
         Mean forces with impulses along their normals and tangents [N].
-    others : ndarray, shape (g + s,)
+    others : ndarray, shape (g + s,), or None
         Those of other unilateral constraints, and of set-valued elements [N, N m].
     power : ndarray, shape (3,)
         Mean power of drives, of forces on bodies, and of dissipation [W].
     error : float or None
         Error of the laws in units of the scene; None for the convex relaxation.
+    paradoxes : list of Paradox
+        Contacts with undetermined forces.
     """
 
     q: np.ndarray
     v: np.ndarray
-    contacts: NearContacts
-    force: np.ndarray
-    others: np.ndarray
+    contacts: NearContacts | None
+    force: np.ndarray | None
+    others: np.ndarray | None
     power: np.ndarray
     error: float | None
+    paradoxes: list[Paradox]
 
 
 class _FreeStep(NamedTuple):
@@ -118,16 +125,16 @@ class MechanismStepper:
         self.n = len(carriers)
         places = {body: k for k, body in enumerate(carriers)}
         self.table.body = np.array([places.get(int(body), self.n) for body in self.table.body], dtype=np.int64)
-        self.detection = ContactDetection(self.table, system.scale.length)
+        self.detection = NearDetection(self.table, self.n + 1, system.scale.length)
         self.reach = np.zeros(self.n + 1)
         np.maximum.at(self.reach, self.table.body, self.table.length)
-        self.ground = np.concatenate([np.eye(3).ravel(), np.zeros(15)])[:, None]
         self._index_others()
         coupled = is_coupled_tree(self.smooth)
         self.free_columns = _null_space(self.smooth) if coupled else None
         self.shares = (0.0,) if self.smooth.closes or self.restitution.any() else (MIDPOINT, 0.0)
         self.acceleration_error = 0.0
-        self.known: tuple[np.ndarray, np.ndarray, np.ndarray]
+        single = self.free_columns is not None and (np.count_nonzero(self.free_columns, axis=1) <= 1).all()
+        self.memory = CompiledStepMemory(self) if single else None
         self.forget()
 
     def _index_others(self):
@@ -146,6 +153,7 @@ class MechanismStepper:
         self.other_restitution = np.array([side.whole.restitution for side in self.others])
         self.restitution = np.concatenate([self.table.restitution, self.other_restitution])
         elements = cast(list[JointDryFriction], [*scene.set_valued.values()])  # others are refused
+        self.coefficients = np.unique(self.restitution)
         self.limit = np.array([element.limit for element in elements]) / self.set_unit
         self.lossy = np.array([element.lossy for element in elements], dtype=bool)
 
@@ -180,7 +188,22 @@ class MechanismStepper:
 
     def forget(self):
         """Forget the forces of the last step: a new motion begins."""
+        self.detection.connect()
         self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(len(self.others) + self.limit.size)
+        if self.memory is not None:
+            self.memory.connect()
+
+    @property
+    def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces of the last step: keys of its contacts in order, forces (m, 3) of these, and of other constraints."""
+        return self._known if self.memory is None else self.memory.known
+
+    @known.setter
+    def known(self, found: tuple[np.ndarray, np.ndarray, np.ndarray]):
+        if self.memory is None:
+            self._known = found
+        else:
+            self.memory.known = found
 
     def step(self, state: State, h: float) -> MechanismStep:
         """Step of length h; the forces of the last step are the initial guess.
@@ -191,6 +214,43 @@ class MechanismStepper:
             If shapes overlap unseen by their gap functions, or no forces are found.
         """
         rest = self.system.scale.time * resting(self.system, state.v)
+        return self._compiled_step(state, h, rest) or self._python_step(state, h, rest)
+
+    def _compiled_step(self, state: State, h: float, rest: float) -> MechanismStep | None:
+        """The step by machine code; None where it is not finished."""
+        memory = self.memory
+        if memory is None:
+            return None
+        scale = self.system.scale
+        settings = {
+            "t": state.t,
+            "h": h,
+            "rest": rest,
+            "slow": sliding_above(self.system, state.v) * scale.time / scale.length,
+            "margin": REACH_MARGIN,
+            "missed": MISSED_CLOSING_RATE,
+            "jammed": JAMMED_RESPONSE,
+            "contact_unit": self.contact_unit,
+        }
+        for share in self.shares:
+            status = memory.step(state, settings | {"share": share})
+            if status != IMPACT:
+                break
+        if status != FINISHED:
+            return None
+        *power, error, doubtful = memory.at["results"]
+        paradoxes = self._examined(state, h, rest) if doubtful else []
+        q, v = memory.at["end_q"].copy(), memory.at["end_v"].copy()
+        return MechanismStep(q, v, None, None, None, np.array(power), error, paradoxes)
+
+    def _examined(self, state: State, h: float, rest: float) -> list[Paradox]:
+        """Painlevé's paradoxes of a step by machine code."""
+        known = self.known
+        found = self._python_step(state, h, rest).paradoxes
+        self.known = known
+        return found
+
+    def _python_step(self, state: State, h: float, rest: float) -> MechanismStep:
         for share in self.shares:
             begun = self._begin(state, h, share)
             speed = max(self._speed(begun, state.v), self._speed(begun, state.v + h * begun.acceleration))
@@ -217,7 +277,10 @@ class MechanismStepper:
         power = begun.power + np.array([work[~lossy].sum(), 0.0, -work[lossy].sum()])
         contacts, others = self._split(rows, near, force * rows.unit)
         self._keep(near, contacts, others)
-        return MechanismStep(q, v, near, contacts, others, power, error)
+        if self.memory is not None:
+            self.memory.connect()
+        paradoxes = self._paradoxes(state, rows, begun, near, force)
+        return MechanismStep(q, v, near, contacts, others, power, error, paradoxes)
 
     def _begin(self, state: State, h: float, share: float) -> _FreeStep:
         kernels, t = self.kernels, state.t + share * h
@@ -232,34 +295,32 @@ class MechanismStepper:
 
     def _compliance(self, terms: MechanismTerms) -> tuple[np.ndarray, np.ndarray]:
         """Compliance H (n_v, n_v), and accelerations (n_v,) by the biases of loops."""
-        M = terms.M + np.tril(terms.M, -1).T
+        M = terms.M
         if self.free_columns is not None:
             N = self.free_columns
             return N @ np.linalg.inv(N.T @ M @ N) @ N.T, np.zeros(len(M))
         tree = M.diagonal() > 0.0
         H = np.zeros_like(M)
         H[np.ix_(tree, tree)] = np.linalg.inv(M[np.ix_(tree, tree)])
-        if not terms.gamma.size:
-            return H, np.zeros(len(M))
         Y = H @ terms.G.T
         S = terms.G @ Y
-        scale = 1.0 / np.sqrt(S.diagonal())
+        sizes = S.diagonal()
+        scale = 1.0 / np.sqrt(np.maximum(sizes, REDUNDANT_LOOPS * sizes.max()))
         P = scale[:, None] * np.linalg.pinv(scale[:, None] * S * scale, rcond=REDUNDANT_LOOPS, hermitian=True) * scale
-        return H - Y @ P @ Y.T, Y @ (P @ terms.gamma)
+        return terms.B @ (H - Y @ P @ Y.T) @ terms.B.T, terms.B @ (Y @ (P @ terms.gamma)) + terms.beta
 
     def _speed(self, begun: _FreeStep, v: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
         if not self.n:
             return 0.0
-        twists = begun.terms.J @ v
+        twists = begun.terms.J[: self.n] @ v
         turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in (twists[:, :3], twists[:, 3:]))
         return float((moving + turning * self.reach[: self.n]).max())
 
     def _near(self, state: State, begun: _FreeStep, speed: float, h: float, share: float) -> NearContacts:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
-        bodies = np.concatenate([begun.terms.bodies, self.ground], axis=1)
-        near, overlaps = self.detection.find(self.table.poses(bodies), bodies[9:12], reach, UNSEEN_OVERLAP)
+        near, overlaps = self.detection.find(begun.terms.bodies, reach, UNSEEN_OVERLAP)
         if overlaps:
             law, depth = overlaps[0]
             raise SimulationError(
@@ -273,11 +334,9 @@ class MechanismStepper:
         return near
 
     def _rows(self, terms: MechanismTerms, near: NearContacts) -> _StepRows:
-        n_v, g, m = self.smooth.n_v, len(self.others), near.gap.size
-        J = np.concatenate([terms.J, np.zeros((1, 6, n_v))])
-        contacts = (near.J[..., :6] @ J[near.bodies]).sum(axis=1)
-        twists = np.concatenate([terms.bodies[12:18].T, np.zeros((1, 6))])
-        rates = (near.J[..., :6] @ twists[near.bodies][..., None]).sum(axis=1)[..., 0]
+        g, m = len(self.others), near.gap.size
+        contacts = (near.J[..., :6] @ terms.J[near.bodies]).sum(axis=1)
+        rates = (near.J[..., :6] @ terms.bodies[12:18].T[near.bodies][..., None]).sum(axis=1)[..., 0]
         rough = np.flatnonzero(self.table.friction[near.law])
         unit = np.full(m, self.contact_unit)
         units = np.concatenate([unit, self.other_unit, np.full(2 * rough.size, self.contact_unit), self.set_unit])
@@ -310,8 +369,8 @@ class MechanismStepper:
         if not n:
             return np.zeros(0), np.zeros(begun.acceleration.size), 0.0
         after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
-        for e in np.unique(rows.restitution):
-            mine = np.flatnonzero(rows.restitution == e)
+        for e in self.coefficients:
+            mine = slice(0, m) if len(self.coefficients) == 1 else np.flatnonzero(rows.restitution == e)
             after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], float(e), h, rest, share)
         force, scale = self._start(near, rows), 1.0 + np.abs(rows.rate).max(initial=0.0)
         active = (after[:m] < 0.0) | (force[:m] > 0.0)
@@ -356,6 +415,23 @@ class MechanismStepper:
             names = [self._name(near, int(k)) for k in held]
             raise jammed_error(f"t = {state.t:.6g} s", names, float((-after / rows.unit)[held].max()))
 
+    def _paradoxes(self, state: State, rows: _StepRows, begun: _FreeStep, near: NearContacts, force) -> list[Paradox]:
+        """Painlevé's paradoxes of the closed contacts."""
+        if not rows.rough.size:
+            return []
+        m, length, time = rows.gap.size, self.system.scale.length, self.system.scale.time
+        slow = sliding_above(self.system, state.v) * time / length
+        across = m + np.arange(2 * rows.rough.size).reshape(-1, 2)
+        which = sliding(rows.rate[across], force[rows.rough] > 0.0, slow)
+        if not which.size:
+            return []
+        normal, across = rows.rough[which], across[which]
+        responses = rows.K[normal] @ begun.H
+        smooth, sideways = responses @ rows.K[normal].T, (responses @ rows.K[across.ravel()].T).reshape(which.size, -1, 2)
+        b = rows.K[normal] @ begun.acceleration + rows.bias[normal]
+        names = [self._name(near, int(row)) for row in normal]
+        return undetermined_sliding(names, rows.friction[which], rows.rate[across], smooth, sideways, b)
+
     def _name(self, near: NearContacts, row: int) -> str:
         """Name of the gap of a row."""
         m = near.gap.size
@@ -385,17 +461,19 @@ class MechanismStepper:
 
     def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Forces over a step from a state, as of :meth:`forces_of`."""
-        return self.forces_of(self.step(state, h))
+        return self.forces_of(self._python_step(state, h, self.system.scale.time * resting(self.system, state.v)))
 
     def forces_of(self, step: MechanismStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""
         normal, friction = np.zeros(self.gap_count), np.zeros((self.gap_count, 3))
-        near, own = step.contacts, np.setdiff1d(np.arange(self.gap_count), self.other_places)
-        normal[self.other_places] = step.others[: len(self.others)]
+        near, force, others = step.contacts, step.force, step.others
+        assert near is not None and force is not None and others is not None  # a step by Python
+        own = np.setdiff1d(np.arange(self.gap_count), self.other_places)
+        normal[self.other_places] = others[: len(self.others)]
         if near.gap.size:
             places = own[self.table.gap_places(near.key)]
-            normal[places] = step.force[:, 0]
-            across = (step.force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1)
+            normal[places] = force[:, 0]
+            across = (force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1)
             friction[places] = across * self.table.sides(near.key)[:, None]
         return normal, friction
 

@@ -28,7 +28,7 @@ from gauss.dynamics.contact.paradox import (
     Paradox,
     sliding,
     sliding_above,
-    undetermined,
+    undetermined_sliding,
     with_sliding_friction,
 )
 from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
@@ -329,11 +329,10 @@ class MoreauStepper:
             return []
         normal = np.searchsorted(rows, laws.under[which])
         across = np.searchsorted(rows, laws.across[which])
-        against = -rates[which] / np.hypot(*rates[which].T)[:, None]
         smooth, sideways = A[np.ix_(normal, normal)], A[normal][:, across]
-        K = with_sliding_friction(smooth, sideways[:, :, 0], sideways[:, :, 1], laws.friction[which], *against.T)
         b = (touch.J @ free.acceleration + touch.bias)[laws.under[which]]
-        return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
+        names = [self.names[i] for i in laws.under[which]]
+        return undetermined_sliding(names, laws.friction[which], rates[which], smooth, sideways, b)
 
 
 def advance_positions(system: System, state: State, h, share) -> State:
@@ -355,10 +354,10 @@ def _both(one, other):
     return math.where(one, math.where(other, 1.0, 0.0), 0.0)
 
 
-def least_rate(width, rate, restitution: float, h, rest, share):
+def least_rate(width, rate, restitution: Scalar, h, rest, share):
     """Least rate of a gap after a step; penetration is removed over a whole step at least, without oscillation."""
     shut = math.where(width > 0.0, -width / ((1.0 - share) * h), -width / h)
-    if not restitution:
+    if isinstance(restitution, float) and not restitution:
         return shut
     hit = _both(width + h * rate <= 0.0, rate < -rest)
     return math.where(hit > share, -restitution * rate, shut)

@@ -100,6 +100,25 @@ def with_sliding_friction(smooth, one, other, friction, along, aside):
     return smooth + friction * (one * along + other * aside)
 
 
+def undetermined_sliding(names: list[str], friction, rates, smooth, sideways, b) -> list[Paradox]:
+    """Smallest sets of sliding contacts with undetermined forces, by their sliding velocities.
+
+    Parameters
+    ----------
+    names : list of str
+        The contacts.
+    friction, rates : ndarray, shape (k,), (k, 2)
+        Coefficients, and sliding velocities.
+    smooth, sideways : ndarray, shape (k, k), (k, k, 2)
+        Accelerations d̈ by unit forces along the normals, and along the tangential directions.
+    b : ndarray, shape (k,)
+        Accelerations d̈ without these forces.
+    """
+    against = -rates / np.hypot(*rates.T)[:, None]
+    K = with_sliding_friction(smooth, sideways[:, :, 0], sideways[:, :, 1], friction, *against.T)
+    return undetermined(names, K, smooth, b)
+
+
 def undetermined(names: list[str], K: np.ndarray, smooth: np.ndarray, b: np.ndarray) -> list[Paradox]:
     """Smallest sets of sliding contacts with undetermined forces.
 

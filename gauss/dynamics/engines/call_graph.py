@@ -100,6 +100,9 @@ def _recorded(system: System) -> RecordedSections:
     write_section("residual", lambda graph, v, own: graph.residual(rates[v], multipliers[own], tau[v]))
     write_section("slip", lambda graph, v, own: graph.velocity_residual())
     write_section("closure", lambda graph, v, own: graph.loop_residual()[::-1])
+    recorder.section("factor damped")
+    for graph in graphs:
+        graph.factor_damped()
     for section, mu in (("multipliers", MU), ("damped", DAMPED)):
         recorder.section(section)
         found = [graph.multipliers(given["gap"][own], mu) for graph, own in zip(graphs, rows, strict=True)]

@@ -17,8 +17,8 @@ from gauss.system import System
 
 COMPILE_THRESHOLD = 500  # certified evaluations that take as long as compiling the assembly, or the refined dynamics
 CONTACT_THRESHOLD = 100  # quadratic programmes that take as long as compiling the active set of a few contacts
-LEAST_THRESHOLD = 25  # evaluations by numpy that take as long as the machine code of a few operations
-PER_OPERATION = 0.25  # further ones for each operation of an evaluation: 0.4 ms of compiling, of 1.6 ms by numpy
+LEAST_THRESHOLD = 40  # evaluations by numpy that take as long as the machine code of a few operations, 40 ms
+PER_OPERATION = 0.015  # further ones for each operation of an evaluation: 0.1 to 0.3 ms of compiling, of 2 to 20 ms by numpy
 
 _at_once: ContextVar[bool] = ContextVar("compiled at once", default=False)
 

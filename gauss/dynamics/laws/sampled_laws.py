@@ -35,15 +35,19 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law", us
         Whether the law is known to use the time: a constant value is then warned of.
     """
 
-    def value(t: float) -> np.ndarray:
+    def values(times) -> np.ndarray:
+        """Values (k, n) at times (k,)."""
         try:
-            return np.ravel(np.asarray(law(t, motion), dtype=float))
+            found = [law(t, motion) for t in times]
+            if any(isinstance(one, np.ndarray | list | tuple) for one in found):
+                found = [np.ravel(np.asarray(one, dtype=float)) for one in found]
+            return np.array(found, dtype=float).reshape(len(found), -1)
         except Exception as error:  # a law may fail in any way at other times
             raise _NoValueError from error
 
     try:
         with preserved(law):
-            return _located(value, begin, end, what, _count(motion, end - begin), CONSTANT if uses_time else "")
+            return _located(values, begin, end, what, _count(motion, end - begin), CONSTANT if uses_time else "")
     except _NoValueError:  # the motion reports this failure by name
         return NO_TIMES
 
@@ -71,16 +75,13 @@ class _NoValueError(Exception):
     """A law has no value at some time in the initial state."""
 
 
-def _located(value, begin: float, end: float, what: str, count: int, constant: str) -> Timetable:
+def _located(values_at, begin: float, end: float, what: str, count: int, constant: str) -> Timetable:
     """Jumps of a function of time, and ends of the intervals in which it is constant."""
     jitter = (0.6180339887498949 * np.arange(count)) % 1.0  # no period coincides with the samples
     times = begin + (end - begin) * np.concatenate([[0.0], (np.arange(count) + 0.5 + 0.5 * (jitter - 0.5)) / count, [1.0]])
-    found = [value(t) for t in times]
-    if len({entry.size for entry in found}) > 1:
-        raise _NoValueError
-    values = np.array(found)
+    values = values_at(times)
     places = np.linspace(0, len(times) - 1, REPEATED_SAMPLES).astype(int)
-    if not np.array_equal([value(times[place]) for place in places], values[places], equal_nan=True):
+    if not np.array_equal(values_at(times[places]), values[places], equal_nan=True):
         return Timetable(NO_TIMES.switches, NO_TIMES.mesh, (FORGETS.format(what),))
     change = np.abs(np.diff(values, axis=0)).max(axis=1)
     moves = change > 0.0
@@ -92,7 +93,7 @@ def _located(value, begin: float, end: float, what: str, count: int, constant: s
     if len(jumps) > MOST_JUMPS:
         return NO_TIMES
     close = CLOSE * max(abs(begin), abs(end))
-    switches = [_bisected(value, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
+    switches = [_bisected(values_at, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
     inside = _cells(times, moves)
     return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])
 
@@ -116,11 +117,11 @@ def _cells(times: np.ndarray, moves: np.ndarray) -> np.ndarray:
     return np.unique(np.concatenate([np.zeros(0), *mesh]))
 
 
-def _bisected(value, low: float, high: float, below: np.ndarray, above: np.ndarray, close: float) -> float:
+def _bisected(values_at, low: float, high: float, below: np.ndarray, above: np.ndarray, close: float) -> float:
     """Time of the largest change of a value between two times, to the last digits."""
     while high - low > close:
         middle = 0.5 * (low + high)
-        here = value(middle)
+        here = values_at([middle])[0]
         if np.abs(here - below).max() > np.abs(above - here).max():
             high, above = middle, here
         else:

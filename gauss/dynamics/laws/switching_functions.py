@@ -21,7 +21,7 @@ from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_ti
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
 from gauss.integrators import Point
-from gauss.system import State, System, coordinate_rates
+from gauss.system import State, System, coordinate_rates, coordinate_units
 
 PARTS = 8  # subintervals of a step
 JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
@@ -68,6 +68,7 @@ class SwitchingFunctions:
         timed = {node.index for node in of_time(outputs, self._clock)} if outputs else set()
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
         self.pairs = self._distinct(_compared(nodes))
+        self.noise = self._rounding()
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
         self.jumps = [_jumps(x) for x in (*starmap(sub, self.pairs), *self.steps)]
         self.peaks = [x for x in _exponents(outputs) if x.index not in timed]
@@ -115,7 +116,7 @@ class SwitchingFunctions:
         slopes = self._slopes(asked)
         sides, jumps = list(chain(*self.pairs)), list(chain(*self.jumps))
         ends = [self._at(asked, node) for node in nodes]
-        crossings, crossed = 0.0, 1.0
+        crossings, distinct, crossed = 0.0, 0.0, 1.0
         hidden: Scalar = 1.0
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
         counts = len(asked), len(slopes), len(sides), len(jumps)
@@ -131,16 +132,24 @@ class SwitchingFunctions:
             middle = (j + 0.5) / PARTS
             hidden = _hidden_peaks((ends[j][conditions:], ends[j + 1][conditions:]), tops[j], highest, hidden, middle)
             for k, value in enumerate(values[:conditions]):
-                noise = SIGN_ROUNDING * size[k] if k < len(self.pairs) else None
+                noise = SIGN_ROUNDING * size[k] + self.noise[k] if k < len(self.pairs) else None
                 changes, straddles = _changes(value, ends[j][k], ends[j + 1][k], noise)
                 turns = _turns(rates[k] if slopes else None)
                 for jump in islice(jumping, len(self.jumps[k])):
                     turns = math.maximum(turns, jump)
                 crossings = crossings + changes
-                crossed = math.where(changes > 0.0, math.minimum(crossed, middle), crossed)
+                heard = self._beyond_rounding(k, changes, ends[j][k], ends[j + 1][k])
+                distinct = distinct + heard
+                crossed = math.where(heard > 0.0, math.minimum(crossed, middle), crossed)
                 unclear = straddles * turns * (1.0 - changes)
                 hidden = math.where(unclear > 0.0, math.minimum(hidden, middle), hidden)
-        return math.minimum(hidden, math.where(crossings > 1.5, crossed, 1.0)), crossings
+        return math.minimum(hidden, math.where(distinct > 1.5, crossed, 1.0)), crossings
+
+    def _beyond_rounding(self, k: int, changes: Scalar, before: Scalar, after: Scalar) -> Scalar:
+        """Changes of the sign of a function, 0 where its values at both ends of a subinterval are rounding."""
+        if k >= len(self.pairs) or not self.noise[k]:
+            return changes
+        return math.where(math.maximum(math.abs(before), math.abs(after)) > self.noise[k], changes, 0.0)
 
     def _distinct(self, pairs: list) -> list:
         """Pairs with linearly independent differences: x < 0 and x > 0 are one surface.
@@ -161,6 +170,29 @@ class SwitchingFunctions:
             if not any(np.allclose(shape, other, rtol=SIGN_ROUNDING, atol=0.0) for other in kept.values()):
                 kept[k] = shape
         return [pairs[k] for k in kept]
+
+    def _rounding(self) -> np.ndarray:
+        """Rounding of the switching function of each pair, by that of coordinates and rates of the size of the scene.
+
+        It bounds what is left where coordinates and rates are zero but for rounding, as in a mechanism at rest. Of a few
+        states the least, for a function may be steep in some.
+        """
+        if not self.pairs:
+            return np.zeros(0)
+        system, eps = self.system, np.finfo(float).eps
+        lengths = np.array([system.scale.length if unit == "m" else 1.0 for unit in coordinate_units(system).values()])
+        sizes = np.concatenate([[system.scale.time], lengths, system.scale.rates])
+        off = eps * np.concatenate([[0.0], sizes[1:]])  # time is exact
+        centre = np.concatenate([[0.0], system.reference.q, np.zeros(system.n_v)])
+        rng, found = np.random.default_rng(0), np.full(len(self.pairs), np.inf)
+        for _ in range(POINTS):
+            point = centre + sizes * rng.uniform(0.1, 0.5, sizes.size)
+            near = [Interval(low, high) for low, high in zip(point - off, point + off, strict=True)]
+            given = {symbol.index: around for symbol, around in zip(self._symbols, near, strict=True)}
+            with np.errstate(all="ignore"):
+                widths = [float(0.5 * (g.high - g.low)) for g in enclose(list(starmap(sub, self.pairs)), given)]
+            found = np.fmin(found, widths)
+        return np.where(np.isfinite(found), found, 0.0)
 
     @cached_property
     def machine_code(self) -> Kernel:

@@ -7,10 +7,11 @@ from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.store import cached
 from gauss.scene.stateful_laws import preserved
 from gauss.scene.values import arguments, as_function, is_scalar
-from gauss.system import BoundLoad, State, System
+from gauss.system import BoundLoad, State, System, coordinate_units
 
 PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # times of comparison, in the time of the scene
 AGREEMENT = 1e-6  # relative: traced functions may have other round-off
+CANCELLATION = 1e-12  # of a law, relative to its value in a generic state: where terms cancel, as at rest, round-off is left
 UNTRACEABLE = ("TypeError: ", "TracerError: ")
 FIELDS = ("effort", "force", "moment")  # fields of loads that hold laws
 
@@ -129,6 +130,7 @@ def _agrees(law, traced: Function, motion: Kinematics) -> bool:
     """Whether a law and its trace agree at the probe times; times at which the law fails do not count."""
     system, state = motion.system, motion.system.reference
     symbols = [motion.state.t, *motion.state.q, *motion.state.v]
+    rounding = CANCELLATION * _generic_size(traced, motion)
     for t in PROBES * system.scale.time:
         try:
             with preserved(law):
@@ -139,6 +141,21 @@ def _agrees(law, traced: Function, motion: Kinematics) -> bool:
         except Exception:  # the motion reports failures
             continue
         size = max(np.abs(called).max(initial=0.0), np.abs(found).max(initial=0.0))
-        if np.shape(called) != np.shape(found) or (np.abs(called - found) > AGREEMENT * size).any():
+        if np.shape(called) != np.shape(found) or (np.abs(called - found) > AGREEMENT * size + rounding).any():
             return False
     return True
+
+
+def _generic_size(traced: Function, motion: Kinematics) -> float:
+    """Largest finite value of a traced law in a state away from the reference by the scale of the scene; 0 without one."""
+    system, state = motion.system, motion.system.reference
+    rng = np.random.default_rng(0)
+    units = np.array([system.scale.length if unit == "m" else 1.0 for unit in coordinate_units(system).values()])
+    q = state.q + units * rng.uniform(0.3, 1.0, system.n_q)
+    given = [system.scale.time, *q, *(system.scale.rates * rng.uniform(0.3, 1.0, system.n_v))]
+    try:
+        folded = substitute(traced.outputs, [motion.state.t, *motion.state.q, *motion.state.v], given)
+        values = np.abs([float(one.value) if isinstance(one, Expression) else float(one) for one in folded])
+    except (ArithmeticError, ValueError, TypeError):
+        return 0.0
+    return float(np.max(values, where=np.isfinite(values), initial=0.0))

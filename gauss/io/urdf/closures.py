@@ -74,8 +74,8 @@ class LoopClosure:
 
     def with_ends(self, link_of: Callable[[str], str]) -> "LoopClosure":
         """The same loop between other links, by their names."""
-        ends = (replace(end, link=link_of(end.link)) for end in (self.predecessor, self.successor))
-        return replace(self, **dict(zip(("predecessor", "successor"), ends, strict=True)))
+        one, other = (replace(end, link=link_of(end.link)) for end in (self.predecessor, self.successor))
+        return replace(self, predecessor=one, successor=other)
 
     @property
     def _ends(self) -> tuple[tuple[str, FrameOnLink], ...]:
@@ -109,7 +109,7 @@ def add_coupling(scene: Scene, source: Source, name: str, predecessor: str, succ
     what = f"coupling {name!r}"
     if not ratio:
         raise SceneError(f"{what}: the ratio must not be 0; make the joint fixed.")
-    chains = [_chain(source, link, f"{what}: {side}") for side, link in _sides_of(predecessor, successor)]
+    chains = [_checked_chain(source, link, f"{what}: {side}") for side, link in _sides_of(predecessor, successor)]
     shared = {joint for joint, _ in chains[0]} & {joint for joint, _ in chains[1]}
     moving = [[joint for joint, _ in chain if joint not in shared and joint in scene.joints] for chain in chains]
     for (side, link), joints in zip(_sides_of(predecessor, successor), moving, strict=True):
@@ -127,17 +127,22 @@ def _sides_of(predecessor: str, successor: str):
     return ("predecessor", predecessor), ("successor", successor)
 
 
-def _chain(source: Source, link: str, what: str) -> list[tuple[str, str]]:
-    """Joints with their parents from a link to the root."""
+def _checked_chain(source: Source, link: str, what: str) -> list[tuple[str, str]]:
+    """Joints with their parents from a link to the root; a SceneError if there is no such link."""
     links = [element.get("name", "") for element in source.root.findall("link")]
     if link not in links:
         raise SceneError(f"{what}: no link {link!r}. {did_you_mean(link, links)}")
+    return chain_to_root(source, link)
+
+
+def chain_to_root(source: Source, link: str) -> list[tuple[str, str]]:
+    """Joints with their parents from a link to the root."""
     inward = {}
     for joint in source.root.findall("joint"):
         parent, child = joint.find("parent"), joint.find("child")
         if parent is not None and child is not None:
             inward[child.get("link")] = (joint.get("name", ""), parent.get("link", ""))
-    chain = []
+    chain: list[tuple[str, str]] = []
     while link in inward and len(chain) <= len(inward):
         chain.append(inward[link])
         link = chain[-1][1]
@@ -159,7 +164,14 @@ def _frame_name(scene: Scene, name: str, end: FrameOnLink, carried: tuple[str, P
     if end.pose is IDENTITY or (np.array_equal(end.pose[0], np.eye(3)) and not end.pose[1].any()):
         return link
     body, (R, p) = carried
-    return scene.frame(name, body, p, R).name
+    for number in range(1, len(scene.frames) + 2):
+        tried = name if number == 1 else f"{name} {number}"
+        there = scene.frames.get(tried)
+        if there is None:
+            return scene.frame(tried, body, p, R).name
+        if there.body == body and np.array_equal(rotation_matrix(there.rotation), R) and np.array_equal(there.position, p):
+            return tried
+    raise AssertionError("one name of so many is free")
 
 
 def _same_loop(scene: Scene, joint, kind: str, ends) -> bool:

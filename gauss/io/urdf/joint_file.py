@@ -1,40 +1,28 @@
 """Loops, joint types and motors of a URDF file, in a YAML file beside it (the format of example-parallel-robots).
 
-    closed_loop: [[frame, frame], …]    pairs of links whose frames meet
-    type: [6d, 3d, …]                   6d: the frames coincide; 3d: their origins do
-    joint_name, joint_type              joints of the URDF that are replaced: SPHERICAL, UJOINT_XY (also YZ, ZX, …), FIXED
-    name_mot: […]                       actuated joints, which become inputs of the scene
-
-Read as plain text nodes: nothing is constructed, aliases and tags are refused.
+closed_loop: [[frame, frame], …]    pairs of links whose frames meet
+type: [6d, 3d, …]                   6d: the frames coincide; 3d: their origins do
+joint_name, joint_type              joints of the URDF that are replaced: SPHERICAL, UJOINT_XY (also YZ, ZX, …), FIXED
+name_mot: […]                       actuated joints, which become inputs of the scene
 """
 
-import re
 from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from gauss.errors import FileError, SceneError, did_you_mean, extra
+from gauss.errors import FileError, SceneError, did_you_mean
 from gauss.io.guard import Source
 from gauss.io.urdf.closures import FrameOnLink, LoopClosure
+from gauss.io.yaml_nodes import Marked, yaml_entries
 from gauss.scene import Scene
 
 ENDINGS = (".yaml", ".yml")
-LARGEST_TEXT = 1_000_000  # bytes; the largest known file has 2 000
-DEEPEST_LISTS = 8  # lists inside lists
 LOOP_TYPES = {"3d": "ball", "6d": "fixed"}
 AXIS_OF = {"X": "1 0 0", "Y": "0 1 0", "Z": "0 0 1"}
 UNIVERSAL = {f"UJOINT_{one}{other}": (one, other) for one, other in permutations(AXIS_OF, 2)}
 JOINT_TYPES = ("SPHERICAL", "FIXED", *UNIVERSAL)
 KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
-
-
-class Marked(NamedTuple):
-    """A text, or a list of such, and where it stands ("robot.yaml:3")."""
-
-    value: "str | list[Marked]"
-    place: str
 
 
 @dataclass(frozen=True)
@@ -124,7 +112,7 @@ def joint_file(path: Path) -> JointFile:
     beside = next((path.with_suffix(ending) for ending in ENDINGS if path.with_suffix(ending).is_file()), None)
     if beside is None:
         return JointFile()
-    entries = _entries(beside)
+    entries = yaml_entries(beside)
     if not {"closed_loop", "joint_name"} & set(entries):
         return JointFile()  # of another tool
     unknown = next((key for key in entries if key not in KEYS), None)
@@ -146,7 +134,7 @@ def _closure(pair: Marked, kind: Marked) -> LoopClosure:
     chosen = str(_name(kind, "type").value).lower()
     if chosen not in LOOP_TYPES:
         raise FileError(f"{kind.place}: type {kind.value!r} of a loop. {did_you_mean(chosen, LOOP_TYPES)}")
-    return LoopClosure(f"{frames[0]} to {frames[1]}", LOOP_TYPES[chosen], *map(FrameOnLink, frames))
+    return LoopClosure(f"{frames[0]} to {frames[1]}", LOOP_TYPES[chosen], FrameOnLink(frames[0]), FrameOnLink(frames[1]))
 
 
 def _link_of(source: Source, name: str) -> str:
@@ -211,51 +199,3 @@ def _list(entry: Marked, key: str) -> list[Marked]:
     if isinstance(entry.value, str):
         raise FileError(f"{entry.place}: {key}: expected a list, got {entry.value[:40]!r}.")
     return entry.value
-
-
-def _entries(path: Path) -> dict[str, Marked]:
-    """Entries of the mapping that a YAML file holds.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or holds aliases, tags, or a key twice.
-    """
-    with extra("yaml"):
-        import yaml  # few robots need it
-    try:
-        if path.stat().st_size > LARGEST_TEXT:
-            raise FileError(f"{path}: larger than {LARGEST_TEXT / 1e6:g} MB; no list of loops is.")
-        text = path.read_text(encoding="utf-8")
-        if re.search(r"[\[{]\s*" * DEEPEST_LISTS, text):
-            raise FileError(f"{path}: lists are nested more than {DEEPEST_LISTS - 1} deep.")
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) or getattr(event, "tag", None):
-                raise FileError(f"{path}:{event.start_mark.line + 1}: anchors, aliases and tags are not read.")
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-        return _mapping(yaml, path, node)
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: cannot be read: {error}.") from error
-    except RecursionError:
-        raise FileError(f"{path}: lists are nested too deep.") from None
-    except yaml.YAMLError as error:
-        raise FileError(f"{path}: not YAML: {' '.join(str(error).split())}.") from error
-
-
-def _mapping(yaml, path: Path, node) -> dict[str, Marked]:
-    if not isinstance(node, yaml.MappingNode):
-        return {}
-    found: dict[str, Marked] = {}
-    for key, entry in node.value:
-        if key.value in found:
-            raise FileError(f"{path}:{key.start_mark.line + 1}: the key {key.value!r} stands twice.")
-        if isinstance(key, yaml.ScalarNode):
-            found[key.value] = _marked(yaml, path, entry)
-    return found
-
-
-def _marked(yaml, path: Path, node) -> Marked:
-    place = f"{path}:{node.start_mark.line + 1}"
-    if isinstance(node, yaml.SequenceNode):
-        return Marked([_marked(yaml, path, entry) for entry in node.value], place)
-    return Marked(node.value if isinstance(node, yaml.ScalarNode) else "", place)

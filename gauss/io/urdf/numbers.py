@@ -9,6 +9,8 @@ from copy import deepcopy
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from gauss.errors import FileError, did_you_mean
 from gauss.io.guard import Source
 from gauss.io.numbers import numbers
@@ -110,3 +112,16 @@ def _normalise(source: Source, element: Element, target: Element):
 
 def _short(text: str) -> str:
     return repr(text if len(text) <= 40 else f"{text[:40]}…")
+
+
+def text_of(value) -> str:
+    """One or several numbers as text, with all digits."""
+    return " ".join(repr(float(number)) for number in np.atleast_1d(value))
+
+
+def roll_pitch_yaw(R) -> tuple[float, float, float]:
+    """Angles [rad] about the fixed axes x, y, z in this order; exact, too, where the pitch is a right angle."""
+    yaw = np.arctan2(R[1, 0], R[0, 0]) if R[0, 0] or R[1, 0] else 0.0
+    s, c = np.sin(yaw), np.cos(yaw)
+    roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return float(roll), float(np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])), float(yaw)

@@ -46,10 +46,11 @@ def add_loops_and_couplings(scene: Scene, source: Source):
     for number, element in enumerate(source.root.findall("coupling"), start=1):
         with placed(source, element):
             name = element.get("name") or f"coupling {number}"
-            ends = [_link(source, element, side).get("link", "") for side in ("predecessor", "successor")]
+            one, other = (_link(source, element, side).get("link", "") for side in ("predecessor", "successor"))
             kind = element.get("type", COUPLING_TYPES[0])
             _require_known(source, element, kind, COUPLING_TYPES)
-            add_coupling(scene, source, name, *ends, ratio=value(source, _part(source, element, "ratio"), "value"))
+            ratio = value(source, _part(source, element, "ratio"), "value")
+            add_coupling(scene, source, name, one, other, ratio)
 
 
 def _loop(source: Source, element: Element) -> LoopClosure:
@@ -57,10 +58,10 @@ def _loop(source: Source, element: Element) -> LoopClosure:
     _require_known(source, element, kind, LOOP_KINDS)
     if not element.get("name"):
         raise FileError(f"{source.place(element)}: <loop> has no name.")
-    ends = [_frame(source, element, side) for side in ("predecessor", "successor")]
+    one, other = (_frame(source, element, side) for side in ("predecessor", "successor"))
     axis = element.find("axis")
     along = (1.0, 0.0, 0.0) if axis is None else values(source, axis, "xyz")
-    return LoopClosure(element.get("name", ""), LOOP_KINDS[kind], *ends, None if kind in WITHOUT_AXIS else along)
+    return LoopClosure(element.get("name", ""), LOOP_KINDS[kind], one, other, None if kind in WITHOUT_AXIS else along)
 
 
 def _frame(source: Source, element: Element, side: str) -> FrameOnLink:

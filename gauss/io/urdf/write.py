@@ -1,4 +1,4 @@
-"""Scenes as URDF: the spanning tree in the file itself, and in a file beside it everything that URDF cannot say.
+"""Scenes as URDF: the spanning tree and its loops (URDF+) in the file itself, and in a file beside it everything else.
 
 Hinges, slides and fixed joints keep their names; other joints of hinges and slides become chains of them, named like the
 rates of :attr:`gauss.System.coordinates`; ball and free joints leave a link floating, and a ball joint then closes a loop.
@@ -16,12 +16,15 @@ import numpy as np
 from gauss.dynamics import compile_scene
 from gauss.errors import FileError
 from gauss.io.mjcf.inertia import inertial
-from gauss.io.mjcf.tree import ElementaryJoint, Limb, limb, spanning_tree
+from gauss.io.mjcf.tree import ElementaryJoint, Limb, joint_frame, limb, spanning_tree
+from gauss.io.urdf.numbers import roll_pitch_yaw, text_of
+from gauss.io.urdf.plus_write import write_coupling, write_loop
 from gauss.io.urdf.side import ENDS, side_file
 from gauss.rotations import from_quaternion
 from gauss.scene import GROUND, Coupling, Drive, Joint, Scene, Start
 from gauss.scene.toml import toml_text
 from gauss.scene.values import rotation_matrix
+from gauss.system import System
 from gauss.system.frames import relative
 
 ROOT = "world"
@@ -37,6 +40,8 @@ class UrdfDocument:
     ----------
     scene : Scene
         What is written.
+    system : System
+        Its system.
     limbs : list of Limb
         Bodies of the tree.
     root : Element
@@ -50,6 +55,7 @@ class UrdfDocument:
     """
 
     scene: Scene
+    system: System
     limbs: list[Limb]
     root: Element
     rest: Scene
@@ -89,14 +95,15 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
     tree, cut = spanning_tree(scene)
     limbs = [limb(system, *edge) for edge in tree]
     rest = Scene(scene.name, scene.gravity)
-    document = UrdfDocument(scene, limbs, Element("robot", name=scene.name), rest)
+    document = UrdfDocument(scene, system, limbs, Element("robot", name=scene.name), rest)
     SubElement(document.root, "link", name=_ground(scene))
     for one in limbs:
         _write_limb(document, one)
     for frame in scene.frames.values():
         _write_frame(document, frame)
     for joint in cut:
-        document.rest.joints[joint.name] = _moved(joint, document.shifts)
+        if not write_loop(document, joint, _ground(scene)):
+            document.rest.joints[joint.name] = _moved(joint, document.shifts)
     _keep_rest(document)
     said = [f"{kind} {name!r}" for kind, name in _listed(document.rest)]
     beside = "" if not said and rest.gravity == Scene().gravity else toml_text(document.rest)
@@ -157,52 +164,54 @@ def _write_step(document: UrdfDocument, one: Limb, step: ElementaryJoint, on: st
     if one.joint.limits is not None and step.name == one.joint.name:
         limits, kind = one.joint.limits, "revolute" if step.kind == "hinge" else kind
     joint = _joint(document, step.name, kind, on, child, R, p)
-    SubElement(joint, "axis", xyz=_text(step.axis))
+    SubElement(joint, "axis", xyz=text_of(step.axis))
     if kind != "continuous":
         ends = {"lower": limits[0], "upper": limits[1], "effort": FAR, "velocity": FAR}
-        SubElement(joint, "limit", {key: _text(value) for key, value in ends.items()})
+        SubElement(joint, "limit", {key: text_of(value) for key, value in ends.items()})
     document.mimics[step.name] = joint
 
 
 def _float(document: UrdfDocument, one: Limb, on: str, R, p):
     """Floating link; a joint that says more goes beside it."""
-    plain = _is_plain(document.scene, one)
+    plain = _is_plain(document.system, one)
     _joint(document, one.joint.name if plain else f"{one.body} floats", "floating", on, one.body, R, p)
     if not plain:
         document.rest.joints[one.joint.name] = one.joint
 
 
-def _is_plain(scene: Scene, one: Limb) -> bool:
+def _is_plain(system: System, one: Limb) -> bool:
     """Whether a joint is free and counts from the frame of its child, as that of a floating link does in URDF."""
-    joint = one.joint
-    if joint.kind != "free" or joint.child != one.body or joint.frame != "world":
+    if one.joint.kind != "free" or one.joint.child != one.body:
         return False
-    R, p = relative(scene, GROUND, one.body)
-    return bool(np.array_equal(joint.axes(), R) and np.array_equal(joint.at, p))
+    R, p = joint_frame(system, one.joint, one.body)
+    return bool(np.array_equal(R, np.eye(3)) and not p.any())
 
 
 def _joint(document: UrdfDocument, name: str, kind: str, parent: str, child: str, R, p) -> Element:
     joint = SubElement(document.root, "joint", name=name, type=kind)
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=child)
-    SubElement(joint, "origin", xyz=_text(p), rpy=_text(roll_pitch_yaw(R)))
+    SubElement(joint, "origin", xyz=text_of(p), rpy=text_of(roll_pitch_yaw(R)))
     return joint
 
 
 def _write_link(document: UrdfDocument, one: Limb):
     body, shift = document.scene.bodies[one.body], document.shifts[one.body]
     link = SubElement(document.root, "link", name=one.body)
-    if not body.mass:
+    if body.inertia_as_given:
+        (J, R), remark = body.principal(), "no body has this inertia"
+    elif body.mass:
+        values, remark = inertial(document.scene, document.limbs, one)
+        J, R = values["diaginertia"], from_quaternion(values["quat"])
+    else:
         return
-    values, remark = inertial(document.scene, document.limbs, one)
-    R = from_quaternion(values["quat"])
-    tensor = R @ np.diag(values["diaginertia"]) @ R.T
+    tensor = R @ np.diag(J) @ R.T
     if remark:
         link.append(Comment(f" {remark} "))
     given = SubElement(link, "inertial")
-    SubElement(given, "origin", xyz=_text(np.array(body.com) - shift), rpy="0 0 0")
-    SubElement(given, "mass", value=_text(body.mass))
-    entries = {f"i{'xyz'[i]}{'xyz'[j]}": _text(tensor[i, j]) for i in range(3) for j in range(i, 3)}
+    SubElement(given, "origin", xyz=text_of(np.array(body.com) - shift), rpy="0 0 0")
+    SubElement(given, "mass", value=text_of(body.mass))
+    entries = {f"i{'xyz'[i]}{'xyz'[j]}": text_of(tensor[i, j]) for i in range(3) for j in range(i, 3)}
     SubElement(given, "inertia", entries)
 
 
@@ -215,7 +224,7 @@ def _write_frame(document: UrdfDocument, frame):
 
 def _mimic(document: UrdfDocument, driven: str, driver: str, ratio: float, offset: float):
     joint = document.mimics.pop(driven)
-    SubElement(joint, "mimic", joint=driver, multiplier=_text(ratio), offset=_text(offset))
+    SubElement(joint, "mimic", joint=driver, multiplier=text_of(ratio), offset=text_of(offset))
 
 
 def _keep_rest(document: UrdfDocument):
@@ -227,8 +236,14 @@ def _keep_rest(document: UrdfDocument):
         else:
             rest.couplings[coupling.name] = coupling
     for group in ("relations", "shapes", "contacts", "set_valued"):
-        for name, element in getattr(scene, group).items():
-            getattr(rest, group)[name] = _moved(element, document.shifts)
+        kept = {name: one for name, one in getattr(scene, group).items() if not write_coupling(document, one)}
+        getattr(rest, group).update((name, _moved(one, document.shifts)) for name, one in kept.items())
+    _keep_loads(document)
+
+
+def _keep_loads(document: UrdfDocument):
+    """Put loads and starts into the second file, those of a joint that became a chain one by one."""
+    scene, rest = document.scene, document.rest
     for name, load in scene.loads.items():
         for number, part in enumerate(_split(document, load) if isinstance(load, Drive) else [load]):
             rest.loads[f"{name}{number or ''}"] = _moved(part, document.shifts)
@@ -275,17 +290,5 @@ def _listed(rest: Scene):
     return [(kind.removesuffix("s"), name) for kind in kinds for name in getattr(rest, kind)]
 
 
-def roll_pitch_yaw(R) -> tuple[float, float, float]:
-    """Angles [rad] about the fixed axes x, y, z in this order; exact, too, where the pitch is a right angle."""
-    yaw = np.arctan2(R[1, 0], R[0, 0]) if R[0, 0] or R[1, 0] else 0.0
-    s, c = np.sin(yaw), np.cos(yaw)
-    roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
-    return float(roll), float(np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])), float(yaw)
-
-
 def _tuple(values) -> tuple:
     return tuple(float(value) for value in values)
-
-
-def _text(value) -> str:
-    return " ".join(repr(float(number)) for number in np.atleast_1d(value))

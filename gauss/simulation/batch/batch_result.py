@@ -10,7 +10,7 @@ import numpy as np
 from gauss.codegen import Kernel
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.outputs import INERTIAL, output_function, shape_of, split
+from gauss.dynamics.outputs import FORCES, INERTIAL, output_function, shape_of, split
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean
@@ -142,8 +142,8 @@ class Rollout:
         if name not in outputs:
             raise StateError(f"no output {name!r}. {did_you_mean(name, outputs)}")
         output = outputs[name]
-        if output.kind in INERTIAL and self.system.nonsmooth:
-            raise SimulationError(f"output {name!r}: accelerations of contacts are means over steps; use gauss.Simulator.")
+        if output.kind in (*INERTIAL, *FORCES) and self.system.nonsmooth:
+            raise SimulationError(f"output {name!r}: with contacts, means over steps; use gauss.SimulatorBatch.")
         return split(self._measured, self.system.scene)[name].reshape(*self.q.shape[:2], *shape_of(output, self.system))
 
     @cached_property

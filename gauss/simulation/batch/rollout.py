@@ -146,22 +146,12 @@ def _fixed(
     device: str | None,
 ) -> Rollout:
     """Batch with fixed steps."""
-    if step is None or not np.isfinite(step) or step <= 0:
-        raise SimulationError(f"step: expected a positive number, got {step!r}.")
-    if steps is None:
-        raise SimulationError("steps: expected a positive whole number, got None.")
-    _check_counts({"steps": steps, "every": every})
+    steps, step = _checked_steps(steps, step, every)
     starts = columns(system, q0, v0)
     control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
-    held = control is not None
-    kind = FixedStepBatch if device is None else DeviceFixedStepBatch
-    batch = kind(fixed_step_code(system, method, held, device), starts)
-    refuse_inconsistent(system, starts, batch.residual)
-    if method.nonsmooth:
-        for k in range(batch.size):
-            moreau_stepper(system).refuse_penetration(State(0.0, *np.split(starts[:, k], [system.n_q])))
+    batch = _begun(system, starts, method, control is not None, device)
     times, t = _switching(system, starts, steps * step).times, step * every * np.arange(steps // every + 1)
     run = {"integrator": method.name, "step": step, "times": t}
     settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
@@ -169,10 +159,8 @@ def _fixed(
         return _singly(system, starts, steps, run, settings, control)
     samples = batch.run(steps, step, every, threads, control)
     finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
-    if not held and (broken := np.flatnonzero(solved & ~finite)).size:
-        raise SimulationError(
-            f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
-        )
+    if control is None:
+        _refuse_divergence(solved & ~finite)
     is_right = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
     doubtful = np.flatnonzero((finite & ~is_right) | ~solved)
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
@@ -186,6 +174,36 @@ def _fixed(
     lost, repeated = tuple(map(int, np.flatnonzero(~finite))), tuple(map(int, doubtful))
     marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again}
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
+
+
+def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[int, float]:
+    """Number and length [s] of fixed steps."""
+    if step is None or not np.isfinite(step) or step <= 0:
+        raise SimulationError(f"step: expected a positive number, got {step!r}.")
+    if steps is None:
+        raise SimulationError("steps: expected a positive whole number, got None.")
+    _check_counts({"steps": steps, "every": every})
+    return steps, step
+
+
+def _begun(system: System, starts: np.ndarray, method: FixedStep, held: bool, device: str | None):
+    """Batch at its initial states, which meet the constraints and do not penetrate."""
+    kind = FixedStepBatch if device is None else DeviceFixedStepBatch
+    batch = kind(fixed_step_code(system, method, held, device), starts)
+    refuse_inconsistent(system, starts, batch.residual)
+    if method.nonsmooth:
+        for start in starts.T:
+            moreau_stepper(system).refuse_penetration(State(0.0, *np.split(start, [system.n_q])))
+    return batch
+
+
+def _refuse_divergence(diverged: np.ndarray):
+    """Raise a SimulationError where motions without inputs diverged."""
+    broken = np.flatnonzero(diverged)
+    if broken.size:
+        raise SimulationError(
+            f"{broken.size} of {diverged.size} motions diverged, the first is number {broken[0]}; shorten the step."
+        )
 
 
 def _result(system: System, t: np.ndarray, samples: np.ndarray, **fields) -> Rollout:

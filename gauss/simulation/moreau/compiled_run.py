@@ -19,6 +19,7 @@ from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.handover import finished
 from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_size
+from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
@@ -54,7 +55,10 @@ class CompiledMoreauRun(CompiledFixedRun):
         """
         self.run()
         fallback = lambda start, samples: self.python_steps.collect(start, samples, False)  # noqa: E731
-        return replace(finished(self, fallback), system=self.whole.system, step=self.step)
+        found = replace(finished(self, fallback), system=self.whole.system, step=self.step)
+        relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
+        warn_of_laws(float(method_state_of(self.layout.point(self.point))[-1]), relaxed, found.stats.steps)
+        return found
 
     @cached_property
     def python_steps(self) -> MoreauRun:

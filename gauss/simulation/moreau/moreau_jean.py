@@ -9,7 +9,6 @@ restitution; impacts and stick–slip transitions leave errors proportional to t
 found, the step of the convex relaxation is taken, and counted.
 """
 
-import warnings
 from dataclasses import replace
 from typing import NamedTuple, cast
 
@@ -24,8 +23,9 @@ from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.loads import Applied
-from gauss.errors import PainleveWarning, SimulationError
+from gauss.errors import SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
+from gauss.simulation.moreau.contact_warnings import ParadoxWarnings, warn_of_laws
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, retract
@@ -50,13 +50,15 @@ class MoreauRun(PythonRun):
         self.stepper = moreau_stepper(system, backend)
         super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
         self.h, self.relaxed, self.error = step, 0, 0.0
-        self.known: frozenset[frozenset[str]] = frozenset()
+        self.paradoxes = ParadoxWarnings()
         self.force: np.ndarray | None = None
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
         self.stepper.refuse_penetration(start)
-        return super().collect(start, samples, progress)
+        found = super().collect(start, samples, progress)
+        warn_of_laws(self.error, self.relaxed, self.steps)
+        return found
 
     def _first(self, start: State) -> Point:
         """Initial point; accelerations without contact forces are checked in every step."""
@@ -72,20 +74,8 @@ class MoreauRun(PythonRun):
         step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end)
         self.force, self.relaxed = step.force, self.relaxed + (step.error is None)
         self.error = max(self.error, step.error or 0.0)
-        self._warn(step.paradoxes, state.t)
+        self.paradoxes.warn(step.paradoxes, state.t, self.stepper.owner)
         return Rates(step.acceleration, step.power), step.share
-
-    def _warn(self, found, t: float):
-        """Warn of Painlevé's paradox, once for each set of contacts."""
-        for paradox in found:
-            contacts = frozenset(self.stepper.owner(gap) for gap in paradox.gaps)
-            if contacts not in self.known:
-                self.known |= {contacts}
-                warnings.warn(
-                    f"t = {t:.6g} s: {paradox}. The step goes on with an impulse that satisfies the law at its end.",
-                    PainleveWarning,
-                    stacklevel=2,
-                )
 
     def over(self, point: Point, h: float) -> tuple[Rates, float]:
         """Rates of a point over a step of length h, and the share s of the old rates."""

@@ -12,6 +12,7 @@ from gauss.dynamics.contact.contact_stepper import contact_stepper
 from gauss.dynamics.engines import Engine
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Point, Rates
+from gauss.simulation.moreau.contact_warnings import ParadoxWarnings, warn_of_laws
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, in_words
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
@@ -64,14 +65,16 @@ class PairKernelRun(PythonRun):
         self.stepper, system = contact_stepper(problem.system), problem.system
         self.engine = PairKernelEngine(self.stepper)
         super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
-        self.largest, self.relaxed = 0.0, 0
+        self.largest, self.relaxed, self.paradoxes = 0.0, 0, ParadoxWarnings()
         self.h = problem.step or 0.0  # a fixed step is always given
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
         self.stepper.forget()
         self.stepper.refuse_penetration(start)
-        return super().collect(start, samples, progress)
+        found = super().collect(start, samples, progress)
+        warn_of_laws(self.largest, self.relaxed, self.steps)
+        return found
 
     def _first(self, start: State) -> Point:
         self.stepper.check(start)
@@ -88,6 +91,7 @@ class PairKernelRun(PythonRun):
         found = self.stepper.step(point.state, h)
         self.engine.evaluations += 1
         self.largest, self.relaxed = max(self.largest, found.error or 0.0), self.relaxed + (found.error is None)
+        self.paradoxes.warn(found.paradoxes, point.state.t)
         state = self.stepper.projected(State(t, found.q, found.v))
         return Point(state, point.work + h * found.power, point.rates)
 

@@ -59,8 +59,10 @@ def _island(subsystem: Subsystem, bodies: list[int]) -> Subsystem:
     number = {body: i for i, body in enumerate(bodies)} | {GROUND: GROUND}
     joints = [j for j in subsystem.joints if j.parent in number and j.child in number]
     joints = [replace(j, parent=number[j.parent], child=number[j.child]) for j in joints]
-    carried = {body: PlacedFrame(number[f.body], f.R, f.p) for body, f in subsystem.carried.items() if f.body in bodies}
     relations = [relation for relation in subsystem.relations if set(_bodies(subsystem, relation)) & set(bodies)]
+    fixed = {body for relation in relations for body in relation.bodies if subsystem.carried[body].body == GROUND}
+    frames = {body: f for body, f in subsystem.carried.items() if f.body in bodies or body in fixed}
+    carried = {body: PlacedFrame(number[f.body], f.R, f.p) for body, f in frames.items()}
     smaller = replace(
         subsystem,
         relations=tuple(relations),

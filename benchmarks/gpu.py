@@ -1,0 +1,110 @@
+"""A GPU beside one core of this CPU: forward dynamics of many states, and steps of many motions, in double precision.
+
+Run it with:
+
+    python -m benchmarks.gpu [--device cuda] [--states 1048576] [--rounds 7]
+
+States are random, starts meet the constraints. Arrays lie on the device before the clock starts; a run ends when all threads
+have. Forward dynamics come with their error check. Share of the peak: operations of an evaluation, multiply–adds as two,
+beside ``--peak`` in Tflop/s (34 of an H100 without tensor cores, as its maker states). Results are compared with those of
+this CPU. ``--device lanes`` runs the same threads one after the other on this CPU, to try the benchmark. Writes
+benchmarks/results/gpu.csv and .md.
+"""
+
+import time
+from functools import partial
+from statistics import median
+
+import numpy as np
+
+from benchmarks.command import command
+from gauss.bench.machine import header
+from gauss.bench.markdown import head, table
+from models.families import n_four_bar
+
+SCENES = {"Panda": "robot:panda", "four-bar": "four_bar", "Bricard linkage": "bricard"}
+STEPS, STEP, FEW = 50, 1e-4, 256  # of a motion; states that are compared
+TITLES = ("scene", "work", "device", "one core of this CPU", "ratio", "per second", "share of the peak", "difference")
+
+
+def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[dict], list[str]]:
+    """Rows of all measurements."""
+    import gauss
+    from gauss.codegen.gpu.cuda import device_names
+    from gauss.codegen.gpu.devices import device as device_of
+    from gauss.system import random_state
+
+    rows, rng, place = [], np.random.default_rng(0), device_of(device)
+    scenes = {name: gauss.load(source) for name, source in SCENES.items()} | {"ladder of 10 four-bars": n_four_bar(10)}
+    for name, scene in scenes.items():
+        system = gauss.compile_scene(scene)
+        some = [system.initial_state(s.q, s.v) for s in (random_state(system, rng, spread=0.2) for _ in range(FEW))]
+        q, v = (np.tile(np.array([getattr(s, part) for s in some]), (-(-states // FEW), 1)) for part in "qv")
+        function = system.function("forward_dynamics", device=device)
+        held = [place.put(array) for array in (q, v, np.zeros_like(v))]
+        arguments = [(array, array.shape[1], 1) for array in held], place.put(np.zeros(len(q)))
+        runs = {
+            "forward dynamics": (
+                partial(function.rows, len(q), *arguments),
+                partial(system.forward_dynamics, q, v, 0 * v),
+                1,
+            ),
+            "RK4 step": (
+                partial(gauss.rollout, system, q, v, steps=STEPS, step=STEP, every=STEPS, device=device),
+                partial(gauss.rollout, system, q[:4096], v[:4096], steps=STEPS, step=STEP, every=STEPS),
+                STEPS,
+            ),
+        }
+        for work, (there, here, units) in runs.items():
+            one, other = there(), here()
+            found = one[0][0].numpy() if work == "forward dynamics" else one.q
+            known = other if work == "forward dynamics" else other.q
+            count = min(len(found), len(known))
+            difference = np.abs(found[:count] - known[:count]).max()
+            rows.append(
+                {
+                    "scene": name,
+                    "work": work,
+                    "device": _seconds(there, rounds) / (len(q) * units),
+                    "cpu": _seconds(here, rounds) / (len(known) * units),
+                    "operations": function.rows.operations if work == "forward dynamics" else "",
+                    "peak": peak,
+                    "difference": difference / max(1.0, np.abs(known[:count]).max()),
+                }
+            )
+    gpus = device_names() if device.startswith("cuda") else [f"device {device!r}"]
+    return rows, [
+        *header("numpy", "llvmlite", "cuda-bindings"),
+        f"device: {', '.join(gpus)}; {states} states, {STEPS} steps",
+    ]
+
+
+def _seconds(run, rounds: int) -> float:
+    """Median time of a run by the clock."""
+    times = []
+    for _ in range(rounds):
+        began = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - began)
+    return median(times)
+
+
+def page(rows: list[dict], conditions) -> list[str]:
+    """Lines of the page."""
+    lines = []
+    for row in rows:
+        share = 2.0 * row["operations"] / row["device"] / (row["peak"] * 1e12) if row["operations"] else None
+        times = f"{1e9 * row['device']:.3g} ns", f"{1e9 * row['cpu']:.3g} ns", f"{row['cpu'] / row['device']:.3g}"
+        last = f"{1.0 / row['device']:.2e}", "–" if share is None else f"{share:.0%}", f"{row['difference']:.0e}"
+        lines.append([row["scene"], row["work"], *times, *last])
+    return [*head("A GPU beside one core of a CPU", conditions), *table(TITLES, lines)]
+
+
+if __name__ == "__main__":
+    OPTIONS = {
+        "device": ("cuda", "name of the device"),
+        "states": (1 << 20, "states, and motions"),
+        "rounds": (7, "repetitions"),
+        "peak": (34.0, "peak of the device in double precision [Tflop/s]"),
+    }
+    command("gpu", __doc__, measure, page, OPTIONS)

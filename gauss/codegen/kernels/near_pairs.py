@@ -1,0 +1,160 @@
+"""Near contacts in machine code: poses of shapes, boxes along the axes, distances, and rows of near pairs of features.
+
+The kernels of pairs of shapes are called through their addresses, so that this code holds no shape and is made once on a
+machine. A pair whose boxes along the world axes are apart is left out first (Ericson, Real-Time Collision Detection, 2005).
+"""
+
+import ctypes
+
+import numpy as np
+from llvmlite import ir
+
+from gauss.codegen import INTEGER, POINTER, Function, machine
+from gauss.codegen.kernels.arrays import Array, Routine, Value
+
+PART = 16  # own rotation (9), centre (3), sizes (4) of a part in its body
+MOVED = 31  # pose and velocities (24), sizes (4), centre of mass of the body (3)
+DISTANCE_INPUTS = 33  # rotation, centre and sizes of two shapes, length of the scene
+ROW_INPUTS = 2 * MOVED + 4  # columns of two shapes, length of the scene, signs
+ROW = 55  # distance, point, rows of both bodies, biases
+FEATURE = 1 + 2 * MOVED  # address of its rows, places of the columns of both shapes
+KIND = 4  # address of the distances, number of features, first feature, whether overlaps may be missed
+MOST = 128  # pairs of features of one pair of shapes, and one more
+NEAR = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 14)
+INTEGERS = ir.IntType(64).as_pointer()
+
+
+class _NearPairsWriter:
+    def __init__(self, place: Function, module: ir.Module):
+        self.place = place
+        kinds = [INTEGER] * 4 + [INTEGERS] * 6 + [POINTER] * 8
+        r = self.r = Routine(ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), "near"))
+        self.parts, self.pairs, self.capacity, self.bodies = r.integers
+        self.body, self.pair, self.kind, self.feature, self.found, self.count = r.arrays[:6]
+        self.pose, self.own, self.signs, self.deepest, self.settings, self.moved, self.rows, self.depth = r.arrays[6:]
+        self.given, self.gaps = r.buffer(ROW_INPUTS), r.buffer(MOST)
+        self.extents = self.moved.after(self.parts * MOVED)
+        arguments = [INTEGER, POINTER, INTEGER, POINTER, INTEGER]
+        self.kernel = ir.FunctionType(ir.VoidType(), arguments).as_pointer()
+
+    def write(self) -> ir.Function:
+        r = self.r
+        self.count[0], self.count[1], self.count[2] = 0, 0, 0
+        with r.each(self.parts) as k:
+            self._move(k)
+        with r.each(self.pairs) as p:
+            first, second = self.pair[p * 3], self.pair[p * 3 + 1]
+            with r.when(self._is_near(first, second)):
+                number = self.pair[p * 3 + 2]
+                is_made = self.kind[number * KIND] > 0
+                with r.when(is_made):
+                    self._examine(p, first, second)
+                with r.when(~is_made):
+                    self.count[2] = number + 1
+        return r.done()
+
+    def _move(self, k: Value):
+        """Pose and velocities of a part, and the half edges of its box along the axes."""
+        r, body, own, moved = self.r, self.body[k * 2], self.own.after(k * PART), self.moved.after(k * MOVED)
+        given = [self.pose[self.bodies * i + body] for i in range(24)] + [own[i] for i in range(12)]
+        for i, value in enumerate(r.inline(self.place, *given)):
+            moved[i] = value
+        for i in range(4):
+            moved[24 + i] = own[12 + i]
+        for i in range(3):
+            moved[28 + i] = self.pose[self.bodies * (9 + i) + body]
+            size = own[15] + self.settings[0] * 0.5
+            for j in range(3):
+                size = size + r.absolute(moved[3 * i + j]) * own[12 + j]
+            self.extents[k * 3 + i] = size
+
+    def _is_near(self, first: Value, second: Value) -> Value:
+        """Whether the boxes of two parts overlap, or the plane of the second reaches into that of the first."""
+        r, one, other = self.r, self.moved.after(first * MOVED), self.moved.after(second * MOVED)
+        height, width, apart = r.number(0.0), r.number(0.0), r.number(-1.0)
+        for i in range(3):
+            between, extent = one[9 + i] - other[9 + i], self.extents[first * 3 + i]
+            normal = other[3 * i + 2]
+            height, width = height + normal * between, width + r.absolute(normal) * extent
+            apart = r.maximum(apart, r.absolute(between) - extent - self.extents[second * 3 + i])
+        is_plane = self.body[second * 2 + 1] > 0
+        return r.choose(is_plane, height - width, apart) <= 0.0
+
+    def _examine(self, p: Value, first: Value, second: Value):
+        """Distances of all features of a pair, and rows of the near ones."""
+        r, kind, given = self.r, self.kind.after(self.pair[p * 3 + 2] * KIND), self.given
+        for side, part in enumerate((first, second)):
+            column = self.moved.after(part * MOVED)
+            for i in range(12):
+                given[16 * side + i] = column[i]
+            for i in range(4):
+                given[16 * side + 12 + i] = column[24 + i]
+        given[32] = self.settings[1]
+        self._call(kind[0], given, self.gaps)
+        least, features = r.variable(np.inf), kind[1]
+        with r.each(features) as f:
+            gap = self.gaps[f]
+            least[0] = r.choose(gap < least[0], gap, least[0])
+            with r.when(gap <= self.settings[0]):
+                with r.when(self.count[0] < self.capacity):
+                    self._add(p, first, second, kind[2] + f, f)
+                self.count[0] = self.count[0] + 1
+        with r.when(kind[3] > 0):
+            apart = self.gaps[features]
+            missed = (apart <= -self.deepest[p]) & (least[0] > -self.settings[2])
+            with r.when(missed):
+                self.count[1] = p + 1
+                self.depth[0] = -apart
+
+    def _add(self, p: Value, first: Value, second: Value, feature: Value, f: Value):
+        """Rows of a pair of features."""
+        own, given, at = self.feature.after(feature * FEATURE), self.given, self.count[0]
+        sides = self.moved.after(first * MOVED), self.moved.after(second * MOVED)
+        for side, column in enumerate(sides):
+            for i in range(MOVED):
+                given[side * MOVED + i] = column[own[1 + side * MOVED + i]]
+        given[2 * MOVED] = self.settings[1]
+        for i in range(3):
+            given[2 * MOVED + 1 + i] = self.signs[feature * 3 + i]
+        self._call(own[0], given, self.rows.after(at * ROW))
+        self.found[at * 2], self.found[at * 2 + 1] = p, f
+
+    def _call(self, address: Value, given: Array, found: Array):
+        """Call a kernel of one state by its address."""
+        b, one = self.r.b, INTEGER(1)
+        b.call(b.inttoptr(address.value, self.kernel), [one, given.pointer, one, found.pointer, one])
+
+
+def write_near(place: Function, module: ir.Module) -> ir.Function:
+    """Emit ``near``; see :class:`NearPairs`."""
+    return _NearPairsWriter(place, module).write()
+
+
+class NearPairs:
+    """Python interface.
+
+    Parameters
+    ----------
+    place : Function
+        (pose, velocities and biases of a body, rotation and centre of a shape in it) → pose and velocities of the shape.
+    """
+
+    def __init__(self, place: Function):
+        module = ir.Module(name="gauss")
+        write_near(place, module)
+        self.code = machine.load(str(module))
+        self._bind()
+
+    def _bind(self):
+        self._near = self.code.entry("near", NEAR)
+
+    def __getstate__(self) -> dict:
+        return {"code": self.code}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
+
+    def __call__(self, counts: tuple[int, int, int, int], addresses: list[int]):
+        """Find the near contacts; arrays are given by their addresses."""
+        self._near.call(*counts, *addresses)

@@ -1,0 +1,144 @@
+"""Working memory and addresses of the compiled step of a mechanism: :mod:`gauss.codegen.kernels.mechanism_step`."""
+
+from functools import cache
+
+import numpy as np
+
+from gauss.codegen import from_disk, write
+from gauss.codegen.kernels import CompiledMechanismStep, StepFunctions
+from gauss.codegen.kernels.mechanism_step import ADDRESSES, FINISHED, RESULTS, SIZES, STEP_SETTINGS, TERMS, slots
+from gauss.dynamics.contact.contact_step import contact_solver
+from gauss.dynamics.contact.free_bodies import place_function
+from gauss.dynamics.contact.mechanism_kernels import MechanismTerms
+from gauss.dynamics.contact.moreau_step import is_impact, least_rate
+from gauss.dynamics.contact.near_detection import FIRST_ROOM
+from gauss.dynamics.contact.shape_table import MOST_FEATURES
+
+STATE = "q", "v", "end_q", "end_v"
+
+
+class CompiledStepMemory:
+    """Compiled steps of one system, with its working memory.
+
+    Parameters
+    ----------
+    stepper : MechanismStepper
+        The stepper, of a system without loop joints.
+    """
+
+    def __init__(self, stepper):
+        self.stepper, self.code = stepper, compiled_mechanism_step()
+        smooth, kernels, self.detection = stepper.smooth, stepper.kernels, stepper.detection
+        table, N = stepper.table, stepper.free_columns
+        self.sizes = {
+            "n_q": smooth.n_q,
+            "n_v": smooth.n_v,
+            "r": N.shape[1],
+            "bodies": stepper.n + 1,
+            "g": len(stepper.others),
+            "s": stepper.limit.size,
+            "entries": kernels.layout.entries.size,
+            "flat": kernels.layout.flat.size,
+            "parts": len(table.parts),
+            "pairs": len(self.detection.pair),
+            "capacity": FIRST_ROOM,
+            "loops": int(smooth.closes),
+            "input": 0,
+        }
+        lengths = slots({**self.sizes, "laws": len(table.contacts)})
+        ends = np.cumsum([0, *lengths.values()])
+        self.work = np.zeros(ends[-1] + 1)
+        offsets = dict(zip(lengths, ends.tolist(), strict=False))
+        parts = dict(zip(MechanismTerms._fields, kernels.layout.parts, strict=True))
+        for name in TERMS:
+            offsets[f"flat:{name}"] = offsets["flat"] + parts[name][0].start
+        self.ints = np.array([*(self.sizes[name] for name in SIZES), *offsets.values()], dtype=np.int64)
+        self.at = {name: self.work[offsets[name] : offsets[name] + length] for name, length in lengths.items()}
+        self._fill(N)
+
+    def _fill(self, N: np.ndarray):
+        stepper, at, table = self.stepper, self.at, self.stepper.table
+        column = np.abs(N).argmax(axis=1)
+        at["value"][:] = N[np.arange(len(N)), column]
+        at["fixed"][:] = stepper.kernels.layout.flat
+        at["reach"][:] = stepper.reach
+        at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
+        at["other_restitution"][:], at["other_unit"][:] = stepper.other_restitution, stepper.other_unit
+        at["set_unit"][:], at["limit"][:], at["lossy"][:] = stepper.set_unit, stepper.limit, stepper.lossy
+        first, second = self.detection.pairs
+        room, n = FIRST_ROOM, self.sizes
+        self.integers = {
+            "entries": stepper.kernels.layout.entries.astype(np.int64),
+            "law": (table.law[first, second] - 1).astype(np.int64),
+            "known_found": np.zeros((room, 2), dtype=np.int64),
+            "known_count": np.zeros(1, dtype=np.int64),
+            "under": np.zeros(6 * room + 2 * n["g"] + n["s"] + 1, dtype=np.int64),
+            "status": np.zeros(1, dtype=np.int64),
+            "column": column.astype(np.int64),
+        }
+        self.pair_keys = first * len(table.parts) + second
+
+    def connect(self):
+        """Take all addresses anew: a new motion may run in another tier."""
+        kernels, detection = self.stepper.kernels, self.detection
+        names = "body", "pair", "kind", "feature", "found", "count", "own", "signs", "deepest", "moved", "rows", "depth"
+        arrays = {**self.integers, **{name: getattr(detection, name) for name in names}}
+        arrays["near_settings"] = detection.settings
+        found = {name: array.ctypes.data for name, array in arrays.items()}
+        found |= {name: getattr(kernels, name).address() for name in ("begin", "forces", "move")}
+        self.addresses = np.array([found[name] for name in ADDRESSES], dtype=np.int64)
+        self.given = self.ints.ctypes.data, self.addresses.ctypes.data, self.work.ctypes.data
+
+    def step(self, state, settings: dict[str, float]) -> int:
+        """Status of a step; its results are in the working memory."""
+        at = self.at
+        at["q"][:], at["v"][:] = state.q, state.v
+        at["settings"][:] = [settings[name] for name in STEP_SETTINGS]
+        self.code(*self.given)
+        return int(self.integers["status"][0])
+
+    @property
+    def results(self) -> dict[str, float]:
+        """Power, error and whether contacts slide."""
+        return dict(zip(RESULTS, self.at["results"].tolist(), strict=True))
+
+    @property
+    def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces of the last step: keys of its contacts in order, forces (m, 3) of these, and of other constraints."""
+        m = int(self.integers["known_count"][0])
+        pair, feature = self.integers["known_found"][:m].T
+        key = self.pair_keys[pair] * MOST_FEATURES + feature
+        order = np.argsort(key)
+        return key[order], self.at["known"][: 3 * m].reshape(m, 3)[order], self.at["known_others"].copy()
+
+    @known.setter
+    def known(self, found: tuple[np.ndarray, np.ndarray, np.ndarray]):
+        key, force, others = found
+        m = min(key.size, FIRST_ROOM)
+        pair, feature = np.divmod(key[:m], MOST_FEATURES)
+        self.integers["known_found"][:m, 0] = np.searchsorted(self.pair_keys, pair)
+        self.integers["known_found"][:m, 1] = feature
+        self.integers["known_count"][0] = m
+        self.at["known"][: 3 * m], self.at["known_others"][:] = force[:m].ravel(), others
+
+
+def is_finished(status: int) -> bool:
+    """Whether the compiled step is whole."""
+    return status == FINISHED
+
+
+@cache
+def compiled_mechanism_step() -> CompiledMechanismStep:
+    """Machine code, made once on a machine."""
+
+    def make() -> CompiledMechanismStep:
+        functions = StepFunctions(
+            place_function(),
+            contact_solver(),
+            write(lambda x: [is_impact(*x)], 5, name="impact"),
+            write(lambda x: [least_rate(x[0], x[1], 0.0, *x[2:])], 5, name="plastic"),
+            write(lambda x: [least_rate(*x)], 6, name="elastic"),
+        )
+        return CompiledMechanismStep(functions)
+
+    return from_disk((CompiledMechanismStep,), make)

@@ -1,0 +1,122 @@
+"""Near contacts of mechanisms by one call of machine code: :mod:`gauss.codegen.kernels.near_pairs` on a table of shapes."""
+
+from functools import cache
+
+import numpy as np
+
+from gauss.codegen import from_disk
+from gauss.codegen.kernels import NearPairs
+from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, PART, ROW
+from gauss.dynamics.contact.free_bodies import place_function
+from gauss.dynamics.contact.moreau_step import START_OVERLAP
+from gauss.dynamics.contact.near_contacts import COLUMNS, NearContacts, Overlap
+from gauss.dynamics.contact.pair_kernels import SIGNS, PairKernels, pair_kernels
+from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
+from gauss.scene import HalfSpace
+
+FIRST_ROOM = 64  # contacts that there is room for at first
+
+
+class NearDetection:
+    """Detection of the near contacts of a system, all pairs of which are candidates.
+
+    Parameters
+    ----------
+    table : ShapeTable
+        Its shapes.
+    bodies : int
+        Number of bodies that its shapes belong to, with the ground.
+    length : float
+        Length of the scene [m].
+    """
+
+    def __init__(self, table: ShapeTable, bodies: int, length: float):
+        self.table, self.length, self.code = table, length, near_pairs()
+        n = len(table.parts)
+        first, second = np.nonzero(np.triu(table.law))
+        self.pairs = first, second
+        codes = table.kind[first] * len(KINDS) + table.kind[second]
+        self.codes, number = np.unique(codes, return_inverse=True)
+        self.pair = np.column_stack([first, second, number]).astype(np.int64)
+        self.body = np.column_stack([table.body, table.kind == KINDS.index(HalfSpace)]).astype(np.int64)
+        self.own = np.concatenate([table.own, table.centre, table.sizes]).T.copy()
+        assert self.own.shape == (n, PART)
+        least = table.sizes[:3].min(axis=0)
+        edges = np.where(least > 0.0, 2.0 * least, np.inf)
+        self.edges = np.minimum(edges[first], edges[second])
+        self.moved, self.bodies = np.empty(n * (MOVED + 3)), np.empty((24, bodies))
+        self.deepest, self.settings = np.empty(first.size), np.array([0.0, length, START_OVERLAP * length])
+        self.kinds: dict[int, PairKernels] = {}
+        self._make_room(FIRST_ROOM)
+        self.kind, self.feature = np.zeros((self.codes.size, KIND), dtype=np.int64), np.zeros((0, FEATURE), dtype=np.int64)
+        self.signs, self.count, self.depth = np.zeros((0, SIGNS)), np.zeros(3, dtype=np.int64), np.zeros(1)
+
+    def _make_room(self, capacity: int):
+        self.rows, self.found = np.empty((capacity, ROW)), np.empty((capacity, 2), dtype=np.int64)
+
+    def connect(self):
+        """Take the addresses of the kernels anew: a new motion may run in another tier."""
+        features: list[np.ndarray] = []
+        signs: list[np.ndarray] = []
+        for number, kernels in sorted(self.kinds.items()):
+            self.kind[number] = kernels.distances.address(), len(kernels.features), len(features), kernels.guarded
+            addresses = [rows.address() for rows in kernels.rows]
+            assert len(kernels.features) < MOST
+            for one in kernels.features:
+                features.append(np.concatenate([[addresses[one.function]], *(COLUMNS[axis] for axis in one.axes)]))
+                signs.append(np.append(one.signs, np.zeros(SIGNS - len(one.signs))))
+        self.feature = np.array(features, dtype=np.int64).reshape(-1, FEATURE)
+        self.signs = np.array(signs).reshape(-1, SIGNS)
+        self._take_addresses()
+
+    def _take_addresses(self):
+        integers = self.body, self.pair, self.kind, self.feature, self.found, self.count
+        numbers = self.bodies, self.own, self.signs, self.deepest, self.settings, self.moved, self.rows, self.depth
+        self.addresses = [array.ctypes.data for array in (*integers, *numbers)]
+
+    def find(self, bodies: np.ndarray, reach: float, unseen: float = np.inf) -> tuple[NearContacts, list[Overlap]]:
+        """Contacts nearer than ``reach``, and a pair of shapes that overlap without one.
+
+        Parameters
+        ----------
+        bodies : ndarray, shape (24, n + 1)
+            Poses, velocities and their rates of the bodies, the ground last.
+        reach : float
+            Distance [m].
+        unseen : float
+            Depth of a missed overlap, relative to the shortest edge of the boxes.
+        """
+        table = self.table
+        self.bodies[...] = bodies
+        self.settings[0] = reach
+        np.multiply(unseen, self.edges, out=self.deepest)
+        while True:
+            counts = len(table.parts), len(self.pair), len(self.rows), self.bodies.shape[1]
+            self.code(counts, self.addresses)
+            m, missed, unmade = self.count.tolist()
+            if unmade:
+                one, other = divmod(int(self.codes[unmade - 1]), len(KINDS))
+                self.kinds[unmade - 1] = pair_kernels((KINDS[one], KINDS[other]))
+                self.connect()
+            elif m > len(self.rows):
+                self._make_room(2 * m)
+                self._take_addresses()
+            else:
+                break
+        pair, feature = self.found[:m].T
+        first, second = self.pairs[0][pair], self.pairs[1][pair]
+        rows = self.rows[:m].copy()
+        J = rows[:, 4:52].reshape(m, 2, 3, 8)
+        key = (first * len(table.parts) + second) * MOST_FEATURES + feature
+        touching = np.column_stack([table.body[first], table.body[second]])
+        law = table.law[first, second] - 1
+        near = NearContacts(key, law, touching, rows[:, 0], rows[:, 1:4], J[:, 0, :, 3:6], J, rows[:, 52:])
+        one = missed - 1
+        overlap = Overlap(int(table.law[self.pairs[0][one], self.pairs[1][one]]) - 1, float(self.depth[0]))
+        return near, [overlap] if missed else []
+
+
+@cache
+def near_pairs() -> NearPairs:
+    """Machine code, made once on a machine."""
+    return from_disk((NearPairs,), lambda: NearPairs(place_function()))

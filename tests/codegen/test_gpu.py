@@ -1,0 +1,367 @@
+"""Code of GPU threads: the same numbers as on this CPU, PTX that NVIDIA's assembler takes, and a driver that is imitated."""
+
+import ctypes
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import math
+from gauss.codegen import machine, write
+from gauss.codegen.gpu import cuda, devices, dlpack
+from gauss.codegen.gpu.batches import DeviceKernel
+from gauss.codegen.gpu.lane_by_lane import LaneByLane
+from gauss.codegen.gpu.ptx import ptx
+from gauss.codegen.gpu.thread_code import ThreadCode
+from gauss.errors import ArgumentError, DeviceError, MissingPackageError, StateError
+from gauss.system import random_state
+from tests.support import mechanisms
+
+CAPABILITY = 90
+# in units of the last place: the polynomials promise less than 1 and 2, the functions of numpy beside them less than 1
+ELEMENTARY = {
+    "sin": (math.sin, np.sin, 2.0),
+    "cos": (math.cos, np.cos, 2.0),
+    "exp": (math.exp, np.exp, 2.0),
+    "log": (math.log, np.log, 2.0),
+    "atan2": (math.atan2, np.arctan2, 3.0),
+}
+ANGLES = 1e9  # [rad] up to which a GPU has sines
+SCENES = [
+    "cart_pole",
+    "double_pendulum",
+    "four_bar",
+    "free_body",
+    "gear_pair",
+    "heavy_top",
+    "parallelogram",
+    "planetary_gears",
+    "rolling_disk",
+    "screw_jack",
+    "slider_crank",
+    "spatial_tree",
+]
+FIXED = {"steps": 20, "step": 1e-3, "every": 5}
+RUNS = [
+    {"integrator": "rk4", **FIXED},
+    {"integrator": "semi_implicit_euler", **FIXED},
+    {"integrator": "dop853", "times": np.linspace(0.0, 0.1, 5), "rtol": 1e-9},
+]
+SPECIAL = [0.0, -0.0, 1.0, -1.0, 5e-324, 1e-310, 1e-8, 709.7, -745.0, 800.0, -800.0, np.inf, -np.inf, np.nan]
+
+
+def _arguments(name: str) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    spread = np.sign(rng.normal(size=2000)) * 10.0 ** rng.uniform(-12.0, 9.0, 2000)
+    if name == "atan2":
+        return np.array(
+            [
+                np.concatenate([spread, np.repeat(SPECIAL, len(SPECIAL))]),
+                np.concatenate([rng.normal(size=2000), np.tile(SPECIAL, len(SPECIAL))]),
+            ]
+        )
+    near = rng.normal(size=2000)
+    wide = {"exp": rng.uniform(-745.0, 709.0, 2000), "log": 10.0 ** rng.uniform(-320.0, 308.0, 2000)}.get(name, spread)
+    return np.concatenate([near, wide, SPECIAL])[None]
+
+
+@pytest.mark.parametrize("name", ELEMENTARY)
+def test_elementary_functions_need_no_library(name):
+    traced, known, ulps = ELEMENTARY[name]
+    x = _arguments(name)
+    kernel = DeviceKernel("lanes", write(lambda given: [traced(*given)], len(x)))
+    found = kernel(x)[0]
+    with np.errstate(all="ignore"):
+        right = known(*x)
+    regular = np.isfinite(right) & (np.abs(x[0]) <= ANGLES if name in ("sin", "cos") else True)
+    assert (np.abs(found - right)[regular] <= ulps * np.spacing(np.abs(right[regular]))).all()
+    signed = regular if name == "atan2" else regular & (right != 0.0)  # the sine of -0 is +0
+    assert np.array_equal(np.signbit(found[signed]), np.signbit(right[signed]))
+    assert np.array_equal(found[~regular], right[~regular], equal_nan=True) or name in ("sin", "cos")
+    assert np.isnan(found[~regular]).all() or name not in ("sin", "cos")  # never a wrong sine of a huge angle
+
+
+def _assembler() -> Path | None:
+    """NVIDIA's assembler of PTX, where it is installed."""
+    for package in ("nvidia-cuda-nvcc", "nvidia-cuda-nvcc-cu12"):
+        try:
+            files = metadata.files(package) or []
+        except metadata.PackageNotFoundError:
+            continue
+        for file in files:
+            if file.name == "ptxas":
+                return Path(str(file.locate()))
+    return None
+
+
+class Assembled(LaneByLane):
+    """This CPU lane by lane; what it runs is assembled for a GPU, too."""
+
+    def __init__(self, folder: Path):
+        self.folder, self.texts = folder, []
+
+    def lowered(self, code: ThreadCode):
+        text, assembler = ptx(code.gpu_text(), CAPABILITY), _assembler()
+        self.texts.append(text)
+        if assembler is not None:
+            source = self.folder / f"{code.name}.ptx"
+            source.write_text(text)
+            arguments = [assembler, f"-arch=sm_{CAPABILITY}", "-O1", source, "-o", source.with_suffix(".cubin")]
+            done = subprocess.run(arguments, capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+        return super().lowered(code)
+
+
+@pytest.fixture
+def assembled(tmp_path, monkeypatch) -> Assembled:
+    device = Assembled(tmp_path)
+    monkeypatch.setattr(devices, "_device", lambda number: device)
+    return device
+
+
+def _states(system, count: int):
+    rng = np.random.default_rng(0)
+    starts = [system.initial_state(s.q, s.v) for s in (random_state(system, rng, spread=0.2) for _ in range(count))]
+    return np.array([s.q for s in starts]), np.array([s.v for s in starts])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_accelerations_on_a_device_are_those_of_this_cpu(name, assembled):
+    system = gauss.compile_scene(gauss.load(name))
+    q, v = _states(system, 5)
+    load = np.ones_like(v)
+    function = system.function("forward_dynamics", device="lanes")
+    assert np.array_equal(function(q, v, load), system.forward_dynamics(q, v, load))
+    assert ".entry rows" in assembled.texts[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["double_pendulum", "four_bar", "heavy_top"])
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run["integrator"])
+def test_batches_on_a_device_are_those_of_this_cpu(name, run, assembled):
+    system = gauss.compile_scene(gauss.load(name))
+    q, v = _states(system, 5)
+    here, there = gauss.rollout(system, q, v, **run), gauss.rollout(system, q, v, device="lanes", **run)
+    assert np.array_equal(here.q, there.q) and np.array_equal(here.v, there.v)
+    assert np.array_equal(here.steps, there.steps) and here.repeated == there.repeated
+    assert assembled.texts
+
+
+@pytest.mark.slow
+def test_inputs_of_each_lane_are_held_on_a_device():
+    scene = gauss.load("cart_pole")
+    scene.input("push", "rail", limits=10.0)
+    system = gauss.compile_scene(scene)
+    q, v = _states(system, 5)
+    control = np.random.default_rng(0).normal(size=(5, 10, 1))
+    run = {"steps": 50, "step": 1e-3, "every": 10, "control": control}
+    here, there = gauss.rollout(system, q, v, **run), gauss.rollout(system, q, v, device="lanes", **run)
+    assert np.array_equal(here.q, there.q) and np.array_equal(here.v, there.v)
+
+
+def test_functions_of_a_state_on_a_device_are_those_of_this_cpu():
+    system = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5]))
+    q, v = _states(system, 7)
+    frame = next(iter(system.frames))
+    for names in (("mass_matrix",), ("bias_forces", "kinetic_energy"), (f"forward_kinematics:{frame}",)):
+        here, there = system.function(*names), system.function(*names, device="lanes")
+        given = [q] if len(there.interface.vectors) == 1 else [q, v]
+        for one, other in zip(_several(here(*given)), _several(there(*given)), strict=True):
+            assert one.shape == other.shape and np.array_equal(one, other)
+
+
+def _several(results):
+    return results if isinstance(results, tuple) else (results,)
+
+
+def test_what_a_device_refuses():
+    system = gauss.compile_scene(mechanisms.chain([1.0, 2.0]))
+    q, v = _states(system, 3)
+    mass = system.function("mass_matrix", device="lanes")
+    with pytest.raises(ArgumentError, match="cuda:NUMBER"):
+        system.function("mass_matrix", device="gpu")
+    with pytest.raises(ArgumentError, match="lanes"):
+        gauss.rollout(system, q, v, steps=1, step=1e-3, device=0)
+    with pytest.raises(StateError, match="q"):
+        mass(q[:, :1])
+    with pytest.raises(StateError, match="1 argument|expected q"):
+        mass(q, v)
+    q[2] = np.nan
+    with pytest.raises(StateError, match="finite") as caught:
+        mass(q)
+    assert "row 2" in caught.value.__notes__[0]
+    stops = gauss.compile_scene(gauss.load("newtons_cradle"))
+    with pytest.raises(DeviceError, match="dgelsy"):
+        start = stops.initial_state()
+        gauss.rollout(stops, start.q[None], start.v[None], integrator="time_stepping", steps=1, step=1e-3, device="lanes")
+
+
+def test_batches_beyond_the_memory_of_a_device_are_split(monkeypatch):
+    system = gauss.compile_scene(mechanisms.rods(1))
+    q, v = _states(system, 9)
+    run = {"steps": 20, "step": 1e-3}
+    whole = gauss.rollout(system, q, v, **run)
+    monkeypatch.setattr(LaneByLane, "free_bytes", lambda self: 2000)
+    parts = gauss.rollout(system, q, v, device="lanes", **run)
+    assert np.array_equal(parts.q, whole.q)
+    monkeypatch.setattr(LaneByLane, "free_bytes", lambda self: 100)
+    with pytest.raises(DeviceError, match="every="):
+        gauss.rollout(system, q, v, device="lanes", **run)
+
+
+class Imitation:
+    """The functions of the CUDA driver that gauss calls, in the memory of this process; modules are those of this CPU."""
+
+    def __init__(self, devices: int = 1, capability: tuple[int, int] = (9, 0)):
+        self.devices, self.capability, self.memory = devices, capability, {}
+        self.CUresult = SimpleNamespace(CUDA_SUCCESS=SimpleNamespace(name="CUDA_SUCCESS"))
+        self.failed = SimpleNamespace(name="CUDA_ERROR_OUT_OF_MEMORY")
+        major, minor = (f"CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_{part}" for part in ("MAJOR", "MINOR"))
+        self.CUdevice_attribute = SimpleNamespace(**{major: 0, minor: 1})
+        options = ("CU_JIT_ERROR_LOG_BUFFER", "CU_JIT_ERROR_LOG_BUFFER_SIZE_BYTES")
+        self.CUjit_option = SimpleNamespace(**{option: option for option in options})
+
+    def __getattr__(self, name):
+        return lambda *given: (self.CUresult.CUDA_SUCCESS, None)
+
+    def _done(self, *found):
+        return self.CUresult.CUDA_SUCCESS, *found
+
+    def cuDeviceGetCount(self):
+        return self._done(self.devices)
+
+    def cuDeviceGetName(self, length, device):
+        return self._done(b"imitation\0")
+
+    def cuDeviceGetAttribute(self, attribute, device):
+        return self._done(self.capability[attribute])
+
+    def cuMemGetInfo(self):
+        return self._done(1 << 30, 1 << 31)
+
+    def cuMemAlloc(self, size):
+        if size > 1 << 30:
+            return self.failed, None
+        room = (ctypes.c_char * size)()
+        self.memory[ctypes.addressof(room)] = room
+        return self._done(ctypes.addressof(room))
+
+    def cuMemFree(self, pointer):
+        del self.memory[pointer]
+        return self._done()
+
+    def cuMemcpyHtoD(self, target, source, size):
+        ctypes.memmove(target, source, size)
+        return self._done()
+
+    cuMemcpyDtoH = cuMemcpyHtoD
+
+    def cuModuleLoadDataEx(self, text, count, options, values):
+        return self._done(machine.load(text.rstrip(b"\0").decode()))
+
+    def cuModuleGetFunction(self, module, name):
+        return self._done((module, name.decode()))
+
+    def cuLaunchKernel(self, function, x, y, z, threads, v, w, shared, stream, given, extra):
+        (module, name), (values, kinds) = function, given
+        run = module.entry(name, ctypes.CFUNCTYPE(None, ctypes.c_int64, *kinds))
+        run.call(x * threads, *values)
+        return self._done()
+
+
+@pytest.fixture
+def imitated(monkeypatch):
+    """GPUs, as if there were some: cuda-bindings is replaced, and PTX by the code of this CPU."""
+
+    def imitate(**how) -> Imitation:
+        api = Imitation(**how)
+        monkeypatch.setitem(sys.modules, "cuda", SimpleNamespace())
+        monkeypatch.setitem(sys.modules, "cuda.bindings", SimpleNamespace(driver=api))
+        return api
+
+    monkeypatch.setattr(ThreadCode, "gpu_text", ThreadCode.cpu_text)
+    monkeypatch.setattr(cuda, "ptx", lambda text, capability: text)
+    for kept in (cuda.driver, devices._device):
+        kept.cache_clear()
+    yield imitate
+    for kept in (cuda.driver, devices._device):
+        kept.cache_clear()
+
+
+class OnGpu:
+    """Array of another library on a GPU, with strides."""
+
+    def __init__(self, array: np.ndarray):
+        self.array = array
+        data = array.__array_interface__["data"]
+        described = {"shape": array.shape, "strides": array.strides, "typestr": array.dtype.str, "data": data, "version": 3}
+        self.__cuda_array_interface__ = described
+
+
+def test_a_gpu_is_driven_through_its_driver(imitated):
+    api = imitated()
+    system = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5]))
+    q, v = _states(system, 300)
+    run = {"steps": 20, "step": 1e-3, "every": 10}
+    assert np.array_equal(gauss.rollout(system, q, v, device="cuda", **run).q, gauss.rollout(system, q, v, **run).q)
+    mass = system.function("mass_matrix", device="cuda:0")
+    assert np.array_equal(mass(q), system.mass_matrix(q))
+    found = mass(OnGpu(np.asfortranarray(q)))
+    described = found.__cuda_array_interface__
+    assert described["shape"] == (300, 3, 3) and described["typestr"] == "<f8"
+    assert np.array_equal(found.numpy(), system.mass_matrix(q)) and found.__dlpack_device__() == (dlpack.CUDA, 0)
+    with pytest.raises(StateError, match="float32|<f4"):
+        mass(OnGpu(q.astype(np.float32)))
+    del found
+    held = len(api.memory)
+    mass(q)
+    assert len(api.memory) == held  # nothing is left on the device
+
+
+@pytest.mark.parametrize(
+    "how, name, error",
+    [({"devices": 0}, "cuda", "cuda:0"), ({}, "cuda:1", "cuda:1"), ({"capability": (5, 2)}, "cuda", "5.2")],
+)
+def test_a_gpu_that_is_not_there_is_refused(how, name, error, imitated):
+    imitated(**how)
+    with pytest.raises(DeviceError, match=error):
+        devices.device(name)
+
+
+def test_memory_that_a_gpu_lacks_is_an_error(imitated):
+    imitated()
+    with pytest.raises(DeviceError, match="cuMemAlloc.*OUT_OF_MEMORY"):
+        devices.device("cuda").empty((1 << 28,))
+
+
+def test_without_its_package_a_gpu_is_refused(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cuda.bindings", None)
+    cuda.driver.cache_clear()
+    devices._device.cache_clear()
+    with pytest.raises(MissingPackageError, match="pip install cuda-bindings"):
+        devices.device("cuda")
+
+
+class Lent:
+    def __init__(self, array: np.ndarray):
+        self.array = array
+
+    def __dlpack_device__(self):
+        return dlpack.CPU, 0
+
+    def __dlpack__(self, **_):
+        return dlpack.capsule(self, self.array.ctypes.data, self.array.shape, dlpack.CPU, 0)
+
+
+def test_arrays_are_lent_until_they_are_given_back():
+    kept, given = len(dlpack._lent), np.arange(6.0).reshape(2, 3)
+    taken = np.from_dlpack(Lent(given))
+    assert np.array_equal(taken, given) and np.shares_memory(taken, given) and len(dlpack._lent) == kept + 1
+    del taken
+    assert len(dlpack._lent) == kept

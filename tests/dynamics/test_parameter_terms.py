@@ -1,0 +1,162 @@
+"""Derivatives by parameters: against scenes with other parameters, Pinocchio's regressor, batches, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.errors import ArgumentError, StateError
+from gauss.system import random_state
+
+EXACT = 1e-9  # relative, of central differences of polynomials of degree two, with large steps
+OF_STEPS = 1e-6  # of central differences, relative
+AGREEMENT = 1e-12  # of sums in another order
+
+
+def sprung_tree() -> gauss.Scene:
+    scene = gauss.load("random_tree", n=4, seed=1)
+    bodies = list(scene.bodies)
+    scene.spring("S", bodies[0], bodies[-1], (0.1, 0.0, 0.0), (0.0, 0.2, 0.1), stiffness=20.0, damping=0.5, length=0.3)
+    scene.force("F", bodies[-1], force=(1.0, -2.0, 0.5))
+    return scene
+
+
+def moved(scene: gauss.Scene, parameter: str, k: int, change: float) -> gauss.Scene:
+    """Scene with another value of a parameter."""
+    kind, _, name = parameter.partition(":")
+    if kind == "gravity":
+        gravity = np.array(scene.gravity)
+        gravity[k] += change
+        return replace(scene, gravity=tuple(gravity))
+    if kind in ("mass", "com", "inertia"):
+        body = scene.bodies[name]
+        J, R = body.principal()
+        tensor, com = R @ np.diag(J) @ R.T, np.array(body.com)
+        i, j = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))[k]
+        if kind == "com":
+            com[k] += change
+        elif kind == "inertia":
+            tensor[i, j] += change
+            tensor[j, i] = tensor[i, j]
+        mass = body.mass + change * (kind == "mass")
+        other = replace(body, mass=mass, com=tuple(com), inertia=tensor, inertia_axes=(0.0, 0.0, 0.0))
+        return replace(scene, bodies={**scene.bodies, name: other})
+    load = scene.loads[name]
+    return replace(scene, loads={**scene.loads, name: replace(load, **{kind: getattr(load, kind) + change})})
+
+
+def by_difference(scene, parameter: str, size: int, value, step: float) -> np.ndarray:
+    """Central differences (n, size) of a function of a compiled scene."""
+    pairs = [[value(gauss.compile_scene(moved(scene, parameter, k, sign * step))) for sign in (1, -1)] for k in range(size)]
+    return np.array([(plus - minus) / (2.0 * step) for plus, minus in pairs]).T
+
+
+def relative(found, expected) -> float:
+    return np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-300)
+
+
+@pytest.mark.parametrize("kind, size, step", [("mass", 1, 0.1), ("com", 3, 0.05), ("inertia", 6, 1e-3), ("gravity", 3, 1.0)])
+def test_inertial_parameters_of_a_tree(kind, size, step):
+    scene = sprung_tree()
+    system = gauss.compile_scene(scene)
+    state, a = random_state(system, np.random.default_rng(2)), np.linspace(-1.0, 1.0, system.n_v)
+    for body in list(scene.bodies)[1:3]:
+        parameter = kind if kind == "gravity" else f"{kind}:{body}"
+        found = system.function(f"inverse_dynamics_by:{parameter}")(state.q, state.v, a)
+        value = lambda other: other.function("inverse_dynamics")(state.q, state.v, a)  # noqa: E731
+        assert relative(found, by_difference(scene, parameter, size, value, step)) <= EXACT
+        slopes = system.parameter_derivatives(parameter)(state.q, state.v, 0.0 * a)
+        own = system.forward_dynamics(state.q, state.v, 0.0 * a)
+        by = system.function(f"inverse_dynamics_by:{parameter}")(state.q, state.v, own)
+        assert relative(-system.mass_matrix(state.q) @ slopes, by) <= EXACT
+
+
+@pytest.mark.parametrize("parameter", ["stiffness:S", "damping:S", "length:S"])
+def test_constants_of_loads(parameter):
+    scene = sprung_tree()
+    system = gauss.compile_scene(scene)
+    state, a = random_state(system, np.random.default_rng(3)), np.linspace(-1.0, 1.0, system.n_v)
+    found = system.function(f"inverse_dynamics_by:{parameter}")(state.q, state.v, a)
+    value = lambda other: other.function("inverse_dynamics")(state.q, state.v, a)  # noqa: E731
+    assert relative(found, by_difference(scene, parameter, 1, value, 0.1)) <= EXACT
+
+
+@pytest.mark.parametrize("where", ["parent_at", "child_at"])
+def test_lengths_of_a_tree(where):
+    system = gauss.compile_scene(gauss.load("random_tree", n=4, seed=1))
+    state, a = random_state(system, np.random.default_rng(4)), np.linspace(-1.0, 1.0, system.n_v)
+    joint, step = system.joints[2], 0.05
+    body = joint.parent if where == "parent_at" else joint.child
+    axes = np.eye(3) if body < 0 else system.frames[system.structure.bodies[body]].R
+    field = {"parent_at": "p_parent", "child_at": "p_child"}[where]
+
+    def efforts(change: np.ndarray) -> np.ndarray:
+        other = replace(joint, **{field: getattr(joint, field) + axes @ change})
+        joints = tuple(other if one is joint else one for one in system.joints)
+        changed = replace(system, joints=joints, dynamics=system.mechanics.anew())
+        return changed.function("inverse_dynamics")(state.q, state.v, a)
+
+    found = system.function(f"inverse_dynamics_by:{where}:{joint.name}")(state.q, state.v, a)
+    expected = [(efforts(step * axis) - efforts(-step * axis)) / (2.0 * step) for axis in np.eye(3)]
+    assert relative(found, np.array(expected).T) <= EXACT
+
+
+PARAMETERS_OF_LOOPS = {"mass:coupler": 1, "com:coupler": 3, "inertia:crank": 6, "stiffness:S": 1}
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS_OF_LOOPS)
+def test_parameters_of_a_loop(parameter):
+    scene = gauss.load("four_bar")
+    scene.joint_spring("S", list(scene.joints)[1], stiffness=3.0)
+    crank = replace(scene.bodies["crank"], inertia=(0.02, 0.02, 0.02))
+    scene = replace(scene, bodies={**scene.bodies, "crank": crank})
+    system = gauss.compile_scene(scene)
+    start, load = system.initial_state(), np.linspace(-1.0, 1.0, system.n_v)
+    found = system.parameter_derivatives(parameter)(start.q, start.v, load)
+    value = lambda other: other.forward_dynamics(start.q, start.v, load)  # noqa: E731
+    expected = by_difference(scene, parameter, PARAMETERS_OF_LOOPS[parameter], value, 1e-5)
+    assert np.abs(found - expected).max() <= OF_STEPS * max(np.abs(expected).max(), 1.0)
+
+
+def test_the_regressor_is_that_of_pinocchio():
+    pin = pytest.importorskip("pinocchio")
+    from gauss.analysis.crosscheck.pinocchio_ import twin
+
+    system = gauss.compile_scene(gauss.load("random_tree", n=4, seed=3, kinds=("revolute",)))
+    state, a = random_state(system, np.random.default_rng(5)), np.linspace(-1.0, 1.0, system.n_v)
+    pair = twin(system)
+    at, model = pair.configuration(state), pair.model
+    Y = pin.computeJointTorqueRegressor(model, model.createData(), at.q, at.v, np.linalg.solve(at.T, a))
+    expected = at.T.T @ Y @ np.concatenate([inertia.toDynamicParameters() for inertia in list(model.inertias)[1:]])
+    bodies = system.scene.bodies.values()
+    names = [f"inverse_dynamics_by:{kind}:{body.name}" for body in bodies for kind in ("mass", "inertia")]
+    parts, found = iter(system.function(*names)(state.q, state.v, a)), np.zeros(system.n_v)
+    for body in bodies:
+        J, R = body.principal()
+        tensor = R @ np.diag(J) @ R.T
+        found += next(parts)[:, 0] * body.mass + next(parts) @ tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    assert relative(found, expected) <= AGREEMENT
+    assert relative(found, system.function("inverse_dynamics")(state.q, state.v, a)) <= AGREEMENT
+
+
+def test_batches_are_single_states():
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    start = system.initial_state()
+    f = system.parameter_derivatives("mass:coupler", "com:crank")
+    many = f(np.tile(start.q, (9, 1)), np.tile(start.v, (9, 1)), np.zeros((9, system.n_v)))
+    one = f(start.q, start.v, np.zeros(system.n_v))
+    for rows, single in zip(many, one, strict=True):
+        assert rows.shape[1:] == single.shape and relative(rows[4], single) <= AGREEMENT
+
+
+@pytest.mark.parametrize(
+    "parameter, error",
+    [("mass:nobody", StateError), ("weight:F", ArgumentError), ("stiffness:T", StateError), ("", ArgumentError)],
+)
+def test_parameters_that_do_not_exist_are_refused(parameter, error):
+    system = gauss.compile_scene(sprung_tree())
+    with pytest.raises(error):
+        system.parameter_derivatives(parameter)
+    with pytest.raises(ArgumentError, match="trees alone"):
+        gauss.compile_scene(gauss.load("four_bar")).parameter_derivatives("child_at:B")
