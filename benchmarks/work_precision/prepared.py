@@ -21,9 +21,7 @@ def name_of(method: str) -> str:
     return f"{method}, prepared"
 
 
-def attempts(
-    case: TimedScene, system: System, against: ReferencePositions, patience: float, methods
-) -> Iterator[Attempt]:
+def attempts(case: TimedScene, system: System, against: ReferencePositions, patience: float, methods) -> Iterator[Attempt]:
     """Attempts by prepared motions of some methods, with tolerances from coarse to fine."""
     for method in methods:
         for tolerance in TOLERANCES:

@@ -72,6 +72,10 @@ ELEMENTS = {
     "damper": acting('<damper name="m" joint="h" kv="3" ctrlrange="0 1"/>'),
     "at a sum": acting('<position name="m" tendon="t" kp="7" gear="2"/>', more=SUM.format("")),
     "at a path": acting('<position name="m" tendon="t" kp="7" gear="2"/>', more=PATH.format("", PULLEY)),
+    "at a path in one body": acting(
+        '<motor name="m" tendon="t"/>', more='<tendon><spatial name="t"><site site="p"/><site site="q"/></spatial></tendon>'
+    ),
+    "at a ball, without gear": acting('<motor name="m" joint="B" gear="0 0 0"/>', FREE.format("", "")),
     "at a site": acting('<motor name="m" site="r" gear="1 2 3 0.1 0.2 0.3"/>'),
     "at a site, against the speed": acting('<velocity name="m" site="r" kv="2" gear="1 2 3 0.1 0.2 0.3"/>'),
     "at a free joint": acting('<motor name="m" joint="F" gear="1 2 3 0.1 0.2 0.3"/>', FREE.format("", "")),

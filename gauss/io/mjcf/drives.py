@@ -82,7 +82,7 @@ def add_actuator(scene: Scene, named: Named, i: int):
     model, name, force = named.model, named.name("actuator", i), actuator_force(named, i)
     name = f"actuator {name}" if name in scene.loads or name in scene.relations or name in scene.contacts else name
     _add_load(scene, named, i, name, force)
-    if not force.gain.any():
+    if not force.gain.any() or not (force.acted.acts_on or force.acted.forces):  # a tendon within one body moves nothing
         return
     acts_on, forces, u_0, gain = force.acted.acts_on, force.acted.forces, force.control, float(force.gain[0])
     effort = None
