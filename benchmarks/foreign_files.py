@@ -33,7 +33,7 @@ KINDS = {".xml": "mujoco", ".sdf": "sdf", ".world": "sdf"}
 ON_SERVER = "it is on a server"
 STILL = ("nothing moves", "there is no model in it")
 STATES = ("agreed", "opened", "nothing moves", "differs", "refused", "too slow", "crashed")
-APART = ("model on a server", "refused by MuJoCo", "flex or plugin")
+APART = ("some on a server, rest opens", "all on a server", "refused by MuJoCo", "flex or plugin")
 QUOTED, NUMBER = re.compile(r"'[^']*'"), re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -70,7 +70,7 @@ def of_file(folder: Path, path: Path) -> FileRecord:
     except GaussError as error:
         still = any(words in str(error) for words in STILL)
         gone = not still and ON_SERVER in str(error)
-        found = ("nothing moves",) if still else ("model on a server",) if gone else ("refused", reasons(str(error)))
+        found = ("nothing moves",) if still else (without_server(path),) if gone else ("refused", reasons(str(error)))
     except TimeoutError:
         found = ("too slow",)
     except Exception as error:  # a fault of gauss
@@ -95,6 +95,15 @@ def opened(folder: Path, path: Path) -> tuple:
     return "agreed" if found < (AGREED_LOOPS if has_loops else AGREED) else "differs", (), found, has_loops
 
 
+def without_server(path: Path) -> str:
+    """Status of a file that names models on a server: whether the rest of it opens."""
+    try:
+        gauss.load(path, missing="left out")
+    except GaussError:
+        return "all on a server"
+    return "some on a server, rest opens"
+
+
 def excluded(path: Path) -> str:
     """Why a MJCF file is counted apart; empty where it is not."""
     text = path.read_text(errors="replace")
@@ -110,7 +119,9 @@ def excluded(path: Path) -> str:
 def reasons(message: str) -> tuple[str, ...]:
     """Reasons of a refusal without names, places, numbers and advice."""
     text = re.sub(r"^\S+?\.(xml|sdf|world)(:\d+)?: (not modelled: )?", "", message).partition(". Remove them")[0]
-    parts = [part.strip("; ").partition("; ")[0].strip() for part in re.split(r"\([^()]*:\d+\)", text)]
+    parts = [
+        re.sub(r"\S*/\S+", "…", part).strip("; ").partition("; ")[0].strip() for part in re.split(r"\([^()]*:\d+\)", text)
+    ]
     return tuple(sorted({NUMBER.sub("#", QUOTED.sub("…", part))[:110] for part in parts if part}))
 
 
