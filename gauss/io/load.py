@@ -132,7 +132,7 @@ def _read_toml(path: Path):
 
 def _read_xacro(path: Path, options, name: str) -> Scene:
     arguments = options.pop("xacro", None)
-    with _packages().expanded(path, arguments) as made:
+    with _packages().urdf_of_xacro(path, arguments) as made:
         return _read_urdf(made, options, "")
 
 

@@ -63,7 +63,7 @@ def description(name: str) -> Path:
 
 
 @contextmanager
-def expanded(path: Path, arguments: Mapping[str, object] | bool | None) -> Iterator[Path]:
+def urdf_of_xacro(path: Path, arguments: Mapping[str, object] | bool | None) -> Iterator[Path]:
     """URDF file that a xacro file expands to, for a ``with`` statement.
 
     Parameters
