@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.cli.common import view
+from gauss.cli.common import INTERRUPTED, as_far_as_it_came, view
 
 
 def linkage(
@@ -50,4 +50,7 @@ def linkage(
             getattr(view(), draw)(cycle, path)
             typer.echo(f"{'figure' if path is plot else 'animation'} written to {path}")
     if run is not None:
-        typer.echo(f"run: {mechanism.run(run)}")
+        motion, interrupted = as_far_as_it_came(lambda: mechanism.run(run))
+        typer.echo(f"run: {motion}")
+        if interrupted:
+            raise typer.Exit(INTERRUPTED)

@@ -10,7 +10,8 @@ from gauss.errors import SimulationError
 
 MOST_STEPS = 10_000_000  # between two samples
 STALL_WINDOW = 100_000  # evaluations of the residual over which the progress of IDA is measured
-LEAST_PROGRESS = 0.01  # of the interval in that window; IDA is stopped below it
+LEAST_PROGRESS = 1e-5  # of the interval in that window; IDA is stopped below it: the rest would take days
+LEAST_PACE = 1e-3  # of the mean progress of the windows before; IDA is stopped below it
 
 
 class LibrarySolution(NamedTuple):
@@ -175,13 +176,15 @@ class _StallMonitor:
     """Progress per evaluation: at singular or redundant constraints IDA factors a new matrix in ever smaller steps."""
 
     def __init__(self, begin: float, end: float):
-        self.least, self.before, self.calls, self.reason = LEAST_PROGRESS * (end - begin), begin, 0, ""
+        self.begin, self.least = begin, LEAST_PROGRESS * (end - begin)
+        self.before, self.calls, self.reason = begin, 0, ""
 
     def stalls(self, t: float) -> bool:
         """Whether the integration stalls; called at every evaluation."""
         self.calls += 1
         if self.calls % STALL_WINDOW == 0 and not self.reason:
-            if t - self.before < self.least:
+            mean = (self.before - self.begin) / max(self.calls // STALL_WINDOW - 1, 1)
+            if t - self.before < max(self.least, LEAST_PACE * mean):
                 self.reason = f"it stalls: {STALL_WINDOW} evaluations from t = {self.before:.6g} s to {t:.6g} s"
             self.before = t
         return bool(self.reason)

@@ -1,17 +1,22 @@
 """Forward dynamics of a linkage in one coordinate, J_e θ̈ + b θ̇² = M1 + Q, by one compiled kernel."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.errors import LinkageError, SimulationError
+from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
+from gauss.errors import LinkageError, SimulationError, SwitchingWarning, user_level
 from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.chain import Chain
+from gauss.linkages.crank_motion import CrankMotion, motor_times, solved
 from gauss.linkages.crank_ranges import closing_ranges, follow, near
+from gauss.linkages.elements import CrankMotor
 from gauss.linkages.kernels import reduced_kernel
 from gauss.linkages.motion import move
 from gauss.linkages.reduced import inertia_terms
+from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 DEFAULT_ATOL = 1e-12  # rad, and relative to the speed of the drive
 
@@ -93,6 +98,8 @@ def run(
     times=None,
     rtol: float = 1e-10,
     atol: float | None = None,
+    step: float | None = None,
+    breaks=(),
 ) -> CrankRun:
     """Run a linkage under a motor.
 
@@ -114,20 +121,29 @@ def run(
         Local error of angle and speed, relative to them.
     atol : float, optional
         Absolute part of it [rad, rad/s]; when not given 1e-12 rad, and 1e-12 of the speed of the drive or start.
+    step : float, optional
+        Largest step [s].
+    breaks : sequence of float
+        Times at which the law of the motor switches [s]; jumps in time longer than 1/20000 of the duration are found.
 
     Returns
     -------
-    Run
+    CrankRun
         Angle and speed of the crank over time.
 
     Raises
     ------
     SimulationError
         If the crank reaches an angle at which the linkage does not close, or the integrator fails.
-    """
-    from scipy.integrate import solve_ivp  # a slow import
+    KeyboardInterrupt
+        After Ctrl-C; its ``trajectory`` is the motion so far.
 
-    _check_settings(duration, rtol, atol, added_inertia)
+    Warns
+    -----
+    SwitchingWarning
+        If the law of a motor, a Python function, was evaluated at few points.
+    """
+    _check_settings(duration, rtol, atol, step, added_inertia)
     equation = ReducedLinkage(chain, added_inertia)
     samples = np.linspace(0.0, duration, 501) if times is None else np.asarray(times, dtype=float)
     start = [chain.driver.start if angle is None else float(angle), float(speed)]
@@ -138,16 +154,33 @@ def run(
     def rates(t, y):
         return [y[1], equation.acceleration(y[0], y[1], motor(t, y[0], y[1]))]
 
-    found = solve_ivp(rates, (0.0, duration), start, method="DOP853", t_eval=samples, rtol=rtol, atol=absolute)
-    if not found.success:
-        raise SimulationError(f"{chain.name}: {found.message}")
-    torques = np.array([motor(*state) for state in zip(found.t, *found.y, strict=True)], dtype=float)
-    accelerations = [equation.acceleration(*state) for state in zip(*found.y, torques, strict=True)]
-    angles, speeds = found.y
-    return CrankRun(found.t, angles, speeds, np.array(accelerations), torques)
+    options = {"rtol": rtol, "atol": absolute, "largest": np.inf if step is None else float(step)}
+    switches = NO_TIMES if isinstance(motor, CrankMotor) else motor_times(motor, start, duration, breaks)
+    try:
+        found = solved(rates, start, samples, duration, switches, **options)
+    except SimulationError as error:
+        raise SimulationError(f"{chain.name}: {error}") from error
+    if not isinstance(motor, CrankMotor):
+        _warn_of_motor(chain, switches, found, duration)
+    angles, speeds = found.y.T.copy()
+    torques = np.array([motor(*state) for state in zip(found.t, angles, speeds, strict=True)], dtype=float)
+    accelerations = [equation.acceleration(*state) for state in zip(angles, speeds, torques, strict=True)]
+    made = CrankRun(found.t, angles, speeds, np.array(accelerations), torques)
+    if found.interruption is not None:
+        found.interruption.trajectory = made  # type: ignore[attr-defined]  # kept on the interruption for the caller
+        raise found.interruption
+    return made
 
 
-def _check_settings(duration: float, rtol: float, atol: float | None, added_inertia: float) -> None:
+def _warn_of_motor(chain: Chain, switches: Timetable, found: CrankMotion, duration: float) -> None:
+    """Warn of features of the law of a motor that are not resolved, and of one that was evaluated at few points."""
+    for text in switches.limitations:
+        warnings.warn(f"{chain.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
+    if found.longest > SPARSE_STEP * duration:
+        warn_of_opaque(chain.name, "the motor", "step=")
+
+
+def _check_settings(duration: float, rtol: float, atol: float | None, step: float | None, added_inertia: float) -> None:
     """Check the arguments of :func:`run`.
 
     Raises
@@ -155,7 +188,7 @@ def _check_settings(duration: float, rtol: float, atol: float | None, added_iner
     SimulationError, LinkageError
         If one makes no sense.
     """
-    given = {} if atol is None else {"atol": atol}
+    given = {name: value for name, value in (("atol", atol), ("step", step)) if value is not None}
     for what, value in {"duration": duration, "rtol": rtol, **given}.items():
         if not np.isfinite(value) or value <= 0:
             raise SimulationError(f"{what}: expected a positive number, got {value!r}.")

@@ -5,9 +5,11 @@ import numpy as np
 from gauss.codegen.kernels import Due
 from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.laws.switching_times import APART, NO_TIMES, Timetable
+from gauss.errors import SimulationError
 from gauss.integrators import FixedStep
 
 EQUAL_TIMES = 1e-9  # relative to the step: closer times are one
+MOST_STEPS = 1e9  # of one motion: their times fill the memory
 SHORTEST_CONTACT_STEP = 1e-3  # relative to the step: the rounding of a gap over the step is a velocity error
 
 
@@ -102,23 +104,37 @@ def with_samples(pairs: np.ndarray, times: np.ndarray, step: float, rows: bool) 
 
 
 def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
-    """Pairs of an equidistant grid."""
+    """Pairs of an equidistant grid.
+
+    Raises
+    ------
+    SimulationError
+        If they are more than :data:`MOST_STEPS`.
+    """
+    if not (end - begin) / step <= MOST_STEPS:
+        raise SimulationError(
+            f"step: {step:.3g} s over {end - begin:.3g} s are {(end - begin) / step:.2g} steps, at most {MOST_STEPS:.0e}; "
+            "continue a longer motion with state=motion.state(-1)."
+        )
     count = max(1, int(np.ceil((end - begin) / step * (1 - EQUAL_TIMES))))
-    times = np.append(begin + step * np.arange(1, count), end)
+    pairs = np.empty((count, 2))  # in place: a long motion waits for it
+    times = pairs[:, 0]
+    np.multiply(step, np.arange(1, count), out=times[:-1])
+    times[:-1] += begin
+    times[-1] = end
     if samples is None:
-        return np.column_stack([times, np.full(count, float(Due.SAMPLE))])
+        pairs[:, 1] = Due.SAMPLE
+        return pairs
     samples = samples[samples > begin]
     after = np.minimum(np.searchsorted(times, samples), count - 1)  # the last step may be shorter than the others
     before = np.maximum(after - 1, 0)
     nearest = np.where(samples - times[before] < times[after] - samples, before, after)
     met = np.abs(times[nearest] - samples) <= EQUAL_TIMES * step
     times[nearest[met]] = samples[met]
-    due = np.full(count, float(Due.STEP))
-    due[nearest[met]] = Due.SAMPLE
+    pairs[:, 1] = Due.STEP
+    pairs[nearest[met], 1] = Due.SAMPLE
     off_grid = samples[~met]
     if not off_grid.size:
-        return np.column_stack([times, due])
-    pairs = np.concatenate(
-        [np.column_stack([times, due]), np.column_stack([off_grid, np.full(off_grid.size, float(Due.OFF_GRID_SAMPLE))])]
-    )
+        return pairs
+    pairs = np.concatenate([pairs, np.column_stack([off_grid, np.full(off_grid.size, float(Due.OFF_GRID_SAMPLE))])])
     return pairs[np.argsort(pairs[:, 0], kind="stable")]

@@ -9,9 +9,10 @@ import numpy as np
 from gauss.codegen import Scalar
 from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.inputs import driven_scene
-from gauss.errors import SimulationError
+from gauss.errors import GaussError, SimulationError
 from gauss.system import System
 
+MOST_SAMPLES = 1e9  # of one motion: their times fill the memory
 EQUAL_SAMPLES = 1e-9  # relative to the time from one sample to the next: closer times are one
 
 
@@ -49,6 +50,10 @@ class HeldInputs:
             raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
         if not isinstance(rate, int | float) or not np.isfinite(rate) or rate <= 0:
             raise SimulationError(f"rate: expected a positive number of samples in a second [Hz], got {rate!r}.")
+        if (asked := (end - start) * rate) > MOST_SAMPLES:
+            raise SimulationError(
+                f"rate: {rate:.3g} Hz are {asked:.2g} samples of this motion, of at most {MOST_SAMPLES:.0e}."
+            )
         count = max(1, int(np.ceil((end - start) * rate - EQUAL_SAMPLES)))
         self.rate, self.times, self.end = float(rate), start + np.arange(count) / rate, end
         self.values: list[np.ndarray] = []
@@ -73,11 +78,20 @@ class HeldInputs:
         Raises
         ------
         SimulationError
-            If the law does not return a finite number for each input.
+            If the law raises an exception, or does not return a finite number for each input.
         """
         if k == len(self.values):
-            self.values.append(checked_inputs(self.law(t, q, v), self.names, t))
+            self.values.append(checked_inputs(self._called(t, q, v), self.names, t))
         return self.values[k]
+
+    def _called(self, t: Scalar, q: np.ndarray, v: np.ndarray):
+        """Values that the law returns."""
+        try:
+            return self.law(t, q, v)
+        except GaussError:
+            raise
+        except Exception as error:  # whatever it does
+            raise SimulationError(f"control: at t = {t:.6g} s the law raised {type(error).__name__}: {error}") from error
 
     def hold_end(self, k: int) -> float:
         """Time at which sample k ends [s]."""

@@ -112,6 +112,8 @@ def test_without_a_law_inputs_are_zero():
         ({"control": law}, "rate"),
         ({"control": law, "rate": -1.0}, "rate"),
         ({"rate": 20}, "control"),
+        ({"control": lambda t, q, v: 1 / 0, "rate": 20}, "t = 0 s the law raised ZeroDivisionError"),
+        ({"control": law, "rate": 1e12}, "rate: 1e.12 Hz are .* samples"),
     ],
 )
 def test_invalid_inputs_are_refused(arguments, message):

@@ -70,6 +70,8 @@ def test_sampled_control_swings_a_pole_up():
         (lambda u: u[:, :, 0], "expected shape"),
         (lambda u: u[:5], "expected shape"),
         (lambda u: u[:, :7], "divisor"),
+        (lambda u: lambda t, q, v: (0.0,), "laws"),
+        (lambda u: [[[1.0]], [[1.0], [2.0]]], "expected numbers"),
         (lambda u: np.where(np.arange(BATCH)[:, None, None] == 4, np.nan, u), "input 'u' of motion 4 is nan in row 0"),
     ],
 )

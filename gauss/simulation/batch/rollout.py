@@ -223,7 +223,11 @@ def _checked_control(system: System, control, batch: int, steps: int) -> np.ndar
     names = tuple(system.scene.inputs)
     if not names:
         raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
-    found = np.require(control, dtype=float, requirements=("C", "W"))
+    try:
+        found = np.require(control, dtype=float, requirements=("C", "W"))
+    except (TypeError, ValueError) as error:
+        what = f"numbers of shape ({batch} motions, k rows, {len(names)} inputs)"
+        raise SimulationError(f"control: expected {what}, got {control!r}; simulate(control=) takes laws.") from error
     if found.ndim != 3 or found.shape[::2] != (batch, len(names)) or not found.shape[1] or steps % found.shape[1]:
         raise SimulationError(
             f"control: expected shape ({batch} motions, k rows, {len(names)} inputs) with k a divisor of {steps} steps, "
