@@ -8,7 +8,8 @@ Each folder holds a copy of a public source, as a wheel of the Python package in
 dm_control, brax, robosuite) or a checkout (google-deepmind/mujoco, gazebosim/gz-sim, gazebosim/sdformat). It is the root
 folder of its files. Files that MuJoCo itself refuses, that hold flexible bodies or plugins, or where nothing moves, are
 counted apart, as are SDFormat files with models on a server. Accelerations are compared at random states and controls,
-without contacts, limits and friction.
+without contacts, limits and friction. One file differs by its own design: MuJoCo drops the terms of M between branches of
+a tree that a heavy tendon joins; gauss keeps them. Many files of sdformat are tests of what a reader is to refuse.
 """
 
 import argparse
