@@ -35,6 +35,7 @@ import numpy as np
 from scipy.stats import kendalltau
 
 from benchmarks import published_form, published_form_report
+from benchmarks.agreement import agreement
 from benchmarks.command import RESULTS
 from gauss.bench.contestants import contestants
 from gauss.bench.folders import of_folder
@@ -42,7 +43,7 @@ from gauss.bench.levels import LEVELS, LIMIT, as_qpbenchmark_sets
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, share, table
 from gauss.bench.qp import PACKAGES, compare
-from gauss.bench.summary import is_kept, mean_time
+from gauss.bench.summary import asked, is_kept, mean_time
 from gauss.bench.table import header_of, read_table, write_table
 from gauss.bench.worker import ONE_THREAD
 
@@ -74,7 +75,7 @@ def main():
     levels = given.level or ["high"]
     for level in levels:
         measured = compare(given.work, backends=solvers, levels=[level], instances=small)
-    rows = pairs(read_table(measured.path), theirs)
+    rows = pairs(asked(read_table(measured.path)), theirs)
     now = verdicts(in_published_form(given.folder / "data", given.work, solvers, [one.name for one in small]))
     as_published = {(row["backend"], row["level"], row["problem"]): row["kept"] for row in now}
     for ours, _ in rows:
@@ -237,13 +238,13 @@ def _level(level: str, rows) -> list[str]:
     solvers = dict.fromkeys(ours["backend"] for ours, _ in rows)
     records = [SolverRecord(name, [pair for pair in rows if pair[0]["backend"] == name]) for name in solvers]
     records.sort(key=lambda record: -record.shares[0])
-    by_share = kendalltau(*zip(*(record.shares for record in records), strict=True)).statistic
+    found = agreement((ours["backend"], ours["kept"], theirs["kept"]) for ours, theirs in rows)
     speed = kendalltau(*zip(*(record.means for record in records), strict=True)).statistic
     return [
         f"## {SETTINGS[level]}: tolerance {LEVELS[level]:g}",
         "",
-        f"{sum(record.same for record in records)} of {len(rows)} verdicts are the same. Kendall's τ of the rankings by "
-        f"share of problems solved: {by_share:.2f}; by mean time: {speed:.2f}. "
+        f"{found.same} of {found.count} verdicts are the same. Kendall's τ of the rankings by "
+        f"share of problems solved: {found.tau:.2f}; by mean time: {speed:.2f}. "
         f"{_control(records)}",
         "",
         *table(TITLES, (record.cells() for record in records)),
@@ -260,14 +261,13 @@ def _control(records: list[SolverRecord]) -> str:
     asked = [record for record in records if np.isfinite(record.as_published)]
     if not asked:
         return ""
-    cells = [pair for record in asked for pair in record.pairs]
-    same = sum(ours["as_published"] == theirs["kept"] for ours, theirs in cells)
-    rank = kendalltau([record.as_published for record in asked], [record.shares[1] for record in asked]).statistic
+    pairs = (pair for record in asked for pair in record.pairs)
+    found = agreement((ours["backend"], ours["as_published"], theirs["kept"]) for ours, theirs in pairs)
     far = [record.solver for record in asked if abs(record.as_published - record.shares[1]) > CLOSE]
     apart = f"but for {', '.join(far)}" if far else "for all"
     return (
-        f"In the published form {same} of {len(cells)} verdicts are the same, τ by share is {rank:.2f}; shares are within "
-        f"{CLOSE:.0%} of the published ones {apart}."
+        f"In the published form {found.same} of {found.count} verdicts are the same, τ by share is {found.tau:.2f}; shares "
+        f"are within {CLOSE:.0%} of the published ones {apart}."
     )
 
 

@@ -7,9 +7,7 @@ measured, nothing else differs but the machine and limits of iterations: setting
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-from scipy.stats import kendalltau
-
+from benchmarks.agreement import agreement
 from gauss.bench.markdown import share, table
 from gauss.bench.table import read_table
 
@@ -46,14 +44,12 @@ def _section(title: str, chosen: list[dict]) -> list[str]:
     by_solver = {
         name: [row for row in chosen if row["solver"] == name] for name in sorted({row["solver"] for row in chosen})
     }
-    shares = {side: [float(np.mean([row[side] for row in mine])) for mine in by_solver.values()] for side in SIDES}
-    same = {side: sum(row[side] == row["published"] for row in chosen) for side in ("now", "then")}
-    rank = {side: kendalltau(shares[side], shares["published"]).statistic for side in same}
-    words = (f"with {SIDES[side]} {same[side]} of {len(chosen)} verdicts, τ = {rank[side]:.2f}" for side in same)
-    body = [
-        [name, len(mine), *(share(shares[side][i]) for side in SIDES), *(_same(mine, side) for side in same)]
-        for i, (name, mine) in enumerate(by_solver.items())
-    ]
+    found = {side: agreement((row["solver"], row[side], row["published"]) for row in chosen) for side in ("now", "then")}
+    words = (f"with {SIDES[side]} {one.same} of {one.count} verdicts, τ = {one.tau:.2f}" for side, one in found.items())
+    body = []
+    for name, mine in by_solver.items():
+        shares = [one.shares[name][0] for one in found.values()] + [found["now"].shares[name][1]]
+        body.append([name, len(mine), *map(share, shares), *(_same(mine, side) for side in found)])
     problems = len({row["problem"] for row in chosen})
     intro = f"{problems} problems, those that all three were asked. Verdicts as published, and Kendall's τ of the rankings "
     intro += f"by share of problems solved: {'; '.join(words)}."

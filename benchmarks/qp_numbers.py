@@ -8,9 +8,8 @@ Writes the section of ``benchmarks/README.md`` between its marks; measures nothi
 from collections.abc import Iterator
 from pathlib import Path
 
-from scipy.stats import kendalltau
-
 from benchmarks import maros_meszaros, published_form_report
+from benchmarks.agreement import agreement
 from benchmarks.command import RESULTS
 from benchmarks.work_precision.beaten import rewrite
 from gauss.bench.class_page import at_main_level, ordered
@@ -49,13 +48,11 @@ def _published() -> Iterator[str]:
     path = RESULTS / "maros_meszaros.csv"
     pairs, form = maros_meszaros.read_pairs(path), read_table(maros_meszaros.FORM)
     for level in maros_meszaros.SETTINGS:
-        here = [
-            (bool(ours["kept"]), bool(theirs["kept"]), ours["backend"]) for ours, theirs in pairs if ours["level"] == level
-        ]
-        words = [_agreement("bounds as rows", here)]
+        here = [(ours["backend"], ours["kept"], theirs["kept"]) for ours, theirs in pairs if ours["level"] == level]
+        words = [_words("bounds as rows", here)]
         for side in ("now", "then"):
-            rows = [(row[side], row["published"], row["solver"]) for row in form if row["level"] == level]
-            words.append(_agreement(f"published form, {published_form_report.SIDES[side]}", rows))
+            rows = [(row["solver"], row[side], row["published"]) for row in form if row["level"] == level]
+            words.append(_words(f"published form, {published_form_report.SIDES[side]}", rows))
         asked_for = (
             {ours["problem"] for ours, _ in pairs} if here else {row["problem"] for row in form if row["level"] == level}
         )
@@ -63,17 +60,10 @@ def _published() -> Iterator[str]:
         yield f"  rankings by share of problems solved: {'; '.join(filter(None, words))}."
 
 
-def _agreement(what: str, rows: list[tuple[bool, bool, str]]) -> str:
-    """Equal verdicts, and τ of the shares of the solvers; "" where there is no row."""
-    shares: dict[str, list[list[bool]]] = {}
-    for ours, theirs, solver in rows:
-        for side, kept in zip(shares.setdefault(solver, [[], []]), (ours, theirs), strict=True):
-            side.append(kept)
-    means = [[sum(side) / len(side) for side in sides] for sides in shares.values()]
-    if len(means) < 2:
-        return ""
-    tau = kendalltau(*zip(*means, strict=True)).statistic
-    return f"{what} {sum(ours == theirs for ours, theirs, _ in rows)} of {len(rows)}, τ = {tau:.2f}"
+def _words(what: str, verdicts: list[tuple[str, bool, bool]]) -> str:
+    """Equal verdicts and τ; "" where there is none."""
+    found = agreement(verdicts)
+    return f"{what} {found.same} of {found.count}, τ = {found.tau:.2f}" if found.count else ""
 
 
 def _by_qpbenchmark() -> Iterator[str]:

@@ -5,9 +5,9 @@
 It runs qpbenchmark on the test set, with qpbenchmark's own settings and its residuals, and puts what it finds beside
 the rows of form F2 in ``results/qp.csv``, whose problems these are. An answer counts if it is claimed within 1 s, and
 primal and dual residual and duality gap are within the tolerance. The comparison sets qpbenchmark's tolerances; beyond
-these it raises limits of iterations and gives CVXOPT and ECOS tolerances of the gap. qpbenchmark times the first call,
-in which JAX compiles qpax and a busy machine loads libraries; here that is a column of its own. The rest is the same
-library with the same problem, so that other verdicts differ only near the tolerance.
+these it raises limits of iterations and gives CVXOPT, KVXOPT and ECOS tolerances of the gap. qpbenchmark times the first
+call, in which JAX compiles qpax and jaxopt's OSQP and a busy machine loads libraries; here that is a column of its own.
+The rest is the same library with the same problem, so that other verdicts differ only near the tolerance.
 
 Writes benchmarks/results/qpbenchmark.md and .csv; what the work folder has is not measured again.
 """
@@ -24,6 +24,7 @@ from benchmarks.maros_meszaros import SETTINGS, SolverRecord, figures, pairs, pu
 from gauss.bench.export import file_name
 from gauss.bench.levels import LEVELS
 from gauss.bench.markdown import head, table
+from gauss.bench.summary import asked
 from gauss.bench.table import header_of, read_table, write_table
 from gauss.bench.worker import ONE_THREAD
 
@@ -47,7 +48,7 @@ def main():
     results.parent.mkdir(parents=True, exist_ok=True)
     for setting in SETTINGS.values():
         run(results, setting)
-    ours = [row for row in read_table(RESULTS / "qp.csv") if row["form"] == FORM]
+    ours = [row for row in asked(read_table(RESULTS / "qp.csv")) if row["form"] == FORM]
     rows = pairs([row | {"problem": file_name(row["problem"])} for row in ours], published(results))
     write(rows, header_of(RESULTS / "qp.csv"))
 

@@ -59,6 +59,8 @@ from gauss.analysis import (
 from gauss.analysis.assembly_modes import assembly_modes
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
+from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
+from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
 from gauss.analysis.recommendation import advise
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
@@ -82,6 +84,12 @@ from gauss.view.viewer import show
 __version__: str
 
 __all__ = [
+    "StaticEquilibrium",
+    "LinearModel",
+    "LinearModes",
+    "equilibria",
+    "equilibrium",
+    "linearise",
     "Baumgarte",
     "Body",
     "Compulsion",

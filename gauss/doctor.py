@@ -32,6 +32,7 @@ EXTRAS = {
     "cluster": ("distributed",),
     "docs": ("pdoc",),
     "cuda": ("cuda-bindings",),
+    "control": ("control",),
     "robots": ("example-robot-data",),
     "mjcf": ("mujoco",),
     "peers": ("scikit-sundae", "mujoco"),

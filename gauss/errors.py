@@ -148,7 +148,12 @@ def did_you_mean(name: str, existing: Iterable[str]) -> str:
     return f"{hint}Known: {shown or 'none yet'}."
 
 
-DISTRIBUTIONS = {"imageio_ffmpeg": "imageio-ffmpeg", "pinocchio": "pin", "sksundae": "scikit-sundae"}  # of imports
+DISTRIBUTIONS = {  # of imports
+    "imageio_ffmpeg": "imageio-ffmpeg",
+    "pinocchio": "pin",
+    "sksundae": "scikit-sundae",
+    "yaml": "pyyaml",
+}
 
 
 @contextmanager

@@ -4,16 +4,20 @@ import numpy as np
 
 import gauss
 from gauss.errors import SceneError
+from gauss.rotations import from_rpy
 
 __all__ = [
     "andrews_squeezer",
     "delta_robot",
     "flyball_governor",
+    "four_bar_branch",
     "hung_chain",
     "mass_ratio_chain",
     "n_four_bar",
     "n_pendulum",
+    "parallel_chains",
     "random_tree",
+    "rotor_branch",
     "spatial_chain",
     "spatial_double_pendulum",
     "stewart_platform",
@@ -111,6 +115,93 @@ def mass_ratio_chain(n: int = 10, ratio: float = 1e6) -> gauss.Scene:
         scene.revolute(f"joint{i}", previous, f"link{i}", axis=axis, frame=f"link{i}")
         previous = f"link{i}"
     return scene
+
+
+def four_bar_branch(n: int = 3, root: str = "free") -> gauss.Scene:
+    """Base with a branch of n four-bars, each on the rocker of the one before, its plane turned by a right angle.
+
+    The base floats, or stands with ``root="fixed"``. Loops in planes of their own: two rows each, three are redundant.
+    """
+    _at_least_one(n)
+    scene, carrier = gauss.Scene(f"branch of {n} four-bars"), "base"
+    scene.body("base", 5.0, (0.1, 0.1, 0.1))
+    scene.joint("base joint", "free" if root == "free" else "fixed", "ground", "base")
+    coupler = np.hypot(0.4, 0.1)
+    for i in range(1, n + 1):
+        turn, foot = (np.pi / 2, 0.0, 0.0), np.array([0.3 if i > 1 else 0.0, 0.0, 0.0])
+        R = from_rpy(*turn)
+        upright = R @ from_rpy(0, 0, np.pi / 2)
+        scene.body(f"crank{i}", **_rod(0.2), on=carrier, position=foot, rotation=upright)
+        scene.revolute(f"A{i}", carrier, f"crank{i}", frame=f"crank{i}")
+        scene.body(f"rocker{i}", **_rod(0.3), on=carrier, position=foot + R @ [0.4, 0.0, 0.0], rotation=upright)
+        scene.revolute(f"D{i}", carrier, f"rocker{i}", frame=f"rocker{i}")
+        lean = (0, 0, np.arctan2(0.1, 0.4) - np.pi / 2)
+        scene.body(f"coupler{i}", **_rod(coupler), on=f"crank{i}", position=(0.2, 0, 0), rotation=lean)
+        scene.revolute(f"B{i}", f"crank{i}", f"coupler{i}", frame=f"coupler{i}")
+        scene.revolute(f"C{i}", f"coupler{i}", f"rocker{i}", at=(0.3, 0, 0), frame=f"rocker{i}")
+        carrier = f"rocker{i}"
+    return scene
+
+
+def rotor_branch(n: int = 3, ratio: float = 6.0, root: str = "free") -> gauss.Scene:
+    """Base with a branch of n links, each with a geared rotor on the link before, axes x and y in turn.
+
+    The base floats, or stands with ``root="fixed"``; a rotor turns ``ratio`` times as fast as its link.
+    """
+    _at_least_one(n)
+    scene, carrier = gauss.Scene(f"branch of {n} links with rotors"), "base"
+    scene.body("base", 5.0, (0.1, 0.1, 0.1))
+    scene.joint("base joint", "free" if root == "free" else "fixed", "ground", "base")
+    for i in range(1, n + 1):
+        axis, foot = (1, 0, 0) if i % 2 else (0, 1, 0), (0, 0, -0.3 if i > 1 else 0.0)
+        scene.body(f"link{i}", 0.8, (0.006, 0.006, 0.0005), com=(0, 0, -0.15), on=carrier, position=foot)
+        scene.body(f"rotor{i}", 0.2, (1e-4, 1e-4, 1e-4), on=carrier, position=foot)
+        for name in (f"link{i}", f"rotor{i}"):
+            scene.revolute(f"{name} joint", carrier, name, frame=name, axis=axis)
+        scene.couple(f"gear{i}", f"rotor{i} joint", f"link{i} joint", ratio)
+        carrier = f"link{i}"
+    return scene
+
+
+def parallel_chains(depth: int = 5, rung: int = 2, belt: bool = False) -> gauss.Scene:
+    """Two chains of ``depth`` links side by side, tied at one height: by a rod, or by a belt.
+
+    Parameters
+    ----------
+    depth : int
+        Links of each chain, 5 to 40 and more.
+    rung : int
+        Links below the tie, of each chain.
+    belt : bool
+        Whether a belt keeps these links of both chains at one direction (a sum of coordinates), instead of a rod between
+        them (a loop).
+    """
+    _at_least_one(rung)
+    if rung > depth:
+        raise SceneError(f"rung: expected 1 to {depth}, the depth, got {rung}.")
+    scene = gauss.Scene(f"parallel chains of {depth}", gravity=(0, -9.81, 0))
+    for chain, side in ((1, 0.0), (2, 1.3)):
+        previous = "ground"
+        for i in range(1, depth + 1):
+            name, place = f"link {chain}.{i}", (side if i == 1 else 1.0, 0, 0)
+            scene.body(name, **_rod(1.0), on=previous, position=place, rotation=(0, 0, -1.2 if i == 1 else 0.1))
+            scene.revolute(f"joint {chain}.{i}", previous, name, frame=name)
+            previous = name
+    if belt:
+        terms = {f"joint {chain}.{i}": 1.0 if chain == 1 else -1.0 for chain in (1, 2) for i in range(1, rung + 1)}
+        scene.linear_coupling("belt", terms)
+        return scene
+    turned = 1.2 - 0.1 * (rung - 1)
+    scene.body("rod", **_rod(1.3), on=f"link 1.{rung}", position=(1.0, 0, 0), rotation=(0, 0, turned))
+    scene.revolute("rod joint", f"link 1.{rung}", "rod", frame="rod")
+    scene.revolute("tie", "rod", f"link 2.{rung}", frame="rod", at=(1.3, 0, 0))
+    return scene
+
+
+def _rod(length: float) -> dict:
+    """Uniform rod along x, of 1 kg/m."""
+    moment = length**3 / 12
+    return {"mass": length, "inertia": (1e-3 * length, moment, moment), "com": (length / 2, 0, 0)}
 
 
 def stewart_platform(base: float = 1.0, top: float = 0.6, height: float = 1.0, stiffness: float = 4000.0) -> gauss.Scene:

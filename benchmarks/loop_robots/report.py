@@ -98,10 +98,18 @@ def _motions(lines: list[dict]) -> list[str]:
     if not moved:
         return []
     cells = [
-        {"robot": line["robot"], "drift": number(_value(line, "drift")), "time": in_time(_value(line, "motion"))}
+        {
+            "robot": line["robot"],
+            "until": f"{_value(line, 'moved_until'):.0f} s",
+            "drift": number(_value(line, "drift")),
+            "time": in_time(_value(line, "motion")),
+        }
         for line in moved
     ]
-    return [*formatted_table({"motion of": "{robot}", "drift": "{drift}", "CPU time": "{time}"}, cells), ""]
+    return [
+        *formatted_table({"motion of": "{robot}", "until": "{until}", "drift": "{drift}", "CPU time": "{time}"}, cells),
+        "",
+    ]
 
 
 def _value(line: dict, key: str) -> float:

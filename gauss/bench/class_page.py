@@ -4,9 +4,9 @@ import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
 from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, is_answered, of_special_form, special_cells
-from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
+from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OURS, OWN
 from gauss.bench.markdown import count_of, head, number, share, table
-from gauss.bench.measure import OURS, WRONG, middle
+from gauss.bench.measure import WRONG, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
 from gauss.bench.settings_report import compared_lines
@@ -107,8 +107,8 @@ def _by_level(rows, names: list[str]) -> list[str]:
     return [
         "## By level",
         "",
-        f"Tolerances: {words}. Asked at each: {len(common)} problems. Right, kept; claimed, beyond where that is not none. "
-        "Then shifted geometric means of times in ms.",
+        f"Tolerances: {words}. Asked at each: {count_of(len(common), 'problem')}. Right, kept; claimed, beyond where that "
+        "is not none. Then shifted geometric means of times in ms.",
         "",
         *table(["solver", *levels, *(f"{level} [ms]" for level in levels)], found),
         "",

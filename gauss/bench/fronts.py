@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.bench.instances import MAIN_FORM
-from gauss.bench.levels import OWN
-from gauss.bench.measure import OURS, middle
+from gauss.bench.levels import OURS, OWN
+from gauss.bench.measure import middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.summary import complete, is_without_multipliers, mean_time
 from gauss.bench.verdicts import truth

@@ -5,17 +5,21 @@ duality gap, relative ones of zero. Nothing is tuned for any solver. One table, 
 beside these tolerances, and which residuals its claim of success promises.
 """
 
+import hashlib
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.backends.accuracy import SMALLEST_TOLERANCE, tolerances
+from gauss.backends import BACKENDS
+from gauss.backends.accuracy import SMALLEST_TOLERANCE, own_settings, tolerances
 from gauss.bench.clocks import WALL_PER_CPU
 
 LEVELS = {"low": 1e-3, "mid": 1e-6, "high": 1e-9, "tightest": 1e-12}  # absolute tolerances of residuals and gap
 MAIN_LEVEL = "high"  # of tables, charts and sentences about one level, and of quick comparisons
-OWN = "own"  # level of methods that have no tolerance
+OWN = "own"  # level of methods that have no tolerance, those of gauss
+AUTO = "auto"  # gauss's own choice, with its rescue
+OURS = (AUTO, *BACKENDS)
 LIMIT = 1.0  # [s] of one solve, by gauss.bench.clocks; later answers do not count, whatever limits a solver takes
 # Limit of wall time [s] that libraries get for one solve: so large that on a busy machine the CPU time ends it first.
 WALL_LIMIT = WALL_PER_CPU * LIMIT
@@ -140,6 +144,13 @@ def promise(solver: str, level: str) -> Promise:
         return Promise(LOOSEST, LOOSEST, np.inf)
     tolerance = max(LEVELS[level], SMALLEST_TOLERANCE.get(solver, 0.0))
     return Promise(tolerance, tolerance, tolerance if policy.has_gap else np.inf, policy.is_relative)
+
+
+def digest_of_settings() -> str:
+    """Digest of all settings of all solvers: those of the comparison, and those with which gauss calls them for a user."""
+    compared = {(solver, level): sorted(settings(solver, level).items()) for solver in POLICIES for level in LEVELS}
+    own = {solver: sorted(own_settings(solver).items()) for solver in POLICIES}
+    return hashlib.sha256(repr((compared, own)).encode()).hexdigest()[:12]
 
 
 def as_qpbenchmark_sets(solver: str, level: str) -> dict:

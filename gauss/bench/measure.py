@@ -6,7 +6,7 @@ from statistics import median
 
 import numpy as np
 
-from gauss.backends import BACKENDS, certify, make, solve
+from gauss.backends import certify, make, solve
 from gauss.backends.certificate import TOLERANCE, conclude
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import Outcome, Programme, read
@@ -14,13 +14,11 @@ from gauss.backends.solution import Answer
 from gauss.bench.clocks import COMPILING, UNKNOWN, ended, median_times, summary, timed
 from gauss.bench.contestants import ready, refusal, started
 from gauss.bench.instances import Instance, of_arrays
-from gauss.bench.levels import LIMIT, OWN, Promise, promise
+from gauss.bench.levels import AUTO, LIMIT, OURS, OWN, Promise, promise
 from gauss.bench.ready import Ready
 from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, ProgrammeStructure, StructuredProgramme
 from gauss.errors import BackendError
 
-AUTO = "auto"  # gauss's own choice, with its rescue
-OURS = (AUTO, *BACKENDS)
 NOT_ASKED = "not asked"  # outcome of a problem that a solver does not take: no failure
 LOADING = 30.0  # [s] of CPU time that a library may take to load and to solve next to nothing
 WRONG = 1e-3  # relative error above which an answer is wrong for any purpose

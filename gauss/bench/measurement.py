@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from gauss.bench.levels import digest_of_settings
 from gauss.bench.machine import header
 from gauss.bench.table import ResultTable, header_of, read_table
 from gauss.errors import BackendError, did_you_mean
@@ -30,7 +31,8 @@ class Measurement:
 
     def table(self, folder: Path, fresh: bool) -> ResultTable:
         """The table in a folder, with the rows that are there unless it begins afresh."""
-        return ResultTable(Path(folder) / f"{self.name}.csv", header(*self.packages), self.keys, self.values, fresh)
+        conditions = [*header(*self.packages), f"settings of QP solvers: digest {digest_of_settings()}"]
+        return ResultTable(Path(folder) / f"{self.name}.csv", conditions, self.keys, self.values, fresh)
 
     def write_page(self, folder: Path, table: Path, markdown: Callable[[list[dict], list[str]], str]) -> Path:
         """Write the page beside the table, and return its path."""

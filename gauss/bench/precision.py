@@ -15,6 +15,7 @@ import numpy as np
 from gauss.analysis import energy
 from gauss.backends import available
 from gauss.bench.extrapolation import extrapolated
+from gauss.bench.levels import AUTO
 from gauss.bench.measurement import chosen
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import position_residual
@@ -32,7 +33,6 @@ LOST = 10.0  # m: a motion that is off by more has nothing to do with the refere
 TWO = ("dopri5", "dop853")  # a reference, and what tells how good it is
 FINEST = 1e-14
 STEPS = 2**14  # of the finest run from which time stepping is extrapolated
-AUTO = "auto"  # gauss's own choice among the backends
 SENTENCE = 120  # letters of a reason, at most
 FEWEST, SLOW = 3, 10.0  # settings of a backend, and times of the limit that one of these may take
 REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the least time counts
@@ -175,8 +175,13 @@ def attempts(
         for count, setting in enumerate(settings(method, duration), start=1):
             found = attempt(system, duration, method, setting, against, time_limit, backend)
             yield found
-            if found.seconds > time_limit * (1.0 if backend is None or count >= FEWEST else SLOW):
+            if found.seconds > time_limit * _of_limit(backend, count):
                 break
+
+
+def _of_limit(backend: str | None, count: int) -> float:
+    """Times of the limit that the run of a setting may take: more for the first ones of a backend."""
+    return 1.0 if backend is None or count >= FEWEST else SLOW
 
 
 def _require_charted(methods: Iterable[str]):

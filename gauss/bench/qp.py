@@ -7,15 +7,14 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from gauss.backends import BACKENDS
 from gauss.backends.programme import FORMS as PROGRAMMES
 from gauss.bench import compiled
 from gauss.bench.clocks import BUDGET, COMPILING, FEWEST, ROUNDS, WALL_PER_CPU
 from gauss.bench.contestants import everyone, imported, source_of, suits
 from gauss.bench.instances import Instance, of_selection
-from gauss.bench.levels import LEVELS, LIMIT, OWN, promise, settings
+from gauss.bench.levels import AUTO, LEVELS, LIMIT, OURS, OWN, promise, settings
 from gauss.bench.machine import header, libraries, write_lock
-from gauss.bench.measure import AUTO, FIGURES, OURS, TERM_ROUNDING_RELATIVE, forms_of, measure, unanswered
+from gauss.bench.measure import FIGURES, TERM_ROUNDING_RELATIVE, forms_of, measure, unanswered
 from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.suite import VERSION
@@ -50,7 +49,7 @@ PACKAGES = tuple(
 
 def quick_backends() -> list[str]:
     """Backends of a quick comparison and of classes of the suite: those that do not compile for every size of problem."""
-    return [name for name in (AUTO, *BACKENDS, *everyone()) if name not in COMPILING]
+    return [name for name in (*OURS, *everyone()) if name not in COMPILING]
 
 
 def compare(
@@ -97,7 +96,7 @@ def compare(
     solvers = tuple(solvers)
     for solver in solvers:
         imported(solver)
-    names = (*chosen(backends, (AUTO, *BACKENDS, *everyone()), "backend"), *solvers)
+    names = (*chosen(backends, (*OURS, *everyone()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
     levels, forms = chosen(levels, LEVELS, "level"), chosen(forms, PROGRAMMES, "form")
     conditions = [*header(*PACKAGES), libraries(), f"problems: suite {VERSION} of gauss"]

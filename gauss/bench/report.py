@@ -7,9 +7,9 @@ import numpy as np
 from gauss.bench import compiled
 from gauss.bench.clocks import AROUND
 from gauss.bench.instances import FILE, MAIN_FORM
-from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OWN
+from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OURS, OWN
 from gauss.bench.markdown import head, in_time, number, share, table
-from gauss.bench.measure import OURS, WRONG
+from gauss.bench.measure import WRONG
 from gauss.bench.problems import INCONSISTENT, SELECTION
 from gauss.bench.reuse_report import reuse_lines
 from gauss.bench.settings_report import settings_lines

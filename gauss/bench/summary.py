@@ -15,9 +15,9 @@ import numpy as np
 
 from gauss.bench import compiled
 from gauss.bench.instances import FILE
-from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.levels import LEVELS, LIMIT, OURS, OWN
 from gauss.bench.markdown import count_of
-from gauss.bench.measure import NOT_ASKED, OURS, WRONG, middle
+from gauss.bench.measure import NOT_ASKED, WRONG, middle
 from gauss.bench.problems import SOLVABLE, UNKNOWN
 from gauss.bench.suite.instance import INFEASIBLE
 from gauss.bench.verdicts import said, stated, truth

@@ -23,6 +23,7 @@ READS: dict[str, dict[str, object]] = {
     "resistance": {"resistance": True},
     "collisions": {"collisions": True},
     "contacts": {"contacts": True},
+    "inertia": {"inertia": "as given"},
 }
 Read = Annotated[
     list[str] | None,

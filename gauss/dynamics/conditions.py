@@ -154,8 +154,10 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 
 def few_contact_operations(ask: Question) -> list[str]:
-    """The gap functions of contacts are short enough to be written out in the coordinates of the scene."""
+    """The gap functions of contacts are short enough to be written out, or inputs are held, which no kernel of pairs has."""
     scene = ask.system.scene
+    if ask.held or not shapes_in_contact(ask):
+        return []
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
     work = sum(_operations(scene.shapes[one.shape], scene.shapes[one.other]) for one in contacts)
     return [f"its contacts would have about {work:.0e} operations"] if work > MOST_CONTACT_OPERATIONS else []

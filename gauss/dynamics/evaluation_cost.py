@@ -12,14 +12,14 @@ from gauss.errors import SlowRouteWarning, user_level
 from gauss.system import System
 
 COSTS = {  # s, and s per body, of an evaluation by a driver and a kind of dynamics
-    ("compiled loop", "compiled"): (1e-6, 3e-7),
-    ("compiled loop", "tree recursion"): (1e-6, 3e-7),
+    ("compiled loop", "compiled"): (2e-7, 1e-7),
+    ("compiled loop", "tree recursion"): (2e-7, 1e-7),
     ("compiled loop", "call graph"): (1e-6, 1e-7),
-    ("Python loop", "compiled"): (5e-4, 3e-6),
-    ("Python loop", "tree recursion"): (5e-4, 3e-6),
-    ("Python loop", "call graph"): (5e-4, 4e-6),
+    ("Python loop", "compiled"): (1e-4, 4e-6),
+    ("Python loop", "tree recursion"): (1e-4, 5e-6),
+    ("Python loop", "call graph"): (1e-4, 5e-7),
     ("certified",): (1e-3, 3.5e-4),
-    ("state", "compiled"): (1e-5, 3e-7),
+    ("state", "compiled"): (3e-6, 1e-7),
 }
 CLIFF = 100.0  # ratio of the costs of the route that is taken and of one that is not, above which a motion warns
 LEAST_WASTE = 1.0  # s of estimated cost of a motion below which it does not

@@ -10,7 +10,7 @@ from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.consistent_states import consistent
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
-from gauss.errors import StateError, require
+from gauss.errors import BackendError, StateError, require
 from gauss.system import State, System, retract
 
 COMPONENTS = ("moment x", "moment y", "moment z", "force x", "force y", "force z")  # rows of a joint, world axes
@@ -126,7 +126,13 @@ def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:
 def _factor(system: System, state: State) -> Factor:
     """Factorisation with the bilateral constraints alone."""
     motion = kinematics(system, state)
-    return Factor(assemble_motion(motion, Applied(motion)))
+    compulsion = assemble_motion(motion, Applied(motion))
+    try:
+        return Factor(compulsion)
+    except BackendError:  # a link without inertia ends the tree, and follows others: freedoms do not depend on inertia
+        Phi = compulsion.Phi.reshape(-1, 6)
+        sizes = np.repeat([Phi[:, :3].max() or 1.0, Phi[:, 3:].max() or 1.0], 3)
+        return Factor(replace(compulsion, Phi=np.where(Phi > 0.0, Phi, sizes).ravel()))
 
 
 def _groups(system: System, redundancies: np.ndarray) -> tuple[Redundancy, ...]:

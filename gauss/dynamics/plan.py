@@ -112,8 +112,7 @@ def _both(one: Callable[[Question], bool], other: Callable[[Question], bool]) ->
 
 _CODE = own_backend, compilable
 _WHOLE = *_CODE, written_out, traced_laws, narrow
-_FEW_CONTACTS = small_contact_problem, few_contact_operations
-_STEP = own_backend, smooth(compilable), smooth(few_bodies), *_FEW_CONTACTS, smooth(traced_laws)
+_STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
 _PAIR_KERNELS = own_backend, no_held_inputs, smooth(traced_laws), takes_pair_kernels
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
@@ -122,7 +121,7 @@ _KERNEL_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
 MOTIONS = RuleTable(
     (
         Rule("constant", "none", when=lambda ask: not ask.system.n_v),
-        Rule("time stepping", "compiled", "certified", is_time_stepping, _STEP),
+        Rule("time stepping", "compiled", "certified", is_time_stepping, (*_STEP, few_contact_operations)),
         Rule("time stepping", "pair kernels", "", _both(is_time_stepping, shapes_in_contact), _PAIR_KERNELS),
         Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs,)),
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs)),

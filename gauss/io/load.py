@@ -14,7 +14,6 @@ from gauss.scene.toml import from_tables, tables, write_toml
 EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
 OF_SDF = ("root", "limits", "root_folder", "missing")
 OF_MJCF = ("limits", "contacts", "root_folder", "keyframe")
-READ = (".toml", ".urdf", ".xml", ".sdf", ".world")
 
 
 def load(source, **options):
@@ -27,10 +26,12 @@ def load(source, **options):
           or .world of Gazebo), or in MJCF (.xml, needs MuJoCo);
         * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
-        * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
+        * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda";
+        * "description:NAME" for one of the package robot_descriptions whose files are on disk, e.g. "description:panda";
+        * path of a .xacro file, which is a program: with ``xacro=True``, or a dict of its arguments.
     **options
-        For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``limits="start"|"stops"``, ``resistance=True`` and
-        ``collisions=True`` (see :func:`gauss.io.urdf.extras.with_extras`); for .sdf ``root``,
+        For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``inertia="as given"``, ``limits="start"|"stops"``,
+        ``resistance=True`` and ``collisions=True`` (see :func:`gauss.io.urdf.extras.with_extras`); for .sdf ``root``,
         ``limits``, ``root_folder=FOLDER`` and ``missing`` (see :func:`gauss.io.sdf.read.read_sdf`); for .xml ``limits``,
         ``contacts=True``, ``root_folder=FOLDER`` and ``keyframe=NAME`` (see :func:`gauss.io.mjcf.read.read_mjcf`); for
         families their parameters.
@@ -49,16 +50,14 @@ def load(source, **options):
     name, path = str(source), Path(source)
     if name.startswith("robot:"):
         return _read_urdf(_robots().robot(name.removeprefix("robot:")), options, name)
-    if path.suffix.lower() == ".urdf":
-        return _read_urdf(path, options, name)
-    if path.suffix.lower() == ".toml":
-        return _without_options(name, options, _read_toml, path)
-    if path.suffix.lower() == ".xml":
-        return _read_mjcf(path, _known(name, options, OF_MJCF))
-    if path.suffix.lower() in (".sdf", ".world"):
-        return import_module("gauss.io.sdf.read").read_sdf(path, **_known(name, options, OF_SDF))
+    if name.startswith("description:"):
+        found = _packages().description(name.removeprefix("description:"))
+        return load(found, **options)
+    read = READERS.get(path.suffix.lower())
+    if read is not None:
+        return read(path, options, name)
     if path.suffix or path.exists():
-        raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
+        raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READERS)}.")
     files = shipped() | servo_files()
     if name in files:
         return _without_options(name, options, _read_toml, files[name])
@@ -131,6 +130,16 @@ def _read_toml(path: Path):
     return found
 
 
+def _read_xacro(path: Path, options, name: str) -> Scene:
+    arguments = options.pop("xacro", None)
+    with _packages().urdf_of_xacro(path, arguments) as made:
+        return _read_urdf(made, options, "")
+
+
+def _read_sdf(path: Path, options, name: str) -> Scene:
+    return import_module("gauss.io.sdf.read").read_sdf(path, **_known(name, options, OF_SDF))
+
+
 def _read_urdf(path: Path, options, name: str) -> Scene:
     options = _known(str(path), options, ("root", "mimic", "inertia", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
@@ -143,7 +152,13 @@ def _robots():
     return import_module("gauss.io.urdf.robots")
 
 
-def _read_mjcf(path: Path, options) -> Scene:
+def _packages():
+    """Robots by other packages."""
+    return import_module("gauss.io.urdf.packages")
+
+
+def _read_mjcf(path: Path, options, name: str) -> Scene:
+    options = _known(name, options, OF_MJCF)
     with extra("mjcf"):  # MuJoCo's parser
         reader = import_module("gauss.io.mjcf.read")
     return reader.read_mjcf(path, **options)
@@ -168,6 +183,14 @@ def _without_options(name: str, options, read, path) -> Scene:
     return read(path)
 
 
+READERS: dict[str, Callable] = {  # (path, options, name) by ending
+    ".toml": lambda path, options, name: _without_options(name, options, _read_toml, path),
+    ".urdf": _read_urdf,
+    ".xacro": _read_xacro,
+    ".xml": _read_mjcf,
+    ".sdf": _read_sdf,
+    ".world": _read_sdf,
+}
 LABELLED = {".nc": _later("gauss.io.dataset", "write_netcdf"), ".zarr": _later("gauss.io.dataset", "write_zarr")}
 WRITERS: dict[str, dict[str, Callable]] = {  # by the name of the class: most are not imported yet
     "scene": {

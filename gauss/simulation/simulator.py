@@ -255,11 +255,15 @@ class Simulator:
         return float(self._point[0])
 
     @property
+    def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates (n_q,) and rates (n_v,), copies."""
+        begin, end = 1 + self._layout.n_q, 1 + self._layout.n_q + self._layout.n_v
+        return self._point[1:begin].copy(), self._point[begin:end].copy()
+
+    @property
     def state(self) -> State:
         """State, a copy."""
-        n_q = self.system.n_q
-        q, v = self._point[1 : 1 + n_q].copy(), self._point[1 + n_q : 1 + n_q + self.system.n_v].copy()
-        return State(float(self._point[0]), q, v)
+        return State(float(self._point[0]), *self.coordinates)
 
     @property
     def work(self) -> np.ndarray:

@@ -121,16 +121,23 @@ def _check_inertia(system: System):
     """Refuse a movable leaf of the tree without inertia; other singular inertias are found by the solvers."""
     structure = system.structure
     inner = {edge.inner for edge in structure.tree}
-    bound = {body for i in structure.closures for body in structure.constraints[i].bodies}
+    bound, tied = _constrained(structure)
     for edge in structure.tree:
-        is_leaf = edge.outer not in inner and edge.outer not in bound
-        pair = system.joints[edge.constraint].pair
+        v, pair = system.joints[edge.constraint].v, system.joints[edge.constraint].pair
+        is_leaf = edge.outer not in inner and edge.outer not in bound and v.start not in tied
         if is_leaf and pair.n_v and not system.Phi[6 * edge.outer : 6 * edge.outer + 6].any():
             body, joint = structure.bodies[edge.outer], structure.constraints[edge.constraint].name
             raise SceneError(
                 f"body {body!r} has no mass, yet joint {joint!r} lets it move and nothing hangs on it: "
                 "its acceleration is undetermined. Give it a mass > 0."
             )
+
+
+def _constrained(structure: Structure) -> tuple[set[int], set[int]]:
+    """Bodies of loops and relations, and first entries of v of the joints of couplings and relations."""
+    closures = [structure.constraints[i] for i in structure.closures]
+    bodies = {body for constraint in closures for body in constraint.bodies}
+    return bodies, {places.start for constraint in closures for places in constraint.columns}
 
 
 def _require_in_tree(joint: Joint, outer: str):

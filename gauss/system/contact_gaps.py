@@ -1,12 +1,17 @@
 """Gap functions of the unilateral constraints of a scene, tangential velocities and guards of its contacts, in order."""
 
-from gauss.scene import ClosedGap, Contact, Guard, Scene, Slip
+from gauss.scene import ClosedGap, Contact, Guard, OneSidedConstraint, Scene, Slip
 
 
 def sides(scene: Scene) -> list[ClosedGap]:
     """Every gap function of the unilateral constraints of a scene."""
     contacts = scene.contacts.values()
     return [ClosedGap(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
+
+
+def has_own_gaps(scene: Scene) -> bool:
+    """Whether the user gives a gap function, which may depend on the time."""
+    return any(isinstance(contact, OneSidedConstraint) for contact in scene.contacts.values())
 
 
 def slips(scene: Scene) -> list[Slip]:

@@ -7,6 +7,7 @@ from gauss.errors import AssemblyError, GaussError
 
 MOST_REASONS = 5  # number of reasons of a pass that are listed
 RANK_ROWS = 150  # number of loop constraints up to which freedoms are counted by rank: the time grows with its cube
+CLOSE_ROUTES = 1.5  # ratio of estimated costs up to which two routes are called equally fast
 MOST_LISTED = 40  # number of joints and names in a list
 
 
@@ -18,7 +19,7 @@ def _method(system) -> list[str]:
     for what, plan in system.dynamics.plans(system).items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
         cost, ratio = system.dynamics.cost(system, plan)
-        if ratio > 1.0:
+        if ratio > CLOSE_ROUTES:
             lines.append(
                 f"    about {1e6 * cost:.0f} µs an evaluation (estimated), {ratio:.0f} times the fastest that is barred"
             )

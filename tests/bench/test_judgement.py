@@ -503,5 +503,5 @@ def test_levels_stand_side_by_side_where_several_were_asked():
     row = GOOD | {"group": "mpc", "library": 1e-4}
     asked = [("a", "high"), ("b", "high"), ("a", "low")]
     text = class_page("mpc", [row | {"problem": problem, "level": level} for problem, level in asked], [], "")
-    assert "Asked at each: 1 problems" in text and "| 1 | one | 2/2 |" in text
+    assert "Asked at each: 1 problem." in text and "| 1 | one | 2/2 |" in text
     assert "## By level" not in class_page("mpc", [row | {"problem": "a", "level": "high"}], [], "")

@@ -18,8 +18,7 @@ ROBOT = f"""<robot name="r">
 </robot>"""
 BOTH = '<a link="left"/><b link="right"/>'
 TIES = {
-    "loop of URDF+": '<loop name="c" type="revolute"><predecessor link="left"/><successor link="right"/></loop>',
-    "coupling of URDF+": '<coupling name="c"><predecessor link="left"/><successor link="right"/></coupling>',
+    "loop of another dialect": '<closure name="c" type="revolute"><one link="left"/><other link="right"/></closure>',
     "joint of Drake": f'<drake:joint name="c" type="ball">{BOTH}</drake:joint>',
     "constraint of Drake": f"<drake:ball_constraint>{BOTH}</drake:ball_constraint>",
     "bushing of Drake": '<drake:linear_bushing_rpy><drake:bushing_frameA name="A"/></drake:linear_bushing_rpy>',

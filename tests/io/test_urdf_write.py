@@ -123,9 +123,10 @@ def test_trees_in_pinocchio_and_mujoco(tmp_path, seed):
 
 def test_what_urdf_cannot_say_is_listed_in_it():
     scene = four_bar()
+    scene.force("wind", "rocker")
     text, beside = to_urdf(scene)
-    assert "Not in this file, but in the one beside it: joint 'D', start 'A'" in text
-    assert 'name = "D"' in beside and 'name = "B"' not in beside
+    assert "Not in this file, but in the one beside it: load 'wind', start 'A'" in text
+    assert 'name = "wind"' in beside and 'name = "D"' not in beside and '<loop name="D"' in text
 
 
 def test_a_tree_needs_no_file_beside_it(tmp_path):

@@ -1,14 +1,22 @@
 """Time stepping of mechanisms by kernels of pairs of shapes: the same motion as by straight-line code, and closed forms."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import gauss
 from gauss import Plan
+from gauss.dynamics.contact.impact import resting
+from gauss.dynamics.contact.mechanism_step import mechanism_stepper
+from gauss.errors import ContactLawWarning, PainleveWarning, StateError
+from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from tests.support import mechanisms
 
 STEP = 1e-3  # [s]
 SAME_STEPS = 1e-9  # coordinates, rates and work after 150 steps of two solvers, each with laws met to 1e-10
+GAIN = 1e-4  # of the energy: what a step of the midpoint rule may gain
 KERNELS, WRITTEN_OUT = Plan("time stepping", "pair kernels"), Plan("time stepping", "compiled")
 
 
@@ -104,3 +112,112 @@ def test_mechanisms_move_as_by_the_machine_code_of_the_scene(name):
     np.testing.assert_allclose(*pushes, atol=1e-6 * pushes[0].max())
     rubs = [gauss.friction_forces(motion, "touch") for motion in (one, other)]
     np.testing.assert_allclose(*rubs, atol=1e-6 * pushes[0].max())
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_machine_code_and_python_take_the_same_steps(name):
+    system = gauss.compile_scene(SCENES[name]())
+    stepper = mechanism_stepper(system)
+    if stepper.memory is None:
+        assert name == "four_bar"
+        return
+    state = system.initial_state()
+    stepper.forget()
+    rest, finished = system.scale.time * resting(system, state.v), 0
+    for _ in range(120):
+        known = stepper.known
+        by_python = stepper._python_step(state, STEP, rest)
+        stepper.known = known
+        found = stepper._compiled_step(state, STEP, rest)
+        if found is None:
+            found = by_python
+            stepper.known = known
+            stepper._python_step(state, STEP, rest)
+        else:
+            finished += 1
+        np.testing.assert_allclose(found.v, by_python.v, atol=SAME_STEPS)
+        np.testing.assert_allclose(found.q, by_python.q, atol=SAME_STEPS)
+        np.testing.assert_allclose(found.power, by_python.power, atol=1e4 * SAME_STEPS)
+        state = system.projected(gauss.State(state.t + STEP, found.q, found.v))
+    assert finished > 100
+
+
+def on_a_slope(shape: str, friction: float, angle: float):
+    """A body of 1 kg in a vertical plane, on a plane of a slope."""
+    scene = gauss.Scene("slope")
+    normal = np.array([np.sin(angle), 0.0, np.cos(angle)])
+    scene.half_space("plane", normal=tuple(normal))
+    place = tuple(0.1 * normal)
+    for name in ("along", "up"):
+        scene.body(name, mass=0.0, position=place)
+    scene.body("body", mass=1.0, inertia=(0.004,) * 3, position=place)
+    scene.prismatic("x", "ground", "along", at=place, axis=(1, 0, 0))
+    scene.prismatic("z", "along", "up", at=place, axis=(0, 0, 1))
+    scene.revolute("turn", "up", "body", at=place, axis=(0, 1, 0))
+    if shape == "ball":
+        scene.sphere("shape", "body", 0.1)
+    else:
+        scene.box("shape", "body", (0.6, 0.2, 0.2), rotation=(0.0, angle, 0.0))
+    scene.contact("touch", "shape", "plane", friction=friction)
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("shape", "friction", "angle", "acceleration"),
+    [
+        ("box", 0.2, 0.3, np.sin(0.3) - 0.2 * np.cos(0.3)),
+        ("box", 0.5, 0.3, 0.0),
+        ("ball", 0.5, 0.3, 5.0 / 7.0 * np.sin(0.3)),
+        ("ball", 0.02, 0.3, np.sin(0.3) - 0.02 * np.cos(0.3)),
+    ],
+)
+def test_bodies_slide_and_roll_down_a_slope_as_by_coulombs_law(shape, friction, angle, acceleration):
+    found = moved(on_a_slope(shape, friction, angle), 0.2, plan=KERNELS)
+    speed = np.hypot(*found.v[-1, :2])
+    assert speed == pytest.approx(9.81 * acceleration * 0.2, abs=1e-8)
+
+
+def test_a_leg_that_falls_comes_to_rest_on_its_stops_and_the_floor():
+    scene = driven()
+    del scene.loads["spring"]
+    for name in [name for name, load in scene.loads.items() if name != "spring"]:
+        del scene.loads[name]
+    found = moved(scene, 1.5, plan=KERNELS)
+    assert np.abs(found.v[-200:]).max() <= 1e-9
+    energy = gauss.energy(found)
+    total = energy.kinetic + energy.potential
+    assert np.diff(total).max() <= GAIN * energy.scale
+    assert total[-1] < total[0] - 0.1 * energy.scale
+
+
+def test_time_stepping_tells_painleves_paradox():
+    scene, radius = gauss.load("painleve_rod"), 1e-3
+    scene.shapes["end"] = replace(scene.shapes["end"], radius=radius)
+    scene.shapes["floor"] = replace(scene.shapes["floor"], at=(0.0, -radius, 0.0))
+    with pytest.warns(PainleveWarning, match="'C'"):
+        moved(scene, 0.02, plan=KERNELS)
+
+
+def test_loose_laws_of_contact_are_told():
+    with pytest.warns(ContactLawWarning, match="3 of 10 steps"):
+        warn_of_laws(1e-12, 3, 10)
+    with pytest.warns(ContactLawWarning, match="1e-03"):
+        warn_of_laws(1e-3, 0, 10)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_laws(1e-9, 0, 10)
+
+
+def test_penetration_at_the_start_is_refused():
+    scene = arm("deep arm", height=0.3)
+    with pytest.raises(StateError, match="inside of 'touch'"):
+        moved(scene, STEP, plan=KERNELS)
+
+
+def test_samples_beside_the_steps_are_those_of_the_written_out_step():
+    system, times = gauss.compile_scene(driven()), np.linspace(0.0, 0.1, 27)
+    one, other = (moved(system, 0.1, plan=plan, times=times) for plan in (WRITTEN_OUT, KERNELS))
+    np.testing.assert_array_equal(one.t, other.t)
+    np.testing.assert_allclose(one.q, other.q, atol=SAME_STEPS)
+    again = moved(system, 0.1, plan=KERNELS, times=times)
+    np.testing.assert_array_equal(again.q, other.q)

@@ -14,14 +14,15 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import block_diag
 
-from gauss.analysis.crosscheck.pinocchio_ import Twin
 from gauss.analysis.crosscheck.pinocchio_dynamics import PinocchioInstant
 from gauss.analysis.crosscheck.pinocchio_joints import forward
 from gauss.errors import GaussError
 from gauss.rotations import cross, skew
-from gauss.system import PlacedJoint, State
+from gauss.scene import LinearCoupling
+from gauss.system import PlacedJoint, State, System
 
 SINGULAR_VALUE_CUTOFF = 1e-9  # of rows of unit length; redundant rows of consistent states lie near 1e-13
+ROW_ROUNDOFF = 1e-13  # length of a row that is zero but for rounding, relative to the longest
 REFINEMENTS = 1  # removes the rounding error by the condition of Zᵀ M Z
 AXES = pin.LOCAL_WORLD_ALIGNED  # motion of the origin of a frame, in world axes
 
@@ -36,7 +37,7 @@ def constrained_accelerations(now: PinocchioInstant, state: State) -> np.ndarray
     """
     K, k = _rows(now, state)
     lengths = np.linalg.norm(K, axis=1)
-    lengths[lengths == 0] = 1.0
+    lengths[lengths <= ROW_ROUNDOFF * lengths.max(initial=0.0)] = 1.0  # 0 = 0 but for rounding
     U, sizes, Vt = np.linalg.svd(K / lengths[:, None])
     rank = int((sizes > SINGULAR_VALUE_CUTOFF).sum())
     x = Vt[:rank].T @ ((U[:, :rank].T @ (k / lengths)) / sizes[:rank])
@@ -77,7 +78,10 @@ def _rows(now: PinocchioInstant, state: State) -> tuple[np.ndarray, np.ndarray]:
         if index < len(system.joints):
             rows, right = _loop_rows(now, data, system.joints[index], state)
         elif name in system.scene.couplings:
-            rows, right = _coupling_row(now.twin, name)
+            coupling = system.scene.couplings[name]
+            rows, right = _coupling_row(system, {coupling.driven: 1.0, coupling.driver: -coupling.ratio})
+        elif isinstance(relation := system.scene.relations[name], LinearCoupling):
+            rows, right = _coupling_row(system, dict(zip(relation.coupled, relation.coefficients, strict=True)))
         else:
             raise GaussError(
                 f"constraint {name!r}: a crosscheck knows joints and couplings, not this relation; leave it out."
@@ -87,11 +91,11 @@ def _rows(now: PinocchioInstant, state: State) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(K), np.concatenate(k)
 
 
-def _coupling_row(twin: Twin, name: str) -> tuple[np.ndarray, np.ndarray]:
-    coupling = twin.system.scene.couplings[name]
-    row = np.zeros((1, twin.system.n_v))
-    row[0, twin.system.joint(coupling.driven).v] = 1.0
-    row[0, twin.system.joint(coupling.driver).v] = -coupling.ratio
+def _coupling_row(system: System, terms: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Row of a sum of rates, coefficients by joint or rate."""
+    row = np.zeros((1, system.n_v))
+    for joint, coefficient in terms.items():
+        row[0, system.column(joint)] = coefficient
     return row, np.zeros(1)
 
 

@@ -10,6 +10,7 @@ from gauss.analysis import warn_of_balance
 from gauss.backends import BACKENDS, Backend, make, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Answer
+from gauss.bench.levels import AUTO, OURS
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
@@ -22,7 +23,6 @@ from gauss.simulation.python_run import PythonRun
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.system import State, System
 
-AUTO = "auto"
 RTOL, ATOL = 1e-10, 1e-12  # of adaptive integrators
 
 
@@ -58,7 +58,7 @@ class Method:
     @property
     def ours(self) -> bool:
         """Whether it is a method of gauss."""
-        return self.backend == AUTO or self.backend in BACKENDS
+        return self.backend in OURS
 
     @property
     def _options(self) -> dict[str, Any]:

@@ -7,8 +7,9 @@ import numpy as np
 
 from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, SLOW, VERDICTS
 from gauss.bench.atlas.cases import CASES
-from gauss.bench.atlas.methods import AUTO, DEFAULT, METHODS, Method
+from gauss.bench.atlas.methods import DEFAULT, METHODS, Method
 from gauss.bench.atlas.run import STABILITY
+from gauss.bench.levels import AUTO
 from gauss.bench.markdown import head, table, when_and_where
 from gauss.bench.table import header_of, read_table
 

@@ -16,8 +16,8 @@ from gauss.backends.certificate import TOLERANCE
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
 from gauss.bench.fuzz.problems import fuzzed
-from gauss.bench.levels import settings
-from gauss.bench.measure import OURS, WRONG
+from gauss.bench.levels import OURS, settings
+from gauss.bench.measure import WRONG
 from gauss.bench.reference import ReferenceSolution, reference
 from gauss.errors import BackendError
 

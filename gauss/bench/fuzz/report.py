@@ -8,8 +8,9 @@ import numpy as np
 from gauss.bench.fuzz.examine import together
 from gauss.bench.fuzz.problems import KINDS
 from gauss.bench.fuzz.run import FUZZ
+from gauss.bench.levels import AUTO, OURS
 from gauss.bench.markdown import head, table
-from gauss.bench.measure import AUTO, OURS, WRONG
+from gauss.bench.measure import WRONG
 
 HOW = f"""Every answer is certified as users get it, and compared with a reference whose residuals have 50 digits, body
 by body and joint by joint. *Certified*: the certificate confirms the answer to 1e-6. *Flagged*: it does not, and says so.

@@ -12,7 +12,7 @@ from tqdm import tqdm
 from gauss.backends import available
 from gauss.bench.fuzz.examine import COUNTS, TYPICAL, WORST, examine, lost, together
 from gauss.bench.fuzz.problems import KINDS
-from gauss.bench.measure import AUTO, OURS
+from gauss.bench.levels import AUTO, OURS
 from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.qp import PACKAGES
 from gauss.bench.table import ResultTable

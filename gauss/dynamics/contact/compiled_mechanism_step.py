@@ -80,6 +80,7 @@ class CompiledStepMemory:
 
     def connect(self):
         """Take all addresses anew: a new motion may run in another tier."""
+        self.version = self.detection.version
         kernels, detection = self.stepper.kernels, self.detection
         names = "body", "pair", "kind", "feature", "found", "count", "own", "signs", "deepest", "moved", "rows", "depth"
         arrays = {**self.integers, **{name: getattr(detection, name) for name in names}}
@@ -91,6 +92,8 @@ class CompiledStepMemory:
 
     def step(self, state, settings: dict[str, float]) -> int:
         """Status of a step; its results are in the working memory."""
+        if self.version != self.detection.version:
+            self.connect()
         at = self.at
         at["q"][:], at["v"][:] = state.q, state.v
         at["settings"][:] = [settings[name] for name in STEP_SETTINGS]

@@ -277,8 +277,6 @@ class MechanismStepper:
         power = begun.power + np.array([work[~lossy].sum(), 0.0, -work[lossy].sum()])
         contacts, others = self._split(rows, near, force * rows.unit)
         self._keep(near, contacts, others)
-        if self.memory is not None:
-            self.memory.connect()
         paradoxes = self._paradoxes(state, rows, begun, near, force)
         return MechanismStep(q, v, near, contacts, others, power, error, paradoxes)
 

@@ -32,6 +32,7 @@ class NearDetection:
 
     def __init__(self, table: ShapeTable, bodies: int, length: float):
         self.table, self.length, self.code = table, length, near_pairs()
+        self.version = 0  # changes with the addresses of the arrays
         n = len(table.parts)
         first, second = np.nonzero(np.triu(table.law))
         self.pairs = first, second
@@ -70,6 +71,7 @@ class NearDetection:
         self._take_addresses()
 
     def _take_addresses(self):
+        self.version += 1
         integers = self.body, self.pair, self.kind, self.feature, self.found, self.count
         numbers = self.bodies, self.own, self.signs, self.deepest, self.settings, self.moved, self.rows, self.depth
         self.addresses = [array.ctypes.data for array in (*integers, *numbers)]

@@ -15,7 +15,7 @@ from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_l
 from gauss.integrators import Point
 from gauss.scene.values import as_function
 from gauss.system import BoundLoad, Relations, State, System
-from gauss.system.contact_gaps import of_shapes
+from gauss.system.contact_gaps import has_own_gaps
 
 LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements that may be laws
 
@@ -73,7 +73,7 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     if laws.motion is not None and laws.outputs:
         times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
     prescribed = prescribed_times(system.relations, begin, end, monotone)
-    timed = (system.set_valued,) if of_shapes(system.scene) else (system.contacts, system.set_valued)
+    timed = (system.contacts, system.set_valued) if has_own_gaps(system.scene) else (system.set_valued,)
     unilateral = [prescribed_times(found, begin, end, monotone) for found in timed]
     times = times.join(prescribed, *unilateral)
     last = prescribed.last_end(begin, end)

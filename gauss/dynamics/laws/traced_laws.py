@@ -1,5 +1,8 @@
 """Laws of loads in compiled dynamics: traced laws become machine code, opaque ones are Python callbacks."""
 
+from dataclasses import replace
+from hashlib import sha256
+
 import numpy as np
 
 from gauss.codegen import Expression, Function, Graph, branches, substitute
@@ -7,11 +10,12 @@ from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.store import cached
 from gauss.scene.stateful_laws import preserved
 from gauss.scene.values import arguments, as_function, is_scalar
-from gauss.system import BoundLoad, State, System, coordinate_units
+from gauss.system import BoundLoad, State, System, retract
 
 PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # times of comparison, in the time of the scene
 AGREEMENT = 1e-6  # relative: traced functions may have other round-off
-CANCELLATION = 1e-12  # of a law, relative to its value in a generic state: where terms cancel, as at rest, round-off is left
+PROBE_ROUNDOFF = 1e-12  # of the values at all probes, relative to the largest: poses at the end of a chain sum up round-off
+ASIDE = 0.3  # distance of another state from the reference, in units of the coordinates
 UNTRACEABLE = ("TypeError: ", "TracerError: ")
 FIELDS = ("effort", "force", "moment")  # fields of loads that hold laws
 
@@ -55,7 +59,7 @@ class Laws:
             functions = [function for function in found if isinstance(function, Function)]
             if len(functions) == len(found):
                 self.traced.append(bound)
-                self.key += "".join(f"load {number}: {function.text()}; " for function in functions)
+                self.key += "".join(f"load {number}: {_digest(system, function)}; " for function in functions)
                 self.functions += [(bound.load.name, function) for function in functions]
             else:
                 self.called.append(bound)
@@ -122,40 +126,46 @@ def _confirmed(law, traced: Function | str, motion: Kinematics) -> Function | st
     if isinstance(traced, str):
         return traced
     system, make = motion.system, lambda: _agrees(law, traced, motion)
-    same = cached(system, (_agrees, traced.text()), make)
+    same = cached(system, (_agrees, _digest(system, traced)), make)
     return traced if same else "called with numbers it gives others than those that were traced"
 
 
+def _digest(system: System, traced: Function) -> str:
+    """Digest of the operations of a traced law: laws are traced for every motion, but their nodes are those of one graph."""
+    ends = tuple(x.index if isinstance(x, Expression) else repr(float(x)) for x in traced.outputs)
+    return cached(system, (_digest, ends), lambda: sha256(traced.text().encode()).hexdigest())
+
+
 def _agrees(law, traced: Function, motion: Kinematics) -> bool:
-    """Whether a law and its trace agree at the probe times; times at which the law fails do not count."""
-    system, state = motion.system, motion.system.reference
-    symbols = [motion.state.t, *motion.state.q, *motion.state.v]
-    rounding = CANCELLATION * _generic_size(traced, motion)
-    for t in PROBES * system.scale.time:
+    """Whether a law and its trace agree at the probe times; times at which the law fails do not count.
+
+    A law of poses is also compared at another state: where it vanishes at the reference, only round-off could be compared.
+    """
+    system, pairs = motion.system, []
+    states = [replace(system.reference, t=float(t)) for t in PROBES * system.scale.time]
+    if arguments(law) > 1:
+        step = ASIDE * system.scale.coordinates * np.random.default_rng(0).uniform(-1.0, 1.0, system.n_v)
+        q, v = retract(system, system.reference.q, step), step / system.scale.time
+        states.append(replace(states[1], q=q, v=v))
+    for state in states:
         try:
-            with preserved(law):
-                here = kinematics(system, State(float(t), state.q, state.v)) if arguments(law) > 1 else None
-                called = np.ravel(np.asarray(as_function(law)(float(t), here), dtype=float))
-            folded = substitute(traced.outputs, symbols, [float(t), *state.q, *state.v])
-            found = np.array([one.value if isinstance(one, Expression) else one for one in folded], dtype=float)
+            pairs.append(_values(law, traced, motion, state))
         except Exception:  # the motion reports failures
             continue
-        size = max(np.abs(called).max(initial=0.0), np.abs(found).max(initial=0.0))
-        if np.shape(called) != np.shape(found) or (np.abs(called - found) > AGREEMENT * size + rounding).any():
-            return False
-    return True
+    if any(np.shape(called) != np.shape(found) for called, found in pairs):
+        return False
+    sizes = [max(np.abs(called).max(initial=0.0), np.abs(found).max(initial=0.0)) for called, found in pairs]
+    floor = PROBE_ROUNDOFF * max(filter(np.isfinite, sizes), default=0.0)
+    return not any(
+        (np.abs(called - found) > AGREEMENT * size + floor).any() for (called, found), size in zip(pairs, sizes, strict=True)
+    )
 
 
-def _generic_size(traced: Function, motion: Kinematics) -> float:
-    """Largest finite value of a traced law in a state away from the reference by the scale of the scene; 0 without one."""
-    system, state = motion.system, motion.system.reference
-    rng = np.random.default_rng(0)
-    units = np.array([system.scale.length if unit == "m" else 1.0 for unit in coordinate_units(system).values()])
-    q = state.q + units * rng.uniform(0.3, 1.0, system.n_q)
-    given = [system.scale.time, *q, *(system.scale.rates * rng.uniform(0.3, 1.0, system.n_v))]
-    try:
-        folded = substitute(traced.outputs, [motion.state.t, *motion.state.q, *motion.state.v], given)
-        values = np.abs([float(one.value) if isinstance(one, Expression) else float(one) for one in folded])
-    except (ArithmeticError, ValueError, TypeError):
-        return 0.0
-    return float(np.max(values, where=np.isfinite(values), initial=0.0))
+def _values(law, traced: Function, motion: Kinematics, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Values of a law at a state, and those of its trace."""
+    with preserved(law):
+        here = kinematics(motion.system, state) if arguments(law) > 1 else None
+        called = np.ravel(np.asarray(as_function(law)(state.t, here), dtype=float))
+    symbols = [motion.state.t, *motion.state.q, *motion.state.v]
+    folded = substitute(traced.outputs, symbols, [state.t, *state.q, *state.v])
+    return called, np.array([one.value if isinstance(one, Expression) else one for one in folded], dtype=float)

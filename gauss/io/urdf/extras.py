@@ -34,7 +34,8 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
         Whether ``<dynamics>`` is read: damping as a damper [N m s/rad, N s/m], friction as a joint that sticks and slips.
     collisions : bool
         Whether spheres, boxes and capsules of ``<collision>`` become shapes, named LINK or LINK.2 …; contacts are added with
-        ``scene.contact``. Cylinders and meshes are not modelled.
+        ``scene.contacts_all``, of all shapes but those of neighbours, or with ``scene.contact``. Cylinders and meshes are
+        not modelled.
 
     Raises
     ------

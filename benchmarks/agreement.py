@@ -1,0 +1,40 @@
+"""How well two judges agree on who solves what: equal verdicts, and Kendall's τ of the rankings by share solved.
+
+M. Kendall, *A new measure of rank correlation*, Biometrika 30, 1938; ties as in τ-b.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import kendalltau
+
+
+class Agreement(NamedTuple):
+    """Agreement of verdicts.
+
+    Parameters
+    ----------
+    same, count : int
+        Equal verdicts, and all.
+    tau : float
+        Kendall's τ of the solvers by share of problems solved; nan of a single solver.
+    shares : dict
+        Shares solved by both judges, by solver.
+    """
+
+    same: int
+    count: int
+    tau: float
+    shares: Mapping[str, tuple[float, float]]
+
+
+def agreement(verdicts: Iterable[tuple[str, bool, bool]]) -> Agreement:
+    """Agreement of verdicts (solver, solved by one judge, solved by the other)."""
+    by_solver: dict[str, list[tuple[bool, bool]]] = {}
+    for solver, one, other in verdicts:
+        by_solver.setdefault(solver, []).append((one, other))
+    shares = {solver: tuple(map(float, np.mean(pairs, axis=0))) for solver, pairs in by_solver.items()}
+    every = [pair for pairs in by_solver.values() for pair in pairs]
+    tau = float(kendalltau(*zip(*shares.values(), strict=True)).statistic) if len(shares) > 1 else float("nan")
+    return Agreement(sum(one == other for one, other in every), len(every), tau, shares)

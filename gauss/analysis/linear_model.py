@@ -1,0 +1,294 @@
+"""Linear model of a system about a state: δẋ = A δx + B δu, δy = C δx + D δu in independent coordinates and rates.
+
+With the tangents of :mod:`gauss.analysis.tangents` and the derivatives of the accelerations of
+:mod:`gauss.analysis.derivatives`, no constraint is approximated: a loop with any redundant rows has as many states as it has
+freedoms, twice. LinearModes are eigenvectors of A (Schiehlen and Eberhard, Applied Dynamics, 2014, ch. 7).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gauss.analysis.derivatives import derivatives
+from gauss.analysis.tangents import Tangents
+from gauss.arguments import named_arguments
+from gauss.codegen import Kernel, forward, write
+from gauss.dynamics import compile_scene
+from gauss.dynamics.inputs import InputForces
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.outputs import FORCES, measured
+from gauss.dynamics.projection import fixed_columns
+from gauss.errors import ArgumentError, MissingPackageError, SimulationError, StateError, did_you_mean, require
+from gauss.scene import Scene
+from gauss.system import State, System, coordinate_rates
+
+STEADY = 1e-8  # share of the accelerations that forces could cause, below which a state is an equilibrium
+MARGINAL = 1e-7  # real parts below this share of the largest eigenvalue count as zero: round-off of double eigenvalues is √ε
+
+
+@dataclass(frozen=True)
+class LinearModes:
+    """Eigenmodes of a linear model, slowest first; one of each pair of conjugate ones.
+
+    Parameters
+    ----------
+    eigenvalues : ndarray of complex, shape (m,)
+        Eigenvalues [1/s].
+    shapes : ndarray of complex, shape (m, n_v)
+        Displacements along all rates of the system, the largest in its unit being 1.
+    coordinates : tuple of str
+        Names of the displacements.
+    """
+
+    eigenvalues: np.ndarray
+    shapes: np.ndarray
+    coordinates: tuple[str, ...]
+
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Frequencies of the oscillations [Hz], 0 where none is."""
+        return np.abs(self.eigenvalues.imag) / (2.0 * np.pi)
+
+    @property
+    def damping(self) -> np.ndarray:
+        """Damping ratios −Re λ / |λ|; NaN where λ = 0."""
+        with np.errstate(invalid="ignore"):
+            return -self.eigenvalues.real / np.abs(self.eigenvalues)
+
+    def __str__(self):
+        lines = [f"{'Hz':>12}{'damping':>12}  moves most"]
+        for frequency, damping, shape in zip(self.frequencies, self.damping, self.shapes, strict=True):
+            largest = [self.coordinates[k] for k in np.argsort(-np.abs(shape))[:3] if abs(shape[k]) > 0.1]
+            lines.append(f"{frequency:12.6g}{damping:12.4g}  {', '.join(largest)}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """Linear model of a system about a state.
+
+    Parameters
+    ----------
+    A, B, C, D : ndarray, shape (n, n), (n, m), (p, n), (p, m)
+        δẋ = A δx + B δu, δy = C δx + D δu.
+    states, inputs, outputs : tuple of str
+        Names of x, u and y; rates of a coordinate have the name of the coordinate with " rate".
+    system : System
+        The system.
+    state : State
+        The state about which it is.
+    displacements : ndarray, shape (n_v, k)
+        Displacements of all coordinates for those of the independent ones, the first k states.
+    is_equilibrium : bool
+        Whether the system rests or moves uniformly in this state: rates and accelerations do not change the coordinates and
+        rates that the model depends on.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    system: System
+    state: State
+    displacements: np.ndarray
+    is_equilibrium: bool
+
+    @cached_property
+    def eigenvalues(self) -> np.ndarray:
+        """Eigenvalues of A [1/s]."""
+        return np.linalg.eigvals(self.A)
+
+    @property
+    def stability(self) -> str:
+        """Whether it is "stable", "marginal" or "unstable", by the largest real part of the eigenvalues."""
+        found = self.eigenvalues
+        size = np.abs(found).max(initial=0.0)
+        largest = found.real.max(initial=-np.inf)
+        return "marginal" if abs(largest) <= MARGINAL * size else "stable" if largest < 0.0 else "unstable"
+
+    def modes(self) -> LinearModes:
+        """Eigenmodes."""
+        found, vectors = np.linalg.eig(self.A)
+        order = [k for k in np.argsort(np.abs(found), kind="stable") if found[k].imag >= 0.0]
+        shapes = (self.displacements @ vectors[: self.displacements.shape[1]]).T[order]
+        shares = shapes / self.system.scale.coordinates
+        peaks = shares[np.arange(len(shares)), np.abs(shares).argmax(axis=1)] if shares.size else np.ones(len(shares))
+        scaled = shapes / np.where(peaks == 0.0, 1.0, peaks)[:, None]
+        return LinearModes(found[order], scaled, tuple(self.system.coordinates))
+
+    def state_space(self):
+        """The model as a ``control.StateSpace`` of python-control, with the names.
+
+        Raises
+        ------
+        MissingPackageError
+            If python-control is not installed.
+        """
+        try:
+            import control
+        except ImportError:
+            raise MissingPackageError(
+                "state_space needs python-control, which is not installed: pip install control"
+            ) from None
+        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        return control.ss(self.A, self.B, self.C, self.D, **names)
+
+
+@named_arguments
+def linearise(
+    system: System | Scene, state: State | None = None, *, inputs=None, outputs=None, independent=None, load=None
+) -> LinearModel:
+    """Linear model about a state that meets the constraints, exact for loops and for rolling.
+
+    Parameters
+    ----------
+    system : System or Scene
+        The system.
+    state : State, optional
+        State about which it is; the start of the scene at rest when not given.
+    inputs : sequence of str, optional
+        Inputs of the scene, or coordinates along which generalised forces act [N m, N]; all inputs of the scene when not
+        given.
+    outputs : sequence of str, optional
+        Outputs of the scene, or coordinates, or their rates as in "pin rate"; when not given, all outputs of the scene, or
+        all independent coordinates where it has none.
+    independent : sequence of str, optional
+        Joints or rates to describe the system with, one for each freedom; well-conditioned ones when not given.
+    load : array_like, shape (n_v,), optional
+        Generalised forces added to those of the scene [N m, N].
+
+    Returns
+    -------
+    LinearModel
+        Matrices and names.
+
+    Raises
+    ------
+    StateError
+        If a name is none of the scene, or the independent coordinates do not determine the others.
+    SimulationError
+        If the system cannot be compiled, or its accelerations have no derivatives in this state.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> model = gauss.linearise(gauss.load("pendulum"))
+    >>> model.states
+    ('pin', 'pin rate')
+    """
+    require(system, (System, Scene), "linearise")
+    system = compile_scene(system) if isinstance(system, Scene) else system
+    if state is None:
+        start = system.initial_state()
+        state = system.initial_state(start.q, np.zeros(system.n_v))
+    require(state, (State,), "linearise: state")
+    slopes, tangents = derivatives(system, state, load), Tangents(system, state)
+    N, rate = tangents.position, tangents.rate
+    if independent is not None:
+        N, rate = (_described_by(system, basis, independent) for basis in (N, rate))
+        tangents.__dict__.update(position=N, rate=rate)
+    k, D, free = N.shape[1], tangents.change, tangents.independent_rates
+    places = tangents.independent_coordinates
+    moving = D + tangents.turning @ N
+    by_q, by_v = slopes.q @ N + slopes.v @ D, slopes.v @ rate
+    A = np.block([[moving[places], rate[places]], [by_q[free], by_v[free]]])
+    names = system.coordinates
+    forces, input_names = _input_columns(system, state, inputs)
+    response = slopes.load @ forces
+    B = np.concatenate([np.zeros((k, forces.shape[1])), response[free]])
+    rows, direct, output_names = _output_rows(system, state, outputs, places, load)
+    along_q = np.concatenate([N, np.zeros((system.n_v, rate.shape[1]))], axis=1)
+    along = np.concatenate([along_q, np.concatenate([D, rate], axis=1), np.concatenate([by_q, by_v], axis=1)])
+    states = (*(names[p] for p in places), *(f"{names[p]} rate" for p in free))
+    own, unit = system.accelerations(state, load), system.scale.rates / system.scale.time
+    is_equilibrium = bool(
+        (np.abs(own) <= STEADY * unit).all() and (np.abs(state.v[places]) <= STEADY * system.scale.rates[places]).all()
+    )
+    return LinearModel(
+        A, B, rows @ along, direct @ response, states, input_names, output_names, system, state, N, is_equilibrium
+    )
+
+
+def _described_by(system: System, N: np.ndarray, independent) -> np.ndarray:
+    """The same tangent in other independent coordinates."""
+    chosen = fixed_columns(system, (independent,) if isinstance(independent, str) else independent)
+    square = N[chosen]
+    if len(chosen) != N.shape[1] or np.linalg.cond(square) > 1e8:
+        raise StateError(f"independent: expected {N.shape[1]} coordinates that determine the others, got {independent!r}.")
+    found = np.linalg.solve(square.T, N.T).T
+    found[chosen] = np.eye(len(chosen))
+    return found
+
+
+def _input_columns(system: System, state: State, inputs) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Generalised forces (n_v, m) for each input of 1, and their names."""
+    known = tuple(system.scene.inputs)
+    names = known if inputs is None else (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    columns = []
+    for name in names:
+        if name in known:
+            columns.append(_input_slope(system, state, known.index(name)))
+        else:
+            columns.append(np.eye(system.n_v)[_column(system, name, "inputs", known)])
+    return np.array(columns).reshape(len(names), system.n_v).T, names
+
+
+def _input_slope(system: System, state: State, place: int) -> np.ndarray:
+    """∂Q/∂u of an input, at u = 0."""
+    inputs = InputForces(system)
+    unit = np.eye(len(inputs.low))[place]
+    if inputs.is_plain:
+        return unit @ np.eye(system.n_v)[inputs.columns]
+    slope = write(lambda u: forward(inputs.forces(u, state), u, unit), unit.size, name="input")
+    return Kernel(slope, batch=False)(np.zeros(unit.size))
+
+
+def _output_rows(system: System, state: State, outputs, places, load):
+    """∂y/∂(ξ, v, q̈) (p, 3 n_v), its part of q̈, and the names."""
+    known, n = system.scene.outputs, system.n_v
+    names = outputs if outputs is not None else (tuple(known) or tuple(system.coordinates[p] for p in places))
+    names = (names,) if isinstance(names, str) else tuple(names)
+    own = system.accelerations(state, load)
+    rows, labels = [], []
+    for name in names:
+        if name in known:
+            found = _slopes_of(system, state, own, known[name])
+            labels += [name] if len(found) == 1 else [f"{name}[{i}]" for i in range(len(found))]
+            rows.append(found)
+            continue
+        coordinate, is_rate = (name.removesuffix(" rate"), name.endswith(" rate"))
+        column = _column(system, coordinate, "outputs", (*known, *(f"{one} rate" for one in system.coordinates)))
+        rows.append(np.eye(3 * n)[[column + n * is_rate]])
+        labels.append(name)
+    whole = np.concatenate(rows) if rows else np.zeros((0, 3 * n))
+    return whole, whole[:, 2 * n :], tuple(labels)
+
+
+def _slopes_of(system: System, state: State, own: np.ndarray, output) -> np.ndarray:
+    """∂y/∂(ξ, v, q̈) (p, 3 n_v) of an output of the scene."""
+    if output.kind in FORCES:
+        raise SimulationError(f"output {output.name!r}: forces are no outputs of a linear model; measure motions.")
+    n = system.n_v
+
+    def slopes(t, q, v, acceleration, along_q, along_v, along_a):
+        found = np.ravel(measured(output, kinematics(system, State(t[0], q, v)), acceleration))
+        direction = np.concatenate([coordinate_rates(system, q, along_q), along_v, along_a])
+        return forward(found, np.concatenate([q, v, acceleration]), direction)
+
+    kernel = Kernel(write(slopes, 1, system.n_q, n, n, n, n, n, name="output"), batch=False)
+    given = np.concatenate([[state.t], state.q, state.v, own])
+    return kernel(np.concatenate([np.tile(given[:, None], 3 * n), np.eye(3 * n)]))
+
+
+def _column(system: System, name: Any, what: str, others) -> int:
+    """Place of a coordinate in v."""
+    if not isinstance(name, str):
+        raise ArgumentError(f"{what}: expected names, got {name!r}.")
+    if name not in system.coordinates:
+        raise StateError(f"{what}: nothing is called {name!r}. {did_you_mean(name, [*others, *system.coordinates])}")
+    return list(system.coordinates).index(name)

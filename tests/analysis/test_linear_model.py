@@ -1,0 +1,171 @@
+"""Linear models and equilibria: against differences on the constraint manifold, closed forms, and motions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_continuous_are
+
+import gauss
+from gauss.dynamics.projection import project_positions, project_rates
+from gauss.errors import SimulationError, StateError
+from gauss.system import retract
+from models import families
+from tests.support import mechanisms
+
+STEP = 1e-5  # of central differences, in units of the scene
+DIFFERENCES = 1e-6  # relative to the largest entry of A: truncation h² and round-off ε / h
+EXACT = 1e-9  # closed forms
+SCENES = {
+    "open": lambda: gauss.load("double_pendulum"),
+    "damped": lambda: gauss.load("cart_pole"),
+    "loop": lambda: gauss.load("four_bar"),
+    "slider": lambda: gauss.load("slider_crank"),
+    "redundant": lambda: gauss.load("bricard"),
+    "coupled": lambda: gauss.load("gear_pair"),
+    "springs": lambda: families.stewart_platform(),
+    "governor": lambda: families.flyball_governor(),
+}
+
+
+def _on_manifold(system, state, N, dy, dw, places, free):
+    """State with the given changes of the independent coordinates and rates."""
+    q = retract(system, state.q, N @ dy)
+    moved = project_positions(system, replace(state, q=q), 40, tuple(places))
+    v = state.v.copy()
+    v[free] += dw
+    return project_rates(system, replace(moved, v=v), tuple(free))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_matrices_are_the_slopes_of_the_motion(name):
+    system = gauss.compile_scene(SCENES[name]())
+    rng = np.random.default_rng(1)
+    start = system.initial_state()
+    state = system.initial_state(start.q, start.v + 0.3 * system.scale.rates * rng.normal(size=system.n_v))
+    # rates of a ball joint are no rates of coordinates: the legs describe the platform
+    legs = [f"leg{k}" for k in range(1, 7)] if name == "springs" else None
+    model = gauss.linearise(system, state, independent=legs)
+    k = model.displacements.shape[1]
+    names = list(system.coordinates)
+    places = [names.index(one) for one in model.states[:k]]
+    free = [names.index(one.removesuffix(" rate")) for one in model.states[k:]]
+    units = np.concatenate([system.scale.coordinates[places], system.scale.rates[free]])
+    found = np.empty((k + len(free),) * 2)
+    for j, unit in enumerate(units):
+        change, slopes = np.zeros(len(units)), []
+        for sign in (1.0, -1.0):
+            change[j] = sign * STEP * unit
+            there = _on_manifold(system, state, model.displacements, change[:k], change[k:], places, free)
+            slopes.append(np.concatenate([there.v[places], system.accelerations(there)[free]]))
+        found[:, j] = (slopes[0] - slopes[1]) / (2.0 * STEP * unit)
+    assert np.abs(model.A - found).max() <= DIFFERENCES * np.abs(model.A).max()
+
+
+def test_a_pendulum_has_its_frequency():
+    scene = gauss.load("pendulum")
+    rest = gauss.equilibrium(scene)
+    modes = rest.model.modes()
+    system = rest.model.system
+    M = system.mass_matrix(rest.state.q)[0, 0]
+    slope = system.gravity_forces(rest.state.q + 1e-6) - system.gravity_forces(rest.state.q - 1e-6)
+    assert modes.frequencies == pytest.approx([np.sqrt(slope[0] / 2e-6 / M) / (2.0 * np.pi)], rel=1e-8)
+    assert rest.stability == "marginal" and "A" in str(modes)
+
+
+@pytest.mark.parametrize("axis, is_stable", [(0, True), (1, False), (2, True)])
+def test_a_free_body_turns_stably_about_its_extreme_axes(axis, is_stable):
+    """λ² = ω² (I₁ − I₂)(I₃ − I₁) / (I₂ I₃) about axis 1 (Euler)."""
+    inertia, speed = np.array([1.0, 2.0, 2.5]), 2.0
+    scene = gauss.Scene("body", gravity=(0.0, 0.0, 0.0))
+    scene.body("body", mass=1.0, inertia=tuple(inertia))
+    scene.free("flight", "ground", "body")
+    system = gauss.compile_scene(scene)
+    start = system.initial_state()
+    v = np.zeros(6)
+    v[[name in (f"flight.w{'xyz'[axis]}",) for name in system.coordinates]] = speed
+    model = gauss.linearise(system, replace(start, v=v))
+    one, two, three = inertia[[axis, (axis + 1) % 3, (axis + 2) % 3]]
+    square = speed**2 * (one - two) * (three - one) / (two * three)
+    assert np.abs(model.eigenvalues**2 - square).min() <= EXACT * abs(square)
+    assert (square < 0.0) == is_stable
+    assert (model.eigenvalues.real.max() > 0.1) == (not is_stable)
+
+
+def test_freedoms_of_a_loop_with_redundant_rows_are_counted_once():
+    model = gauss.linearise(gauss.load("bricard"))
+    assert model.A.shape == (2, 2)
+
+
+def test_rolling_binds_rates_alone():
+    model = gauss.linearise(gauss.load("rolling_disk"))
+    assert len([one for one in model.states if one.endswith(" rate")]) == 3 and len(model.states) == 8
+
+
+def test_a_pole_is_balanced_by_the_regulator_of_its_linear_model():
+    scene = gauss.load("cart_pole")
+    scene.input("push", "rail")
+    scene.output("lean", "coordinate", "pin")
+    upright = max(gauss.equilibria(scene), key=lambda one: one.energy)
+    assert upright.stability == "unstable"
+    model = gauss.linearise(scene, upright.state)
+    assert model.inputs == ("push",) and model.outputs == ("lean",) and model.D == pytest.approx(0.0)
+    gains = model.B.T @ solve_continuous_are(model.A, model.B, np.eye(4), np.eye(1))
+    order = [list(model.system.coordinates).index(name.removesuffix(" rate")) for name in model.states]
+    k = len(order) // 2
+    at = upright.state.q[order[:k]]
+    law = lambda t, q, v: -gains[0] @ np.concatenate([q[order[:k]] - at, v[order[k:]]])  # noqa: E731
+    q = upright.state.q + [0.0, 0.2]
+    motion = gauss.simulate(scene, 12.0, state=model.system.initial_state(q, np.zeros(2)), control=law, rate=200, rtol=1e-8)
+    assert np.abs(motion.q[-1] - upright.state.q).max() <= 1e-2
+
+
+def test_a_regulated_arm_has_the_forces_that_hold_it():
+    system = gauss.compile_scene(gauss.load("double_pendulum"))
+    kept = gauss.equilibrium(system, keep=["A"])
+    load = np.array([kept.forces["A"], 0.0])
+    assert np.abs(system.inverse_dynamics(kept.state.q, np.zeros(2), np.zeros(2)) - load).max() <= 1e-9
+    assert kept.state.q[0] == system.initial_state().q[0]
+
+
+def test_equilibria_of_a_linkage_are_the_extremes_of_its_energy():
+    found = gauss.equilibria(gauss.load("four_bar"), starts=16)
+    assert len(found) == 4 and found[0].stability == "marginal" and found[-1].stability == "unstable"
+    assert sorted(one.energy for one in found) == [one.energy for one in found]
+    assert [one.energy for one in found] == pytest.approx([-25.42069, -0.40837, 0.40837, 25.42069], abs=1e-5)
+
+
+def test_outputs_are_slopes_of_what_is_measured():
+    scene = gauss.load("cart_pole")
+    scene.output("felt", "accelerometer", "pole", at=(0.0, 0.0, 0.6))
+    system = gauss.compile_scene(scene)
+    model = gauss.linearise(system, inputs=["rail"], outputs=["felt", "rail", "pin rate"], independent=["rail", "pin"])
+    assert model.outputs == ("felt[0]", "felt[1]", "felt[2]", "rail", "pin rate")
+    assert model.C[3:] == pytest.approx(np.eye(4)[[0, 3]]) and np.abs(model.D[:3]).max() > 0.0
+    response = gauss.linearise(system, inputs=["rail"], outputs=["rail"], independent=["rail", "pin"]).B[2:]
+    assert model.B[2:] == pytest.approx(response)
+
+
+@pytest.mark.parametrize(
+    "call, error, words",
+    [
+        (lambda s: gauss.linearise(s, inputs=["rial"]), StateError, "rail"),
+        (lambda s: gauss.linearise(s, outputs=["pin rates"]), StateError, "pin rate"),
+        (lambda s: gauss.linearise(s, independent=["rail"]), StateError, "2 coordinates"),
+        (lambda s: gauss.equilibrium(s, keep=["nothing"]), StateError, "nothing"),
+        (lambda s: gauss.equilibrium(s, loads={"rial": 1.0}), StateError, "rail"),
+        (lambda s: gauss.equilibrium(s, loads={"rail": 1.0}), SimulationError, "'rail' still accelerates"),
+        (lambda s: gauss.linearise("cart_pole"), gauss.GaussError, "Scene"),
+    ],
+)
+def test_what_cannot_be_linearised_is_named(call, error, words):
+    with pytest.raises(error, match=words):
+        call(gauss.compile_scene(gauss.load("cart_pole")))
+
+
+def test_a_state_space_of_python_control_has_the_names():
+    control = pytest.importorskip("control")
+    model = gauss.linearise(mechanisms.rods(1))
+    assert isinstance(model.state_space(), control.StateSpace)
+    assert model.state_space().state_labels == list(model.states)
