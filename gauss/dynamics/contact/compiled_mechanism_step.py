@@ -6,15 +6,13 @@ import numpy as np
 
 from gauss.codegen import from_disk, write
 from gauss.codegen.kernels import CompiledMechanismStep, StepFunctions
-from gauss.codegen.kernels.mechanism_step import ADDRESSES, FINISHED, RESULTS, SIZES, STEP_SETTINGS, TERMS, slots
+from gauss.codegen.kernels.mechanism_step import ADDRESSES, SIZES, STEP_SETTINGS, TERMS, slots
 from gauss.dynamics.contact.contact_step import contact_solver
 from gauss.dynamics.contact.free_bodies import place_function
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms
 from gauss.dynamics.contact.moreau_step import is_impact, least_rate
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.dynamics.contact.shape_table import MOST_FEATURES
-
-STATE = "q", "v", "end_q", "end_v"
 
 
 class CompiledStepMemory:
@@ -101,11 +99,6 @@ class CompiledStepMemory:
         return int(self.integers["status"][0])
 
     @property
-    def results(self) -> dict[str, float]:
-        """Power, error and whether contacts slide."""
-        return dict(zip(RESULTS, self.at["results"].tolist(), strict=True))
-
-    @property
     def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Forces of the last step: keys of its contacts in order, forces (m, 3) of these, and of other constraints."""
         m = int(self.integers["known_count"][0])
@@ -123,11 +116,6 @@ class CompiledStepMemory:
         self.integers["known_found"][:m, 1] = feature
         self.integers["known_count"][0] = m
         self.at["known"][: 3 * m], self.at["known_others"][:] = force[:m].ravel(), others
-
-
-def is_finished(status: int) -> bool:
-    """Whether the compiled step is whole."""
-    return status == FINISHED
 
 
 @cache
