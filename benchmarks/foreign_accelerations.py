@@ -120,7 +120,10 @@ def _accelerations(model, data) -> np.ndarray:
 
 def _rows(model, data) -> np.ndarray:
     rows = np.array(data.efc_type) == EQUALITY
-    return np.array(data.efc_J).reshape(-1, model.nv)[rows]
+    J = np.array(data.efc_J).reshape(-1, model.nv)
+    if len(J) != len(rows):
+        raise NotCompared("the Jacobian is sparse")
+    return J[rows]
 
 
 def _takes_data() -> bool:

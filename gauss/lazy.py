@@ -28,6 +28,10 @@ class LazyPackage(ModuleType):
             value = getattr(value, name, value)
         super().__setattr__(name, value)
 
+    def __reduce__(self) -> tuple:
+        """Import it: a function that is sent to another process with its globals names the package."""
+        return import_module, (self.__name__,)
+
 
 def attach(package: str, file: str) -> tuple[list[str], Callable, Callable]:
     """Values of ``__all__``, ``__getattr__`` and ``__dir__`` of a package, from the stub beside its ``__init__.py``.

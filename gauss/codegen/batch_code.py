@@ -5,6 +5,7 @@ register holds, and its results are transposed back. The last vector repeats the
 """
 
 import ctypes
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -130,27 +131,53 @@ class _BatchWriter:
         return [self.b.gep(data, [self.b.mul(row, stride)]) for row in rows]
 
     def _gather(self, rows, stride, size: int, target, place: int):
-        """Entries of the rows, to vectors of lanes."""
+        """Entries of the rows, to vectors of lanes: blocks of contiguous ones are transposed in registers."""
+        b = self.b
+        if self.width == 1 or size < self.width:
+            self._gather_entries(rows, stride, size, target, place)
+            return
+        with b.if_else(b.icmp_signed("==", stride, INTEGER(1))) as (contiguous, strided):
+            with contiguous:
+                for k in self._blocks(size):
+                    block = self._transposed([self._load(row, k) for row in rows])
+                    for i, vector in enumerate(block):
+                        self._store(vector, target, self._offset(b.add(k, INTEGER(i)), place))
+            with strided:
+                self._gather_entries(rows, stride, size, target, place)
+
+    def _gather_entries(self, rows, stride, size: int, target, place: int):
+        """Entries of the rows, one after the other, to vectors of lanes."""
         b = self.b
         with counted_loop(b, INTEGER(0), INTEGER(size)) as k:
             offset = b.mul(k, stride)
             values = [b.load(b.gep(row, [offset])) for row in rows]
-            self._store(self._vector(values), target, b.mul(b.add(k, INTEGER(place)), INTEGER(self.width)))
+            self._store(self._vector(values), target, self._offset(k, place))
 
     def _scatter(self, rows, size: int, source, place: int):
-        """Vectors of lanes, to entries of the rows: whole blocks are transposed in registers."""
+        """Vectors of lanes, to entries of the rows: blocks are transposed in registers."""
         b, width = self.b, self.width
-        whole = size - size % width
-        offset = lambda k: b.mul(b.add(k, INTEGER(place)), INTEGER(width))  # noqa: E731
-        if whole and width > 1:
-            with counted_loop(b, INTEGER(0), INTEGER(whole), width) as k:
-                block = [self._load(source, offset(b.add(k, INTEGER(i)))) for i in range(width)]
+        if 1 < width <= size:
+            for k in self._blocks(size):
+                block = [self._load(source, self._offset(b.add(k, INTEGER(i)), place)) for i in range(width)]
                 for row, vector in zip(rows, self._transposed(block), strict=True):
                     self._store(vector, row, k)
-        with counted_loop(b, INTEGER(whole if width > 1 else 0), INTEGER(size)) as k:
-            vector = self._load(source, offset(k))
+            return
+        with counted_loop(b, INTEGER(0), INTEGER(size)) as k:
+            vector = self._load(source, self._offset(k, place))
             for lane, row in enumerate(rows):
                 b.store(vector if width == 1 else b.extract_element(vector, LANE(lane)), b.gep(row, [k]))
+
+    def _blocks(self, size: int) -> Iterator:
+        """First entries of blocks that cover ``size`` entries, in a loop; the last block overlaps the one before."""
+        width = self.width
+        with counted_loop(self.b, INTEGER(0), INTEGER(size - size % width), width) as k:
+            yield k
+        if size % width:
+            yield INTEGER(size - width)
+
+    def _offset(self, k, place: int):
+        """Place of the lanes of an entry in a buffer."""
+        return self.b.mul(self.b.add(k, INTEGER(place)), INTEGER(self.width))
 
     def _transposed(self, block: list) -> list:
         """Transpose a square block: in step s entries whose places differ in bit s change sides."""

@@ -20,7 +20,6 @@ from llvmlite import ir
 from gauss.codegen import cpython_layout, machine
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
-from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.lanes import DOUBLE, INTEGER
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface, PythonWrapper, Shape
@@ -33,11 +32,11 @@ class _CtypesCall:
     """Machine code called through ctypes."""
 
     def __init__(self, code: machine.MachineCode, outputs: int):
-        self.outputs, self.run = outputs, code.entry("run", SIGNATURE)
+        self.outputs, self.run = outputs, code.entry("single", ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p))
 
     def __call__(self, given: np.ndarray) -> np.ndarray:
         found = np.empty(self.outputs)
-        self.run.call(1, given.ctypes.data, 1, found.ctypes.data, 1)
+        self.run.call(given.ctypes.data, found.ctypes.data)
         return found
 
 
@@ -82,7 +81,7 @@ def entry_code(function: Function | NativeFunction, interface: Interface) -> Ent
         Arguments and limits.
     """
     writer = Writer()
-    writer.over_states(function, ())
+    writer.export(function, "single")
     _EntryWriter(writer, function, interface).write()
     return EntryCode(machine.load(str(writer.module)), len(function.outputs))
 

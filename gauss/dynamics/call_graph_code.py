@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss.codegen import INTEGER, Function, endless_loop, write
-from gauss.codegen.kernels import RowCode, RowFunction
+from gauss.codegen.kernels import RowCode, SingleRowFunction
 from gauss.codegen.kernels.arrays import Array, Value
 from gauss.dynamics.call_graph_evaluation import CallGraphEvaluation, RecordedSystem
 from gauss.dynamics.projection import RESIDUAL_ROUNDOFF
@@ -22,25 +22,25 @@ class CallGraphCode(RecordedSystem):
     """Functions of a system with loops."""
 
     @cached_property
-    def forward(self) -> RowFunction:
+    def forward(self) -> SingleRowFunction:
         """(t, q, v, generalised forces) → (q̈, no power)."""
-        return RowFunction("forward", 1 + self.n_q + 2 * self.n_v, self.n_v + 3, self._forward)
+        return SingleRowFunction("forward", 1 + self.n_q + 2 * self.n_v, self.n_v + 3, self._forward)
 
     @cached_property
-    def check(self) -> RowFunction:
+    def check(self) -> SingleRowFunction:
         """(point without method state, generalised forces) → error of the accelerations of the point."""
-        return RowFunction("error", 1 + self.n_q + 3 * self.n_v + 6, 1, self._check)
+        return SingleRowFunction("error", 1 + self.n_q + 3 * self.n_v + 6, 1, self._check)
 
     @cached_property
-    def project(self) -> RowFunction:
+    def project(self) -> SingleRowFunction:
         """(t, q, v) → (q and v on the constraints, position residual), by least changes in the mass metric."""
         n = self.n_q + self.n_v
-        return RowFunction("nearest", 1 + n, n + 1, self._project)
+        return SingleRowFunction("nearest", 1 + n, n + 1, self._project)
 
-    def refined(self, loads: Function) -> RowFunction:
+    def refined(self, loads: Function) -> SingleRowFunction:
         """(q, v, forces, t) → as :class:`gauss.codegen.kernels.CorrectedRecursion`, with the same ``loads``."""
         n_in = self.n_q + 2 * self.n_v + 1
-        return RowFunction("corrected", n_in, self.n_v + 3, lambda code: self._refined(code, loads))
+        return SingleRowFunction("corrected", n_in, self.n_v + 3, lambda code: self._refined(code, loads))
 
     @cached_property
     def _retracted(self) -> Function:

@@ -28,7 +28,8 @@ class MechanismEnv(gymnasium.Env):
     def __init__(self, task: Task, integrator: str | None = None):
         self.task, self.simulator = task, Simulator(task.scene, task.step, integrator)
         self.action_space = task.action_space
-        self.observation_space = task.observation_space(self._observed().size)
+        self._last = self._observed()
+        self.observation_space = task.observation_space(self._last.size)
         self._actions = 0
 
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
@@ -39,24 +40,23 @@ class MechanismEnv(gymnasium.Env):
             self.simulator.reset(seed=int(self.np_random.integers(2**31)), spread=self.task.spread)
         else:
             self.simulator.reset(state)
-        self._actions = 0
-        return self._observed(), {}
+        self._actions, self._last = 0, self._observed()
+        return self._last, {}
 
     def step(self, action) -> tuple[np.ndarray, float, bool, bool, dict]:
         """Hold an action: (observation, reward, terminated, truncated, info)."""
-        before = self._observed()
+        simulator = self.simulator
         try:
-            self.simulator.step(action, n=self.task.hold)
+            simulator.step(action, n=self.task.hold)
         except SimulationError as error:
-            return before, 0.0, True, False, {"failure": str(error)}
+            return self._last, 0.0, True, False, {"failure": str(error)}
         self._actions += 1
-        state, u = self.simulator.state, np.asarray(action, dtype=float)
-        given = state.q, state.v, u, split(self.simulator.output_vector(), self.task.scene)
+        self._last = vector = self._observed()
+        outputs = split(vector, self.task.scene) if simulator.output_names else {}
+        given = *simulator.coordinates, np.asarray(action, dtype=float), outputs
         reward, ends = float(self.task.reward(*given)), bool(self.task.terminated(*given))
-        return self._observed(), reward, ends, self._actions >= self.task.actions, {}
+        return vector, reward, ends, self._actions >= self.task.actions, {}
 
     def _observed(self) -> np.ndarray:
-        if self.task.scene.outputs:
-            return self.simulator.output_vector()
-        state = self.simulator.state
-        return np.concatenate([state.q, state.v])
+        simulator = self.simulator
+        return simulator.output_vector() if simulator.output_names else np.concatenate(simulator.coordinates)

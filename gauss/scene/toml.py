@@ -224,5 +224,7 @@ def _entries(section: str, element):
         value, default = getattr(element, name), type(element).__dataclass_fields__[name].default
         if callable(value) and not isinstance(value, package.profiles.Profile | package.profiles.Several):
             raise FileError(f"{section} {element.name!r}: {name} is a Python function, which a file cannot hold.")
+        if name == "forces" and value:
+            raise FileError(f"{section} {element.name!r}: forces are elements of their own, which this table cannot hold.")
         if value is not None and value != default:
             yield key, value

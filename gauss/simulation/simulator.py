@@ -30,6 +30,7 @@ from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.tolerances import check_tolerances
+from gauss.simulation.undetected_switching import warn_of_short_features
 from gauss.system import State, System, retract
 
 FAILURES = {
@@ -119,9 +120,11 @@ class Simulator:
                 problem = problem._replace(held=HeldInputs(self.system, _zero(len(self.inputs)), 1.0, 0.0, 1.0))
             plan = plan_of(problem.question)
             if plan.dynamics != "compiled" or plan.driver not in ("compiled loop", "time stepping"):
-                raise SimulationError(f"steps of {whole.name!r} are not compiled: {'; '.join(map(str, plan.rejected))}.")
+                why = "; ".join(map(str, plan.rejected)) or "nothing in it can move"
+                raise SimulationError(f"steps of {whole.name!r} are not compiled: {why}.")
             if problem.switching.jumps:
                 raise SimulationError(f"prescribed velocities of {whole.name!r} jump; use gauss.simulate.")
+            warn_of_short_features(whole.name, problem.laws, self.step_size)
             problem = problem._replace(switching=Switching())
             self._run = run = _run_of(problem)
             self._loop = run.prepared().entry
@@ -252,11 +255,15 @@ class Simulator:
         return float(self._point[0])
 
     @property
+    def coordinates(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates (n_q,) and rates (n_v,), copies."""
+        begin, end = 1 + self._layout.n_q, 1 + self._layout.n_q + self._layout.n_v
+        return self._point[1:begin].copy(), self._point[begin:end].copy()
+
+    @property
     def state(self) -> State:
         """State, a copy."""
-        n_q = self.system.n_q
-        q, v = self._point[1 : 1 + n_q].copy(), self._point[1 + n_q : 1 + n_q + self.system.n_v].copy()
-        return State(float(self._point[0]), q, v)
+        return State(float(self._point[0]), *self.coordinates)
 
     @property
     def work(self) -> np.ndarray:

@@ -115,6 +115,17 @@ def test_accelerations_are_those_of_the_certified_recursion(case):
 
 
 @pytest.mark.slow
+def test_batches_of_states_are_evaluated_one_by_one():
+    system = gauss.compile_scene(gauss.load("n_four_bar", n=43))
+    states = [consistent_state(system, seed) for seed in range(3)]
+    q, v = (np.array([getattr(state, name) for state in states]) for name in ("q", "v"))
+    load = np.random.default_rng(0).normal(size=v.shape)
+    found = system.forward_dynamics(q, v, load)
+    for k, state in enumerate(states):
+        assert np.array_equal(found[k], system.accelerations(state, load[k]))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITTEN)
 def test_they_are_those_of_the_code_that_is_written_out(name):
     system = gauss.compile_scene(SCENES[name]())

@@ -86,6 +86,7 @@ MOTOR = '<motor name="last" joint="h" ctrllimited="true" ctrlrange="1 2"/>'
 REFUSED = {  # of MuJoCo 4: bodies, actuators, what is named with its line
     "no control": (BODIES, '<dcmotor name="m" joint="h" motorconst="1" resistance="0.5" input="none"/>', "actuator 'm'.*:6"),
     "three controls": (BODIES + BALL, '<orientation name="m" joint="b" kp="1"/>', "actuator 'm'.*:6"),
+    "a delay": (BODIES, '<motor name="m" joint="h" delay="0.05" nsample="6"/>', "actuator 'm': its control is delayed.*:6"),
     "no name": (BODIES, '<dcmotor joint="h" motorconst="1" resistance="0.5"/>', "actuator 'actuator 0'.*:6"),
     "after others": (BODIES + BALL, f'{MOTOR}\n<orientation name="m" joint="b" kp="1"/>', "actuator 'm'.*:7"),
 }

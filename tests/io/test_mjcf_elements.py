@@ -6,6 +6,7 @@ import pytest
 
 import gauss
 from benchmarks.foreign_accelerations import deviation
+from gauss.codegen.content_digest import content_digest
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError, NotImportedWarning
 from gauss.simulation.held_inputs import driven_as
@@ -71,18 +72,35 @@ ELEMENTS = {
     "damper": acting('<damper name="m" joint="h" kv="3" ctrlrange="0 1"/>'),
     "at a sum": acting('<position name="m" tendon="t" kp="7" gear="2"/>', more=SUM.format("")),
     "at a path": acting('<position name="m" tendon="t" kp="7" gear="2"/>', more=PATH.format("", PULLEY)),
+    "at a path in one body": acting(
+        '<motor name="m" tendon="t"/>', more='<tendon><spatial name="t"><site site="p"/><site site="q"/></spatial></tendon>'
+    ),
+    "at a ball, without gear": acting('<motor name="m" joint="B" gear="0 0 0"/>', FREE.format("", "")),
     "at a site": acting('<motor name="m" site="r" gear="1 2 3 0.1 0.2 0.3"/>'),
     "at a site, against the speed": acting('<velocity name="m" site="r" kv="2" gear="1 2 3 0.1 0.2 0.3"/>'),
     "at a free joint": acting('<motor name="m" joint="F" gear="1 2 3 0.1 0.2 0.3"/>', FREE.format("", "")),
     "at a ball": acting('<motor name="m" joint="B" gear="0.1 0.2 0.3"/>', FREE.format("", "")),
     "of the name of a tendon": acting('<motor name="t" joint="h"/>', more=PATH.format('stiffness="2"', "")),
     "two at one joint": acting('<motor name="m" joint="h"/><position name="n" joint="h" kp="2"/>'),
+    "no passive forces": (
+        arm(a=' gravcomp="1"', h=f" {SOFT}"),
+        "",
+        '<option density="1.2" wind="1 2 3"><flag spring="disable" damper="disable"/></option>',
+    ),
+    "gravcomp by actuators": (
+        arm(a=' gravcomp="1"', b=' gravcomp="1"', h=' actuatorgravcomp="true"'),
+        '<actuator><motor name="m" joint="h"/></actuator>',
+    ),
     "a switch": (*acting('<motor name="m" joint="h"/>'), '<option><flag actuation="disable"/></option>'),
 }
 WELD = '<equality><weld body1="a" body2="w" {}/></equality>'
 POINT = '<body name="w" pos="1 0 1"><freejoint/><geom size="0.1" pos="0.1 0 0"/></body>'
 HELD = {
     "weld at another pose": (arm() + POINT, WELD.format('relpose="0.7 0.1 0.3 0.8 0.6 0 0" anchor="0.1 0.2 0"')),
+    "weld of sites, at another pose": (
+        arm() + POINT.replace("<freejoint", '<site name="e" pos="0 0 0.1" euler="10 0 0"/><freejoint'),
+        '<equality><weld site1="r" site2="e"/></equality>',
+    ),
     "weld without torque": (arm() + POINT, WELD.format('torquescale="0"')),
     "path": (arm(), PATH.format("", "") + '<equality><tendon tendon1="t" polycoef="0.05 0 0 0 0"/></equality>'),
     "path by a sum": (
@@ -117,6 +135,14 @@ def test_elements_accelerate_as_in_mujoco(tmp_path, name):
 def test_held_tendons_accelerate_as_in_mujoco(tmp_path, name):
     path = _file(tmp_path, *HELD[name])
     assert deviation(path, quietly(path)) < CLOSED
+
+
+@pytest.mark.parametrize("name", ELEMENTS | HELD)
+def test_machine_code_of_elements_is_kept_by_their_content(tmp_path, name):
+    """Laws that hold the model of MuJoCo would have no digest, and be compiled in every process."""
+    path = _file(tmp_path, *(ELEMENTS | HELD)[name])
+    one, other = content_digest(quietly(path)), content_digest(quietly(path))
+    assert one is not None and one == other
 
 
 def test_friction_of_balls_and_free_joints_is_read(tmp_path):

@@ -358,3 +358,19 @@ def test_impulses_are_kept_in_files(tmp_path):
     motion = gauss.simulate(slider(speed=lambda t: gm.where(t < 1.0, 0.5, 0.0)), 2.0)
     kept = np.load(gauss.save(motion, tmp_path / "motion.npz"))
     assert kept["event_impulses"][0] == '{"drive of P": [-1.0]}'
+
+
+@pytest.mark.parametrize("key", ["speed", "displacement"])
+@pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.1}])
+def test_two_prescribed_motions_that_part_at_a_jump_are_refused(key, options):
+    parting = {
+        "speed": (lambda t: 1.0 + 0.0 * t, lambda t: gm.where(t < 0.5, 1.0, 2.0)),
+        "displacement": (lambda t: 1.0 * t, lambda t: t + gm.maximum(t - 0.5, 0.0)),
+    }[key]
+    scene = gauss.Scene("cart", gravity=(0, 0, 0))
+    scene.body("b", 1.0)
+    scene.prismatic("x", "ground", "b", axis=(1, 0, 0))
+    for number, law in enumerate(parting):
+        scene.drive("x", **{key: law}, name=f"drive {number}")
+    with pytest.raises(gauss.GaussError, match="t = 0.5 s: the prescribed speed of 'drive 1' jumps.*prescribed twice"):
+        gauss.simulate(scene, 1.0, progress=False, **options)

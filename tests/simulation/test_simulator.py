@@ -1,10 +1,12 @@
 """The simulator: its steps are those of simulate, bit for bit; snapshots, outputs, refusals."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 import gauss
-from gauss.errors import SimulationError
+from gauss.errors import SimulationError, SwitchingWarning
 
 STEP = 1e-3
 ROUNDING = 1e-9  # of accelerations by two routes
@@ -107,3 +109,44 @@ def test_scenes_without_a_compiled_step_are_refused():
         gauss.Simulator(scene, STEP)
     with pytest.raises(SimulationError, match="fixed ones"):
         gauss.Simulator(gauss.load("cart_pole"), STEP, "dop853")
+
+
+def _pushed(law):
+    scene = gauss.Scene("cart", gravity=(0, 0, 0))
+    scene.body("b", 1.0)
+    scene.prismatic("x", "ground", "b", axis=(1, 0, 0))
+    scene.drive("x", force=law)
+    return scene
+
+
+SHORT = {
+    "pulse": lambda t: 10.0 if 5 <= t < 5.01 else 0.0,
+    "bell": lambda t: gauss.math.exp(-(((t - 5) / 1e-3) ** 2)),
+}
+LASTING = {
+    "pulse": lambda t: 10.0 if 5 <= t < 6 else 0.0,
+    "sine": lambda t: gauss.math.sin(20.0 * t),
+    "move": gauss.scene.profiles.Move(0.0, 1.0, 1.0, 2.0),
+}
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_features_of_laws_that_are_shorter_than_the_steps_are_warned_of(name):
+    for _ in range(2):
+        with pytest.warns(SwitchingWarning, match="'cart': steps of 0.03 s pass over a feature of a law of time"):
+            gauss.Simulator(_pushed(SHORT[name]), step=0.03)
+
+
+@pytest.mark.parametrize("name", LASTING)
+def test_laws_that_the_steps_resolve_are_not_warned_of(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gauss.Simulator(_pushed(LASTING[name]), step=0.03)
+
+
+def test_a_scene_in_which_nothing_moves_has_no_steps():
+    scene = gauss.Scene("still")
+    scene.body("b", 1.0, (1, 1, 1))
+    scene.joint("weld", "fixed", "ground", "b")
+    with pytest.raises(SimulationError, match="nothing in it can move"):
+        gauss.Simulator(scene, step=0.1)

@@ -108,6 +108,12 @@ def test_who_takes_functions_as_they_are_gets_them():
     np.testing.assert_array_equal(other.accelerations(state), system.accelerations(state))
 
 
+def test_functions_that_name_the_package_are_sent_to_other_processes():
+    """As joblib sends those of a script: with the packages that they name."""
+    for package in (gauss, gauss.scene):
+        assert pickle.loads(pickle.dumps(package)) is package
+
+
 def test_copies_need_no_journey():
     system = _driven(lambda t: 0.1)
     assert copy.copy(system).dynamics is system.dynamics

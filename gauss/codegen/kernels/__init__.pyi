@@ -26,7 +26,7 @@ from gauss.codegen.kernels.loop_control import Control, LoopStatus
 from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
-from gauss.codegen.kernels.row_code import RowCode, RowFunction
+from gauss.codegen.kernels.row_code import RowCode, RowFunction, SingleRowFunction
 from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
 from gauss.codegen.kernels.taylor import TaylorStep
 from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
@@ -64,6 +64,7 @@ __all__ = [
     "Newton",
     "FirstAccepted",
     "Pivots",
+    "SingleRowFunction",
     "Slot",
     "MotionQueue",
     "MOTION_RECORD",

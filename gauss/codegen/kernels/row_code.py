@@ -168,6 +168,16 @@ class RowFunction(NativeFunction):
         return code.done()
 
 
+class SingleRowFunction(RowFunction):
+    """The same where loops end by the numbers of one motion: it has no code for several at a time."""
+
+    def write(self, writer: Writer, width: int) -> ir.Function:
+        """Machine code for one motion."""
+        code = RowCode(writer, self.begin_scalar(writer.module, width), width)
+        self.emit(code)
+        return code.done()
+
+
 def reduced(b: ir.IRBuilder, first, end, start: ir.Value, following: Callable) -> ir.Value:
     """Value after ``value = following(k, value)`` for the whole numbers k from ``first`` to ``end − 1``."""
     before, (head, inside, after) = b.block, (b.function.append_basic_block(name) for name in ("sum", "term", "summed"))

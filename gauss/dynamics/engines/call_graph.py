@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss.codegen import Kernel
-from gauss.codegen.kernels import CallRecorder, RecordedSections, RowFunction, Vector
+from gauss.codegen.kernels import CallRecorder, RecordedSections, SingleRowFunction, Vector
 from gauss.dynamics.call_graph import DAMPED, CallGraph
 from gauss.dynamics.call_graph_code import CallGraphCode
 from gauss.dynamics.constrained_aba import MU
@@ -57,7 +57,7 @@ def call_graph_kernels(system: System, gains: Gains = None) -> CallGraphKernels:
     return cached(system, (CallGraphKernels, gains), lambda: CallGraphKernels(system, gains))
 
 
-def refined_call_graph(system: System, loads) -> RowFunction:
+def refined_call_graph(system: System, loads) -> SingleRowFunction:
     """(q, v, τ, t) → as :func:`gauss.dynamics.traced_refinement.refined_once`, under loads."""
     return call_graph_code(system).refined(added_forces(system, loads))
 

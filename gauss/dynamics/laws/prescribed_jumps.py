@@ -14,7 +14,7 @@ from gauss.dynamics.contact.impact import Impact, at_time, impact
 from gauss.dynamics.gap_functions import TOUCHING, gaps, stacked_rows
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.switching_times import APART
-from gauss.dynamics.projection import scalar_coordinates
+from gauss.dynamics.projection import relative_velocity_residual, scalar_coordinates, velocity_residual_of
 from gauss.errors import SimulationError
 from gauss.scene import Constraint
 from gauss.scene.values import evaluate
@@ -23,6 +23,7 @@ from gauss.system import State, System, retract, sides
 RELATIVE = 1e-10  # of the largest coordinate, or velocity, in a row: a smaller change may be rounding in the law
 SMOOTH = 4.0  # ratio to the change over an equal time beside the switching time: a smaller one may be the slope of the law
 LOOKS = 33  # times at which magnitudes of laws are sampled, besides switching times
+CONTRADICTION = 1e-6  # velocity residual after a jump, relative to the scales of the rows: more is no rounding
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,7 @@ class Jumps:
         touching = np.flatnonzero(gaps(kinematics(system, later)).width <= TOUCHING * gap_scales(system))
         restitution = np.array([side.whole.restitution for side in parts])
         found = impact(system, later, touching, restitution, since=state.t, driven=names)
+        _refuse_contradiction(system, found.state, names)
         rough = {slip.name for slip in system.slips.placed}
         words = ", ".join(map(repr, names))
         frictional = [parts[gap].whole.name for gap in found.active if parts[gap].name in rough]
@@ -95,6 +97,17 @@ class Jumps:
         """Time just after the start of a motion [s], if velocities may jump there."""
         after = begin + APART * max(abs(begin), abs(end))
         return after if self.within(begin, after) else None
+
+
+def _refuse_contradiction(system: System, state: State, names: tuple[str, ...]) -> None:
+    """Raise a SimulationError where velocities after a jump cannot meet all constraints."""
+    residual = velocity_residual_of(system, kinematics(system, state))
+    if relative_velocity_residual(system, residual, state.v) > CONTRADICTION:
+        words = ", ".join(map(repr, names))
+        raise SimulationError(
+            f"t = {state.t:.6g} s: the prescribed speed of {words} jumps, and no velocities meet it together with the other "
+            "constraints: one motion is prescribed twice. Take one of the drives away."
+        )
 
 
 NO_JUMPS = Jumps(None, np.zeros(0), np.zeros((2, 0)))

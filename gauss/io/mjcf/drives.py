@@ -5,6 +5,8 @@
 The load is F(u₀), u₀ the control that is given when nobody gives any; the input adds F(u) − F(u₀).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from gauss import math
@@ -14,29 +16,27 @@ from gauss.io.mjcf.transmissions import JOINT, JOINT_IN_PARENT, ActuatorTransmis
 from gauss.scene import Scene
 
 
+@dataclass(frozen=True)
 class ActuatorForce:
     """Force of one actuator: number, or law, of its control.
 
     Parameters
     ----------
-    named : Named
-        The model.
-    i : int
-        Number of the actuator.
+    acted : ActuatorTransmission
+        What it acts on.
+    gain, bias : ndarray, shape (3,)
+        Numbers g and b.
+    control : float
+        Control that is given when nobody gives any.
+    ranges : tuple of tuple of float
+        Least and largest force, of each that limits it.
     """
 
-    def __init__(self, named: Named, i: int):
-        model = named.model
-        self.gain = np.zeros(3) if has_state(model, i) else gain_of(model, i)
-        self.bias, self.control = bias_of(model, i), control(model, i)
-        acted = transmission(named, i)
-        assert acted is not None  # see what is refused
-        self.acted: ActuatorTransmission = acted
-        self.ranges = [tuple(model.actuator_forcerange[i])] if model.actuator_forcelimited[i] else []
-        self.ranges += [acted.range] if acted.range is not None else []
-        self.scales = [1.0] * len(self.ranges)
-        if acted.range is not None and int(model.actuator_trntype[i]) in (JOINT, JOINT_IN_PARENT):  # beyond the gear
-            self.scales[-1] = next(iter(acted.acts_on.values()))
+    acted: ActuatorTransmission
+    gain: np.ndarray
+    bias: np.ndarray
+    control: float
+    ranges: tuple[tuple[float, float], ...]
 
     @property
     def follows(self) -> bool:
@@ -49,9 +49,8 @@ class ActuatorForce:
         g, b = self.gain, self.bias
         gain = g[0] + (g[1] * length + g[2] * rate if g[1:].any() else 0.0)
         force = gain * u + b[0] + (b[1] * length + b[2] * rate if b[1:].any() else 0.0)
-        for (low, high), scale in zip(self.ranges, self.scales, strict=True):
-            ends = sorted((float(low) / scale, float(high) / scale)) if scale else (0.0, 0.0)
-            force = math.clip(force, *ends)
+        for low, high in self.ranges:
+            force = math.clip(force, low, high)
         return force
 
     def _length(self, motion):
@@ -63,12 +62,27 @@ class ActuatorForce:
         return self.acted.rate(motion) if depends and self.acted.rate is not None else 0.0
 
 
+def actuator_force(named: Named, i: int) -> ActuatorForce:
+    """Force of the actuator of a number."""
+    model, acted = named.model, transmission(named, i)
+    assert acted is not None  # see what is refused
+    gain = np.zeros(3) if has_state(model, i) else np.array(gain_of(model, i))
+    ranges = [tuple(map(float, model.actuator_forcerange[i]))] if model.actuator_forcelimited[i] else []
+    if acted.range is not None:
+        on_joint = int(model.actuator_trntype[i]) in (JOINT, JOINT_IN_PARENT)  # limited beyond the gear
+        scale = next(iter(acted.acts_on.values())) if on_joint else 1.0
+        ranges.append(tuple(sorted(end / scale for end in acted.range)) if scale else (0.0, 0.0))
+    return ActuatorForce(
+        acted, gain, np.array(bias_of(model, i)), control(model, i), tuple((low, high) for low, high in ranges)
+    )
+
+
 def add_actuator(scene: Scene, named: Named, i: int):
     """Input of one actuator, and its force without control."""
-    model, name, force = named.model, named.name("actuator", i), ActuatorForce(named, i)
+    model, name, force = named.model, named.name("actuator", i), actuator_force(named, i)
     name = f"actuator {name}" if name in scene.loads or name in scene.relations or name in scene.contacts else name
     _add_load(scene, named, i, name, force)
-    if not force.gain.any():
+    if not force.gain.any() or not (force.acted.acts_on or force.acted.forces):  # a tendon within one body moves nothing
         return
     acts_on, forces, u_0, gain = force.acted.acts_on, force.acted.forces, force.control, float(force.gain[0])
     effort = None

@@ -24,7 +24,7 @@ from gauss.io.mjcf.passive import add_ball_armature, add_compensation, add_passi
 from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, WELD, is_closed, left_out, refused
 from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
-from gauss.io.mjcf.tendon_path import TendonPath
+from gauss.io.mjcf.tendon_path import tendon_path
 from gauss.io.mjcf.tendons import add_tendon, couple_tendons, hold_tendon
 from gauss.io.mjcf.touching import add_contacts, add_stops
 from gauss.io.numbers import bounds
@@ -212,18 +212,19 @@ class _MjcfReader:
 
     def _of_tendons(self, scene: Scene, name: str, one: int, other: int, data):
         """A tendon that keeps its length, or is as long as another; lengths count from the pose of the file."""
-        path = TendonPath(self.named, one)
+        path = tendon_path(self.named, one)
         if other < 0:
             hold_tendon(scene, name, path, float(data[0]))
         else:
-            couple_tendons(scene, name, path, TendonPath(self.named, other), data[:5].tolist())
+            couple_tendons(scene, name, path, tendon_path(self.named, other), data[:5].tolist())
 
     def _weld(self, scene: Scene, name: str, i: int, one: int, other: int, data):
         """A weld at another pose than that of the file, or of points alone: p₁ = p₂, R₁ R = R₂."""
-        ends = [(body, np.zeros(3), np.eye(3)) for body in (self.bodies[one], self.bodies[other])]
         if int(self.model.eq_objtype[i]) == SITE:
             ends = [(self.bodies[int(self.model.site_bodyid[s])], *_site_pose(self.model, s)) for s in (one, other)]
             data = np.array([*np.zeros(6), 1.0, 0.0, 0.0, 0.0, data[10]])
+        else:
+            ends = [(self.bodies[body], np.zeros(3), np.eye(3)) for body in (one, other)]
         (first, p_1, R_1), (second, p_2, R_2) = ends
         at, other_at = p_1 + R_1 @ data[3:6], p_2 + R_2 @ data[:3]
         if not data[10]:  # no torque

@@ -18,7 +18,8 @@ from gauss.io.mjcf.actuators import (
 )
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
 from gauss.io.mjcf.start import START, key_of
-from gauss.io.mjcf.tendon_path import TendonPath
+from gauss.io.mjcf.switches import is_off
+from gauss.io.mjcf.tendon_path import tendon_path
 from gauss.io.mjcf.transmissions import JOINT as ON_JOINT
 from gauss.io.mjcf.transmissions import JOINT_IN_PARENT, ActuatorTransmission, transmission
 
@@ -42,8 +43,18 @@ def refused(named: Named, contacts: bool = False) -> list[str]:
     """Everything that moves the mechanism and has no counterpart."""
     model, found = named.model, []
     found += [f"flexible body {i}" for i in range(model.nflex)]
+    found += _compensated(named)
     parts = [*_of_joints(named), *_curved(named), *_without_counterpart(named, contacts)]
     return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
+
+
+def _compensated(named: Named) -> list[str]:
+    """Gravity compensation that MuJoCo counts to the actuators of a joint, and then does not apply, or not in full."""
+    model = named.model
+    counted = np.flatnonzero(model.jnt_actgravcomp) if model.body_gravcomp.any() else np.zeros(0, dtype=int)
+    silent = not len(actuators(model)) or is_off(model, "ACTUATION")
+    lost = [named.joints[j] for j in counted.tolist() if silent or model.jnt_actfrclimited[j]]
+    return [f"gravity compensation that counts to the actuators (actuatorgravcomp) of joint {name!r}" for name in lost]
 
 
 def _of_joints(named: Named) -> Iterator[Finding]:
@@ -98,7 +109,7 @@ def _unlimited(named: Named, stops: bool) -> list[tuple[str, list[str]]]:
     limited = np.flatnonzero(model.jnt_limited).tolist()
     if stops:
         return [("limits of ball joints", [named.joints[i] for i in limited if named.kinds[i] not in SCALAR])]
-    tied = [named.name("tendon", i) for i in np.flatnonzero(model.tendon_limited).tolist() if TendonPath(named, i).is_fixed]
+    tied = [named.name("tendon", i) for i in np.flatnonzero(model.tendon_limited).tolist() if tendon_path(named, i).is_fixed]
     joints = [named.joints[i] for i in limited]
     return [("limits, kept for the assembly of a start only, of joints", joints), ("limits of tendons", tied)]
 
@@ -145,7 +156,7 @@ def _of_joint(named: Named, i: int) -> list[str]:
 
 def _against_tendon(named: Named, i: int) -> str:
     """Why a tendon has no counterpart; empty if it has one."""
-    model, path = named.model, TendonPath(named, i)
+    model, path = named.model, tendon_path(named, i)
     if not path.is_read:
         return "it is wrapped around geoms; lead it over sites"
     if model.tendon_frictionloss[i] and not (path.is_fixed and len(path.terms) == 1):
@@ -161,7 +172,7 @@ def _against_equality(named: Named, i: int) -> str:
         scalar = all(named.kinds[j] in SCALAR for j in ends if j >= 0)
         return "" if scalar else "a joint has several freedoms"
     if kind == TENDON:
-        return "" if all(TendonPath(named, j).is_read for j in ends if j >= 0) else "it holds a tendon wrapped around geoms"
+        return "" if all(tendon_path(named, j).is_read for j in ends if j >= 0) else "it holds a tendon wrapped around geoms"
     if kind not in (CONNECT, WELD):
         return "only connect, weld, joint and tendon are read"
     if int(model.eq_objtype[i]) not in (BODY, SITE):
@@ -188,6 +199,8 @@ def _against_actuator(named: Named, i: int) -> str:
         return "only actuators of joints, of tendons over sites, and of sites beside none or one of the ground are read"
     if n_controls(model, i) > 1:
         return "it has several controls"
+    if np.any(getattr(model, "actuator_delay", np.zeros(i + 1))[i]):
+        return "its control is delayed"
     if not has_affine_force(model, i):
         return "its force is not affine"
     if has_state(model, i) and control(model, i):

@@ -29,6 +29,9 @@ def without_what_is_off(model):
         if is_off(model, switch):
             for field in fields:
                 getattr(model, field)[:] = 0
+    if is_off(model, "SPRING") and is_off(model, "DAMPER"):  # then MuJoCo computes no passive force at all
+        model.opt.density = model.opt.viscosity = 0.0
+        model.body_gravcomp[:] = 0.0
     if is_off(model, "GRAVITY"):
         model.opt.gravity[:] = 0.0
     return model

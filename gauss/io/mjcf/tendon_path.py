@@ -7,8 +7,8 @@ A pulley begins another branch, with the divisor of its rope (MuJoCo's documenta
 """
 
 from collections.abc import Callable
-from functools import cached_property
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -22,14 +22,16 @@ TINY = 1e-30  # m², below which the root of a squared length is not taken: the 
 Law = Callable  # (t, motion) → number
 
 
-class PathPoint(NamedTuple):
+@dataclass(frozen=True)
+class PathPoint:
     """Site of a tendon: body, point of its frame [m]."""
 
     body: str
-    at: tuple
+    at: tuple[float, ...]
 
 
-class PathSpan(NamedTuple):
+@dataclass(frozen=True)
+class PathSpan:
     """Straight piece of a tendon between two of its points, with the share 1/divisor of its branch."""
 
     first: PathPoint
@@ -37,78 +39,33 @@ class PathSpan(NamedTuple):
     share: float
 
 
+@dataclass(frozen=True)
 class TendonPath:
     """Tendon of a model.
 
     Parameters
     ----------
-    named : Named
-        The model.
-    i : int
-        Number of the tendon.
+    rest : float
+        Length in the pose of the file, L₀ [m or rad].
+    is_fixed, is_read : bool
+        Whether it is a sum of coordinates of hinges and slides; whether it is that, or led over sites and pulleys only.
+    terms : dict of str to float
+        Joints and coefficients of a fixed tendon.
+    spans : tuple of PathSpan
+        Straight pieces of a spatial tendon, but for those within one body.
+    constant : float
+        Length of the pieces within one body [m].
+    is_line : bool
+        Whether it is one straight line between two bodies.
     """
 
-    def __init__(self, named: Named, i: int):
-        self.named, self.number = named, i
-        self.rest = float(named.model.tendon_length0[i])
-
-    @property
-    def wraps(self) -> range:
-        """Numbers of what it is led over."""
-        model = self.named.model
-        return range(int(model.tendon_adr[self.number]), int(model.tendon_adr[self.number] + model.tendon_num[self.number]))
-
-    @cached_property
-    def types(self) -> list[int]:
-        """Types of what it is led over."""
-        return [int(self.named.model.wrap_type[w]) for w in self.wraps]
-
-    @property
-    def is_fixed(self) -> bool:
-        """Whether it is a sum of coordinates of hinges and slides."""
-        return all(kind == ON_JOINT for kind in self.types)
-
-    @property
-    def is_read(self) -> bool:
-        """Whether it is led over sites and pulleys only, or is fixed."""
-        return self.is_fixed or all(kind in (ON_SITE, ON_PULLEY) for kind in self.types)
-
-    @cached_property
-    def terms(self) -> dict[str, float]:
-        """Joints and coefficients of a fixed tendon."""
-        model, found = self.named.model, dict[str, float]()
-        for w in self.wraps:
-            joint = self.named.joints[model.wrap_objid[w]]
-            found[joint] = found.get(joint, 0.0) + float(model.wrap_prm[w])
-        return found
-
-    @cached_property
-    def spans(self) -> list[PathSpan]:
-        """Straight pieces of a spatial tendon; those within one body do not change and are left out."""
-        model, found, share, last = self.named.model, list[PathSpan](), 1.0, None
-        for w, kind in zip(self.wraps, self.types, strict=True):
-            if kind == ON_PULLEY:
-                share, last = 1.0 / float(model.wrap_prm[w]), None
-                continue
-            site = int(model.wrap_objid[w])
-            point = PathPoint(self.named.bodies[int(model.site_bodyid[site])], tuple(map(float, model.site_pos[site])))
-            if last is not None and last.body != point.body:
-                found.append(PathSpan(last, point, share))
-            last = point
-        return found
-
-    @cached_property
-    def constant(self) -> float:
-        """Part of the length of a spatial tendon that does not change [m]: pieces within one body."""
-        model, total, share, last = self.named.model, 0.0, 1.0, None
-        for w, kind in zip(self.wraps, self.types, strict=True):
-            site = int(model.wrap_objid[w])
-            if kind == ON_PULLEY:
-                share, site = 1.0 / float(model.wrap_prm[w]), -1
-            elif last is not None and last >= 0 and model.site_bodyid[last] == model.site_bodyid[site]:
-                total += share * float(np.linalg.norm(model.site_pos[site] - model.site_pos[last]))
-            last = site
-        return total
+    rest: float
+    is_fixed: bool
+    is_read: bool
+    terms: dict[str, float]
+    spans: tuple[PathSpan, ...] = ()
+    constant: float = 0.0
+    is_line: bool = False
 
     def length(self, at):
         """Length [m or rad] by a view of the mechanism."""
@@ -123,7 +80,7 @@ class TendonPath:
         total = 0.0
         for span in self.spans:
             along = _between(span, at)[0]
-            total = total + span.share * (along @ (at.velocity(*span.second) - at.velocity(*span.first)))
+            total = total + span.share * (along @ (_velocity(span.second, at) - _velocity(span.first, at)))
         return total
 
     def pull(self, scene: Scene, name: str, force: float | Law):
@@ -147,11 +104,50 @@ class TendonPath:
         return found
 
 
+def tendon_path(named: Named, i: int) -> TendonPath:
+    """Tendon of a number."""
+    model = named.model
+    wraps = range(int(model.tendon_adr[i]), int(model.tendon_adr[i] + model.tendon_num[i]))
+    types, rest = [int(model.wrap_type[w]) for w in wraps], float(model.tendon_length0[i])
+    if all(kind == ON_JOINT for kind in types):
+        terms = dict[str, float]()
+        for w in wraps:
+            joint = named.joints[model.wrap_objid[w]]
+            terms[joint] = terms.get(joint, 0.0) + float(model.wrap_prm[w])
+        return TendonPath(rest, True, True, terms)
+    if not all(kind in (ON_SITE, ON_PULLEY) for kind in types):
+        return TendonPath(rest, False, False, {})
+    spans, constant = _spatial(named, wraps, types)
+    return TendonPath(rest, False, True, {}, spans, constant, len(types) == 2 and len(spans) == 1)
+
+
+def _spatial(named: Named, wraps: range, types: list[int]) -> tuple[tuple[PathSpan, ...], float]:
+    """Pieces of a tendon over sites and pulleys, and the length of those within one body."""
+    model = named.model
+    spans, constant, share, last = list[PathSpan](), 0.0, 1.0, None
+    for w, kind in zip(wraps, types, strict=True):
+        if kind == ON_PULLEY:
+            share, last = 1.0 / float(model.wrap_prm[w]), None
+            continue
+        site = int(model.wrap_objid[w])
+        point = PathPoint(named.bodies[int(model.site_bodyid[site])], tuple(map(float, model.site_pos[site])))
+        if last is not None and last.body != point.body:
+            spans.append(PathSpan(last, point, share))
+        elif last is not None:
+            constant += share * float(np.linalg.norm(np.subtract(point.at, last.at)))
+        last = point
+    return tuple(spans), constant
+
+
 def _between(span: PathSpan, at):
     """Unit vector (3,) from the first to the second point of a piece, and its length [m]."""
-    gap = at.position(*span.second) - at.position(*span.first)
+    gap = at.position(span.second.body, span.second.at) - at.position(span.first.body, span.first.at)
     length = np.sqrt(math.maximum(gap @ gap, TINY))
     return gap / length, length
+
+
+def _velocity(point: PathPoint, at):
+    return at.velocity(point.body, point.at)
 
 
 def _along(span: PathSpan, factor: float) -> Law:

@@ -4,16 +4,16 @@ import numpy as np
 
 from gauss import math
 from gauss.io.mjcf.names import Named
-from gauss.io.mjcf.tendon_path import ON_SITE, TendonPath
+from gauss.io.mjcf.tendon_path import TendonPath, tendon_path
 from gauss.scene import GROUND, Scene
 
 
 def add_tendon(scene: Scene, named: Named, i: int, stops: bool):
     """What a tendon stands for; limits of fixed ones where stops are asked for, those of spatial ones always."""
-    model, name, path = named.model, named.name("tendon", i), TendonPath(named, i)
+    model, name, path = named.model, named.name("tendon", i), tendon_path(named, i)
     stiffness, damping = float(np.ravel(model.tendon_stiffness[i])[0]), float(np.ravel(model.tendon_damping[i])[0])
     low, high = map(float, model.tendon_lengthspring[i])
-    between = _is_line(path)
+    between = path.is_line
     if (stiffness or damping) and between and low == high:
         scene.spring(name, **_ends(path), stiffness=stiffness, damping=damping, length=low)
     elif stiffness or damping:
@@ -25,11 +25,6 @@ def add_tendon(scene: Scene, named: Named, i: int, stops: bool):
     if model.tendon_frictionloss[i]:  # of one joint, see what is refused
         joint, factor = next(iter(path.terms.items()))
         scene.joint_friction(joint, abs(factor) * float(model.tendon_frictionloss[i]), name=f"friction of {name}")
-
-
-def _is_line(path: TendonPath) -> bool:
-    """Whether a tendon is one straight line between two bodies."""
-    return path.types == [ON_SITE] * 2 and len(path.spans) == 1
 
 
 def _ends(path: TendonPath) -> dict:
@@ -51,7 +46,7 @@ def _resistance(path: TendonPath, stiffness: float, damping: float, low: float, 
 def _limit(scene: Scene, named: Named, i: int, path: TendonPath, name: str):
     """Largest and least length as ropes and one-sided constraints."""
     shortest, longest = map(float, named.model.tendon_range[i])
-    if _is_line(path):
+    if path.is_line:
         if longest > 0.0:
             scene.rope(f"{name} taut" if name in scene.loads else name, **_ends(path), length=longest)
     else:
@@ -78,7 +73,7 @@ def _add_armature(scene: Scene, name: str, path: TendonPath, inertia: float):
 def hold_tendon(scene: Scene, name: str, path: TendonPath, offset: float):
     """Hold a tendon at its length in the pose of the file, plus an offset."""
     if not path.is_fixed:
-        if _is_line(path):
+        if path.is_line:
             scene.distance(name, **_ends(path), length=path.rest + offset)
         else:
             scene.constrain(name, lambda at: path.length(at) - path.rest - offset)

@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss.io.mjcf.actuators import gear
 from gauss.io.mjcf.names import SCALAR, Named
-from gauss.io.mjcf.tendon_path import Law, TendonPath
+from gauss.io.mjcf.tendon_path import Law, tendon_path
 from gauss.rotations import from_quaternion
 from gauss.scene import PAIRS, Force, Scene
 
@@ -86,7 +86,7 @@ def _of_joint(named: Named, i: int, j: int, on: int) -> ActuatorTransmission | N
 
 
 def _of_tendon(named: Named, i: int, number: int) -> ActuatorTransmission | None:
-    model, path, ratio = named.model, TendonPath(named, number), float(gear(named.model, i)[0])
+    model, path, ratio = named.model, tendon_path(named, number), float(gear(named.model, i)[0])
     if not path.is_read:
         return None
     bounds = _bounds(model.tendon_actfrcrange[number]) if model.tendon_actfrclimited[number] else None
