@@ -38,7 +38,7 @@ WALKER = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9"/>
 <geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0" density="500"/>
 <body name="b" pos="0.5 0 0" quat="1 0.1 0 0"><joint name="k" axis="0 1 0.5" frictionloss="0.4"/>
 <inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.2 0.25"/></body></body></worldbody>
-<actuator><position joint="j" kp="3"/><motor joint="k" gear="3" ctrlrange="1 2"/></actuator></mujoco>"""
+<actuator><position joint="j" kp="3"/><motor joint="k" gear="3" ctrlrange="-1 2"/></actuator></mujoco>"""
 
 
 def _load(folder, ending: str, text: str, **options) -> str:

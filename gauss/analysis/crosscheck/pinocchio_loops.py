@@ -80,7 +80,7 @@ def _rows(now: PinocchioInstant, state: State) -> tuple[np.ndarray, np.ndarray]:
         elif name in system.scene.couplings:
             coupling = system.scene.couplings[name]
             rows, right = _coupling_row(system, {coupling.driven: 1.0, coupling.driver: -coupling.ratio})
-        elif isinstance(relation := system.scene.relations[name], LinearCoupling):
+        elif isinstance(relation := system.scene.relations.get(name), LinearCoupling):
             rows, right = _coupling_row(system, dict(zip(relation.coupled, relation.coefficients, strict=True)))
         else:
             raise GaussError(

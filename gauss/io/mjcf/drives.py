@@ -5,6 +5,7 @@
 The load is F(u₀), u₀ the control that is given when nobody gives any; the input adds F(u) − F(u₀).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,16 +85,19 @@ def add_actuator(scene: Scene, named: Named, i: int):
     _add_load(scene, named, i, name, force)
     if not force.gain.any() or not (force.acted.acts_on or force.acted.forces):  # a tendon within one body moves nothing
         return
-    acts_on, forces, u_0, gain = force.acted.acts_on, force.acted.forces, force.control, float(force.gain[0])
-    effort = None
-    if force.ranges or force.gain[1:].any() or u_0:
-        effort = lambda u, t, motion: force.of(u, motion) - force.of(u_0, motion)  # noqa: E731
-    elif forces and gain != 1.0:
-        effort = lambda u, t, motion: gain * u  # noqa: E731
-    else:
-        acts_on = {joint: factor * gain for joint, factor in acts_on.items()}
+    acts_on, forces, effort = force.acted.acts_on, force.acted.forces, _effort(force)
+    if effort is None:
+        acts_on = {joint: factor * float(force.gain[0]) for joint, factor in acts_on.items()}
     joint = next(iter(acts_on)) if list(acts_on.values()) == [1.0] else acts_on
     scene.input(name, joint, control_range(model, i), effort, forces)
+
+
+def _effort(force: ActuatorForce) -> Callable | None:
+    """Law of the effort that a control adds to the force without control; None where it is proportional, along joints."""
+    u_0, gain = force.control, float(force.gain[0])
+    if force.ranges or force.gain[1:].any() or u_0:
+        return lambda u, t, motion: force.of(u, motion) - force.of(u_0, motion)
+    return (lambda u, t, motion: gain * u) if force.acted.forces and gain != 1.0 else None
 
 
 def _add_load(scene: Scene, named: Named, i: int, name: str, force: ActuatorForce):
