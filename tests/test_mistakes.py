@@ -130,7 +130,7 @@ MISTAKES = {
     "wrong path of a robot": (lambda: gauss.load("nowhere.urdf"), FileError, "no such file"),
     "wrong name": (lambda: gauss.load("fourbar"), FileError, "Did you mean 'four_bar'"),
     "wrong robot": (lambda: gauss.load("robot:pandas"), FileError, "Did you mean 'panda'"),
-    "wrong format": (lambda: gauss.load("scene.json"), FileError, r"expected .toml or .urdf or .xml"),
+    "wrong format": (lambda: gauss.load("scene.json"), FileError, r"expected .toml or .urdf"),
     "a scene for a path": (lambda: gauss.load(door()), ArgumentError, "load: expected a str or Path, got a Scene"),
     "typo in a key": (lambda: gauss.load("typo.toml"), FileError, "'mas'. Did you mean 'mass'"),
     "typo in a section": (lambda: gauss.load("section.toml"), FileError, "'bodies'. Did you mean 'body'"),

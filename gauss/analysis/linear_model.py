@@ -128,7 +128,11 @@ class LinearModel:
         ------
         MissingPackageError
             If python-control is not installed.
+        SimulationError
+            If the model has no input or no output, which python-control does not take.
         """
+        if not self.inputs or not self.outputs:
+            raise SimulationError("state_space: expected a model with inputs and outputs; name some in linearise.")
         try:
             import control
         except ImportError:

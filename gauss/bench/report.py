@@ -61,11 +61,11 @@ open; a solver that gives none is off by 1."""
 
 def markdown(rows, reused, header) -> str:
     """The whole report."""
-    left, rows = not_asked(rows), asked(rows)
+    problems, left, rows = _problems(rows), not_asked(rows), asked(rows)
     lines = head("QP backends on mechanism problems", [*header, "all packages: [qp.lock](qp.lock)", checksum(rows)])
     lines += [HOW, "", *left, *(["![Errors of the backends](qp_errors.png)"] if cells_shown(rows) else [])]
     lines += ["![Time against error](qp_time_error.png)", "", "![Performance profiles](qp_profile.png)", ""]
-    lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], MAIN_LEVEL)
+    lines += problems + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], MAIN_LEVEL)
     lines += _errors(rows) + _totals(rows) + _verdicts(rows) + _times(rows) + _means(rows) + _against(rows) + _honesty(rows)
     return "\n".join(lines + (reuse_lines(reused, rows) if reused else [])) + "\n"
 

@@ -166,6 +166,9 @@ def test_what_cannot_be_linearised_is_named(call, error, words):
 
 def test_a_state_space_of_python_control_has_the_names():
     control = pytest.importorskip("control")
-    model = gauss.linearise(mechanisms.rods(1))
+    system = gauss.compile_scene(mechanisms.rods(1))
+    model = gauss.linearise(system, inputs=system.coordinates)
     assert isinstance(model.state_space(), control.StateSpace)
     assert model.state_space().state_labels == list(model.states)
+    with pytest.raises(SimulationError, match="inputs"):
+        gauss.linearise(system).state_space()
