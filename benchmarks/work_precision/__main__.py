@@ -43,9 +43,9 @@ def _measure(case: TimedScene, table: "report.AttemptTable", patience: float):
     system = gauss.compile_scene(case.make())
     methods = [*METHODS, *SUNDIALS] if system.n_v <= WIDE else EXPLICIT
     wanted = [method for method in methods if not table.has_method(case.name, "gauss", method)]
-    lacking = [engine for engine, (_, _, own) in peers.ENGINES.items() if not table.has_method(case.name, engine, own[-1])]
+    missing = [engine for engine, (_, _, own) in peers.ENGINES.items() if not table.has_method(case.name, engine, own[-1])]
     ready = [one for one in prepared.METHODS if not table.has_method(case.name, "gauss", prepared.name_of(one))]
-    if not (wanted or lacking or ready):
+    if not (wanted or missing or ready):
         return
     against = find(case, system)
     for method in wanted:

@@ -2,7 +2,7 @@
 
 Newton's method on q̈(ξ, τ) = 0 for displacements ξ along the constraints and forces τ, with the exact derivatives of
 the accelerations; steps are halved until the accelerations decrease, and projected onto the constraints. Whether an
-equilibrium is stable is told by the eigenvalues of its linear model.
+equilibrium is stable follows from the eigenvalues of its linear model.
 """
 
 from collections.abc import Mapping

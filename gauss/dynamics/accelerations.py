@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +19,6 @@ from gauss.codegen import (
     fastcall,
     write,
 )
-from gauss.codegen.gpu.device_function import DeviceFunction
-from gauss.codegen.gpu.rows import RowsOnDevice
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
@@ -38,6 +37,9 @@ from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_refinement import refined, refined_once
 from gauss.dynamics.traced_system import FINITE, Program
 from gauss.system import State, System
+
+if TYPE_CHECKING:
+    from gauss.codegen.gpu.device_function import DeviceFunction
 
 NAME = "forward_dynamics"
 DOC = """Joint accelerations (n_v,) of a state under generalised forces, in machine code with an error check.
@@ -116,7 +118,7 @@ def forward_dynamics(system: System) -> Callable:
     return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
 
 
-def forward_dynamics_on_device(system: System, device: str) -> DeviceFunction:
+def forward_dynamics_on_device(system: System, device: str) -> "DeviceFunction":
     """Function (q, v, load, t=0.0) → q̈ of batches on a device; rows that fail the check are repeated on this CPU.
 
     Raises
@@ -124,6 +126,9 @@ def forward_dynamics_on_device(system: System, device: str) -> DeviceFunction:
     SimulationError
         If the system cannot be compiled as a whole, with the reasons.
     """
+    from gauss.codegen.gpu.device_function import DeviceFunction
+    from gauss.codegen.gpu.rows import RowsOnDevice
+
     laws = Laws(system)
     BATCHES.plan(Question(system, laws))
     limits = (ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE)

@@ -10,8 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
-from gauss.codegen.gpu.device_function import DeviceFunction
-from gauss.codegen.gpu.rows import RowsOnDevice
 from gauss.dynamics.acceleration_derivatives import acceleration_derivatives, inverse_dynamics_derivatives
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
@@ -273,6 +271,9 @@ def _function(system: System, requests, columns) -> _Traced:
 
 def _on_device(system: System, requests, columns, key, device: str) -> Callable:
     """Function of requests over rows on a device; its reasons to refuse a row are those of the function on this CPU."""
+    from gauss.codegen.gpu.device_function import DeviceFunction
+    from gauss.codegen.gpu.rows import RowsOnDevice
+
     function = _function(system, requests, columns)
     make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
     rows = cached_on_disk(system, (RowsOnDevice, *key, device), make)

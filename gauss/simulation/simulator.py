@@ -26,6 +26,7 @@ from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.held_inputs import HeldInputs, checked_inputs
+from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import steps_per_check
@@ -107,7 +108,7 @@ class Simulator:
         require(scene, (Scene, System), "Simulator")
         check_tolerances(step=step)
         whole = scene if isinstance(scene, Scene) else scene.scene
-        integrator = integrator or ("time_stepping" if whole.nonsmooth else "rk4")
+        integrator = integrator or usual_fixed_step(whole)
         with one_tier():
             problem = checked_problem(
                 scene, step, integrator, step, 1e-12, None, "auto", stabilisation, None, None, (), False

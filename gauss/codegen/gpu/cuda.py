@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen.gpu import dlpack
 from gauss.codegen.gpu.device import Lowered
-from gauss.codegen.gpu.ptx import LEAST_CAPABILITY, ptx
+from gauss.codegen.gpu.ptx import LEAST_CAPABILITY, ptx, refuse_libraries
 from gauss.codegen.gpu.thread_code import THREADS_PER_BLOCK, ThreadCode
 from gauss.errors import DeviceError, MissingPackageError
 
@@ -107,16 +107,22 @@ class CudaDevice:
         self.driver.call("cuCtxSetCurrent", self.context)
 
     def lowered(self, code: ThreadCode) -> Lowered:
-        """Thread code as PTX."""
-        return Lowered(code.name, ptx(code.gpu_text(), self.capability), code.is_array)
+        """Thread code as LLVM IR; PTX is made for the device at hand where the code is loaded."""
+        text = code.gpu_text()
+        refuse_libraries(text)
+        return Lowered(code.name, text, code.is_array)
 
     def program(self, lowered: Lowered) -> "CudaProgram":
         """Thread code, ready to run."""
         return CudaProgram(self, lowered)
 
     def view(self, given) -> "CudaView | None":
-        """An array of another library on a GPU, as it is; None if it is none."""
-        return CudaView(given) if hasattr(given, "__cuda_array_interface__") else None
+        """An array of another library on a GPU, as it is; None if it is none. What writes to it has ended."""
+        if not hasattr(given, "__cuda_array_interface__"):
+            return None
+        self.current()
+        self.driver.call("cuCtxSynchronize")
+        return CudaView(given)
 
     def put(self, array: np.ndarray) -> "CudaArray":
         """Copy of an array in the memory of the device."""
@@ -216,7 +222,7 @@ class CudaProgram:
     device : CudaDevice
         The GPU.
     lowered : Lowered
-        PTX.
+        The code.
 
     Raises
     ------
@@ -229,7 +235,7 @@ class CudaProgram:
         device.current()
         log = np.zeros(LOG_BYTES, dtype=np.uint8)
         options = [api.CUjit_option.CU_JIT_ERROR_LOG_BUFFER, api.CUjit_option.CU_JIT_ERROR_LOG_BUFFER_SIZE_BYTES]
-        text = lowered.text.encode() + b"\0"
+        text = ptx(lowered.text, device.capability).encode() + b"\0"
         try:
             self.module = device.driver.call("cuModuleLoadDataEx", text, 2, options, [log.ctypes.data, LOG_BYTES])
         except DeviceError as error:

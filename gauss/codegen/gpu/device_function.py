@@ -101,6 +101,6 @@ def _rows(name: str, given, size: int) -> np.ndarray:
 def _fitting(name: str, view: DeviceView, size: int) -> DeviceView:
     """Array of another library, if it can be read where it is."""
     fits = view.dtype == "<f8" and len(view.shape) == 2 and view.shape[1] == size
-    if not fits or any(step % 8 for step in view.strides):
+    if not fits or any(step % 8 or step < 0 for step in view.strides):
         raise StateError(f"{name}: expected doubles (n, {size}) on the device, got {view.dtype} of shape {view.shape}.")
     return view

@@ -29,7 +29,7 @@ from gauss.dynamics.contact.moreau_step import (
     is_impact,
     least_rate,
 )
-from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts
+from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts, confirmed
 from gauss.dynamics.contact.paradox import Paradox
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.store import cached
@@ -214,17 +214,7 @@ class FreeBodyStepper:
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         poses = self.table.poses(begun.bodies)
         near, overlaps = self.detection.find(poses, begun.bodies[9:12], reach, UNSEEN_OVERLAP)
-        if overlaps:
-            law, depth = overlaps[0]
-            raise SimulationError(
-                f"t = {state.t:.6g} s: shapes are {depth:.3g} m in each other, and no gap of "
-                f"{self.table.contacts[law].name!r} leads out; move them apart with scene.start, or shorten the step."
-            )
-        if not np.isfinite(near.J).all():
-            row = int(np.flatnonzero(~np.isfinite(near.J).all(axis=(1, 2, 3)))[0])
-            name = self.table.contacts[near.law[row]].name
-            raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
-        return near
+        return confirmed(near, overlaps, self.table, state.t)
 
     def _impacts(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:
         before, after = known[:, 0].T

@@ -35,7 +35,7 @@ from gauss.dynamics.contact.moreau_step import (
     is_impact,
     least_rate,
 )
-from gauss.dynamics.contact.near_contacts import NearContacts
+from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.dynamics.contact.paradox import Paradox, sliding, sliding_above, undetermined_sliding
 from gauss.dynamics.contact.shape_table import ShapeTable
@@ -319,17 +319,7 @@ class MechanismStepper:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         near, overlaps = self.detection.find(begun.terms.bodies, reach, UNSEEN_OVERLAP)
-        if overlaps:
-            law, depth = overlaps[0]
-            raise SimulationError(
-                f"t = {state.t:.6g} s: shapes are {depth:.3g} m in each other, and no gap of "
-                f"{self.table.contacts[law].name!r} leads out; move them apart with scene.start, or shorten the step."
-            )
-        if not np.isfinite(near.J).all():
-            row = int(np.flatnonzero(~np.isfinite(near.J).all(axis=(1, 2, 3)))[0])
-            name = self.table.contacts[near.law[row]].name
-            raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
-        return near
+        return confirmed(near, overlaps, self.table, state.t)
 
     def _rows(self, terms: MechanismTerms, near: NearContacts) -> _StepRows:
         g, m = len(self.others), near.gap.size

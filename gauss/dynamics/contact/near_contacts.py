@@ -8,6 +8,7 @@ import numpy as np
 from gauss.dynamics.contact.moreau_step import START_OVERLAP
 from gauss.dynamics.contact.pair_kernels import CYCLIC, PLACE, POSE, SIGNS, SIZES, PairKernels, pair_kernels
 from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
+from gauss.errors import SimulationError
 
 COLUMN = POSE + SIZES + 3  # pose and sizes of a part, centre of mass of its body
 # Rows of a column for each axis of a box that counts as its first, and those that distances depend on.
@@ -152,6 +153,27 @@ class ContactDetection:
         return NearContacts(
             key, table.law[first, second] - 1, bodies, found[0], found[1:4].T, J[:, 0, :, 3:6], J, found[52:].T
         )
+
+
+def confirmed(near: NearContacts, overlaps: list[Overlap], table: ShapeTable, t: float) -> NearContacts:
+    """Contacts of a state, whose shapes are not too deep in each other, and meet where they have normals.
+
+    Raises
+    ------
+    SimulationError
+        If they are, or do not: it names the contact.
+    """
+    if overlaps:
+        law, depth = overlaps[0]
+        raise SimulationError(
+            f"t = {t:.6g} s: shapes are {depth:.3g} m in each other, and no gap of {table.contacts[law].name!r} leads out; "
+            "move them apart with scene.start, or shorten the step."
+        )
+    sloped = np.isfinite(near.J).all(axis=(1, 2, 3))
+    if not sloped.all():
+        name = table.contacts[near.law[int(np.flatnonzero(~sloped)[0])]].name
+        raise SimulationError(f"t = {t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
+    return near
 
 
 def _joined(found: list[NearContacts]) -> NearContacts:

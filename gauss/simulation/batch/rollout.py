@@ -1,7 +1,6 @@
 """Batch of motions of one system: all steps in machine code, in the lanes of vector registers."""
 
 from numbers import Integral
-from typing import TypeVar
 
 import numpy as np
 
@@ -32,7 +31,6 @@ from gauss.system import State, System, refuse_changed
 
 ADAPTIVE = {method.name: method for method in EXPLICIT}
 LARGE_BATCH = 1_000_000  # steps of all motions that take about as long as optimising the code of a robot arm
-T = TypeVar("T")
 ADAPTIVE_STEPS = 100  # number of steps that an adaptive motion is taken to make
 
 

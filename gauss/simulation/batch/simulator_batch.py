@@ -18,6 +18,7 @@ from gauss.scene import Scene
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code
+from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.simulator import Simulator, SimulatorState, checked_count
 from gauss.simulation.tolerances import check_tolerances
 from gauss.system import State, System, retract
@@ -77,7 +78,7 @@ class SimulatorBatch:
         self.system = system = compile_scene(scene) if isinstance(scene, Scene) else scene
         whole, self.step_size, self.threads = system.scene, float(step), checked_count("threads", threads)
         self.inputs, self.output_names = tuple(whole.inputs), tuple(whole.outputs)
-        self.integrator = integrator or ("time_stepping" if whole.nonsmooth else "rk4")
+        self.integrator = integrator or usual_fixed_step(whole)
         if self.integrator not in STEPPED:
             raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(self.integrator, STEPPED)}")
         method = STEPPED[self.integrator]

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, TypeGuard
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, NativeFunction, Scalar, write
-from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, CheckedSwitch, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
@@ -18,6 +17,9 @@ from gauss.simulation.compiled_steps.momentum_form import MomentumForm
 from gauss.simulation.compiled_steps.projected_stages import ProjectedEquations, with_projected_stages
 from gauss.simulation.compiled_steps.taylor_step import taylor_step
 from gauss.system import State
+
+if TYPE_CHECKING:
+    from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 
 CONSISTENT = 1e-10  # largest residual, relative to the sizes of the constraints, of a state that satisfies them
 
@@ -168,14 +170,16 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     return Fixed(size, layout.row, step, project, program.point_check, method.evaluations, program.rates)
 
 
-def fixed_batch(program: Program, method: FixedStep, device: str | None = None) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+def fixed_batch(
+    program: Program, method: FixedStep, device: str | None = None
+) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
     """Machine code of a fixed-step method for a batch of motions, of this CPU or of a device."""
     return batch_loop(program, fixed(program, method), device=device)
 
 
 def batch_loop(
     program: Program, functions: Fixed, width: int | None = None, device: str | None = None
-) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
     """Machine code of a batch of motions; samples are coordinates, rates and work.
 
     Parameters
@@ -199,4 +203,6 @@ def batch_loop(
     begin, written, inputs = write(start, layout.size, name="start"), slice(1, layout.row), len(program.inputs)
     if device is None:
         return FixedStepBatchLoop(functions, begin, written, inputs, width)
+    from gauss.codegen.gpu.batches import DeviceFixedStepLoop
+
     return DeviceFixedStepLoop(device, functions, begin, written, inputs)

@@ -4,17 +4,21 @@ The method state is the contact forces of the last step, from which the solver o
 residual of the contact and friction laws so far.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from gauss import math
 from gauss.codegen import write
-from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop
 from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
 from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_steps.loop_functions import batch_loop
 from gauss.simulation.moreau.moreau_jean import KnownRates, time_step
+
+if TYPE_CHECKING:
+    from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 
 
 def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
@@ -69,7 +73,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
 
 def compiled_batch(
     stepper: MoreauStepper, program: Program, device: str | None = None
-) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
     """Machine code of a batch of motions: one after the other, for the contact problem is solved motion by motion."""
     return batch_loop(program, compiled_steps(stepper, program), width=1, device=device)
 
