@@ -27,7 +27,7 @@ from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.scene import ClosedGap, Stop
 from gauss.scene.losses import joint_factors
-from gauss.system import ContactMode, State, System, sides
+from gauss.system import ContactMode, State, System
 
 CONVERGED_STEP = 1e-14  # Newton step relative to the largest force
 CONVERGED_RESIDUAL = 1e-12  # residual of a force relative to the largest multiplier
@@ -35,6 +35,38 @@ LEAST_CONTRACTION = 0.1  # of Newton steps: an affine problem converges much fas
 ROUNDOFF_STEP = 1e-8  # Newton step relative to the largest force by round-off, above all of QP solvers
 MOST_ROUNDS = 20  # of Newton's method
 NOT_CONVERGED = "the forces of the links with losses did not converge."
+
+
+class ClosedStop(NamedTuple):
+    """Closed stop of a joint of one freedom: the row ± q̇ = 0.
+
+    Attributes
+    ----------
+    name : str
+        Name of the gap.
+    sign : float
+        The gap is sign · (q − bound).
+    bound : float
+        Coordinate of the stop [rad, m].
+    q, v : int
+        Places of the joint in q and v.
+    """
+
+    name: str
+    sign: float
+    bound: float
+    q: int
+    v: int
+
+
+def closed_stop(system: System, gap: ClosedGap) -> ClosedStop | None:
+    """Closed stop of a gap; None if its row is not constant."""
+    if not isinstance(gap.whole, Stop):
+        return None
+    placed, rate = system.coordinate(gap.whole.joint)
+    if rate is not None or placed.v.stop - placed.v.start != 1 or placed.q.stop - placed.q.start != 1:
+        return None
+    return ClosedStop(gap.name, *gap.whole.bounds[gap.index], placed.q.start, placed.v.start)
 
 
 class CutRows(NamedTuple):
@@ -50,8 +82,8 @@ class CutRows(NamedTuple):
         Jacobian of the rows, and generalised forces for Q = 1.
     units : ndarray, shape (m,)
         Forces of the scene along the driven joints [N m, N].
-    stops : dict of int to (int, float)
-        Place in q, and coordinate of the stop [rad, m], by place in v.
+    stops : tuple of ClosedStop
+        The closed stops among them.
     """
 
     names: tuple[str, ...]
@@ -59,7 +91,7 @@ class CutRows(NamedTuple):
     R: np.ndarray
     W: np.ndarray
     units: np.ndarray
-    stops: dict[int, tuple[int, float]]
+    stops: tuple[ClosedStop, ...]
 
     @property
     def ideal(self) -> bool:
@@ -67,34 +99,21 @@ class CutRows(NamedTuple):
         return np.array_equal(self.R, self.W)
 
 
-def cut_rows(system: System, whole: System, stops: Sequence[str], mode: ContactMode) -> CutRows:
+def cut_rows(system: System, whole: System, stops: Sequence[ClosedStop], mode: ContactMode) -> CutRows:
     """Rows of a phase to be cut: links with losses, with the directions of power flow of its mode, and closed stops."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if mode.power_flow.get(name) and name in places}
-    found, names = {side.name: side for side in sides(whole.scene)} if stops else {}, (*links, *stops)
+    names = (*links, *(stop.name for stop in stops))
     R, W = (np.zeros((len(names), system.n_v)) for _ in range(2))
     for k, (name, link) in enumerate(links.items()):
         for matrix, factors in ((R, link.acts_on), (W, joint_factors(link, mode.power_flow[name]))):
             for joint, factor in factors.items():
                 matrix[k, system.column(joint)] += factor
-    columns = [system.column(link.driven) for link in links.values()]
-    held = {}
-    for k, name in enumerate(stops, start=len(links)):
-        stop, joint = found[name].whole, system.joint(found[name].whole.joint)
-        sign, bound = stop.bounds[found[name].index]
-        R[k, joint.v] = W[k, joint.v] = sign
-        columns.append(joint.v.start)
-        held[joint.v.start] = joint.q.start, bound
+    for k, stop in enumerate(stops, start=len(links)):
+        R[k, stop.v] = W[k, stop.v] = stop.sign
+    columns = [*(system.column(link.driven) for link in links.values()), *(stop.v for stop in stops)]
     units = system.scale.energy / system.scale.coordinates[columns]
-    return CutRows(names, np.array([places[name] for name in names], dtype=int), R, W, units, held)
-
-
-def is_joint_stop(system: System, gap: ClosedGap) -> bool:
-    """Whether a gap is that of a stop of a joint of one freedom: its row is constant."""
-    if not isinstance(gap.whole, Stop):
-        return False
-    placed, rate = system.coordinate(gap.whole.joint)
-    return rate is None and placed.v.stop - placed.v.start == placed.q.stop - placed.q.start == 1
+    return CutRows(names, np.array([places[name] for name in names], dtype=int), R, W, units, tuple(stops))
 
 
 def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.ndarray:
@@ -261,7 +280,7 @@ class CutRowEngine(Engine):
         correction = -inverse @ (R @ found.acceleration)
         self.Q = self.Q + correction
         acceleration = found.acceleration + responses @ correction
-        acceleration[list(self.links.stops)] = 0.0  # without rounding, joints at stops stay there
+        acceleration[[stop.v for stop in self.links.stops]] = 0.0  # without rounding, joints at stops stay there
         return found._replace(acceleration=acceleration)
 
     def solution(self, state: State) -> tuple[Solution, np.ndarray]:
@@ -272,10 +291,9 @@ class CutRowEngine(Engine):
         """State after a step, projected onto the constraints."""
         if self.compiled is None or self.cut.closes or len(self.links.stops) < len(self.links.names):
             return project(self.system, state)
-        q, v, at_rest = state.q.copy(), state.v.copy(), list(self.links.stops)
-        v[at_rest] = 0.0
-        for place, bound in self.links.stops.values():
-            q[place] = bound
+        q, v = state.q.copy(), state.v.copy()
+        for stop in self.links.stops:
+            q[stop.q], v[stop.v] = stop.bound, 0.0
         same = np.array_equal(q, state.q) and np.array_equal(v, state.v)
         return state if same else replace(state, q=q, v=v)
 

@@ -16,7 +16,7 @@ from gauss.dynamics.assemble import assemble
 from gauss.dynamics.contact.mode_selection import ModeSelector, forces_of
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
-from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, cut_rows, is_joint_stop
+from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, closed_stop, cut_rows
 from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.engines.tiering import tiered
 from gauss.dynamics.gap_functions import margin_kernel
@@ -56,11 +56,12 @@ def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places
 
     def make() -> PhaseParts:
         system = build(phase_scene(whole.scene, names, mode, places), SystemDynamics())
-        stops = [gap.name for gap in sides(whole.scene) if gap.name in names and is_joint_stop(whole, gap)]
+        found = [closed_stop(whole, gap) for gap in sides(whole.scene) if gap.name in names]
+        stops = [stop for stop in found if stop is not None]
         links = cut_rows(system, whole, stops, mode)
         cut = None
         if stops:
-            others = phase_parts(whole, tuple(name for name in names if name not in stops), mode, places)
+            others = phase_parts(whole, tuple(name for name in names if name not in links.names), mode, places)
             cut = others.cut or others.system
         elif links.names:
             cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics())
