@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from gauss.bench.atlas import CASES
 from gauss.bench.atlas.case import HONEST, SILENT, SLOW, judged
-from gauss.bench.atlas.cases import CASES
 from gauss.bench.atlas.methods import METHODS
 from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.table import ResultTable
