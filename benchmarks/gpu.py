@@ -31,7 +31,7 @@ TITLES = ("scene", "work", "device", "one core of this CPU", "ratio", "per secon
 def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[dict], list[str]]:
     """Rows of all measurements."""
     import gauss
-    from gauss.codegen.gpu.cuda import device_names
+    from gauss.codegen.gpu.cuda_driver import device_names
     from gauss.codegen.gpu.devices import device as device_of
     from gauss.system import random_state
 

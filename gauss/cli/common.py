@@ -22,6 +22,7 @@ READS: dict[str, dict[str, object]] = {
     "stops": {"limits": "stops"},
     "resistance": {"resistance": True},
     "collisions": {"collisions": True},
+    "motors": {"motors": True},
     "contacts": {"contacts": True},
     "inertia": {"inertia": "as given"},
 }

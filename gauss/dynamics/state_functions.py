@@ -137,7 +137,7 @@ TERMS = {
 
 
 def state_function(
-    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None, device: str | None = None
+    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None, device=None
 ) -> Callable:
     """Compiled function of a state, or of several at once; see :meth:`gauss.System.function`.
 
@@ -164,6 +164,9 @@ def state_function(
     key = state_function, requests, columns, laws
     if device is None:
         return cached(system, key, lambda: _compiled(system, requests, columns, key))
+    from gauss.codegen.gpu.devices import device_name  # on demand: most systems stay on this CPU
+
+    device = device_name(device)
     return cached(system, (*key, device), lambda: _on_device(system, requests, columns, key, device))
 
 
@@ -278,7 +281,7 @@ def _on_device(system: System, requests, columns, key, device: str) -> Callable:
     make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
     rows = cached_on_disk(system, (RowsOnDevice, *key, device), make)
     own = cached(system, key, lambda: _compiled(system, requests, columns, key))
-    return DeviceFunction(rows, function.interface, own, function.name)
+    return DeviceFunction(rows, own, function.name)
 
 
 def _compiled(system: System, requests, columns, key) -> Callable:
