@@ -1,4 +1,4 @@
-"""Scenes of long runs, what of their momentum is conserved, and how a trend is told from noise."""
+"""Scenes of long runs, the conserved part of their momentum, and trends beside noise."""
 
 from collections.abc import Callable
 from typing import NamedTuple

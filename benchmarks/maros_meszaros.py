@@ -281,7 +281,7 @@ def _control(records: list[SolverRecord]) -> str:
 
 
 def _reasons(cells) -> list[str]:
-    """How many verdicts differ by the form of the problem, and how many do not; – where that cannot be told."""
+    """How many verdicts differ by the form of the problem, and how many do not; – where that is unknown."""
     if any(ours.get("as_published", "") == "" for ours, _ in cells):
         return ["–", "–"]
     agreed = [ours["as_published"] == theirs["kept"] for ours, theirs in cells if ours["kept"] != theirs["kept"]]

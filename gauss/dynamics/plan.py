@@ -94,7 +94,7 @@ def _by_accelerations(ask: Question) -> bool:
 
 
 def _beyond_accelerations(ask: Question) -> str:
-    """What needs the equations of motion beyond the accelerations of single states; empty if nothing does."""
+    """Reason why equations of motion are needed beyond accelerations of single states; empty if there is none."""
     method = ask.method
     if method is not None and (method.implicit if isinstance(method, Library) else method.mechanical):
         return f"integrator {method.name!r}"

@@ -254,7 +254,7 @@ class _Traced(NamedTuple):
 
 
 def _function(system: System, requests, columns) -> _Traced:
-    """What a function of requests is compiled from."""
+    """Traced function of requests, and its interface in Python."""
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
     limits = (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))

@@ -90,7 +90,7 @@ class LoadBuilder(SceneBuilder):
         return self.add(ElasticLink(name, name_of(driven), name_of(driver), ratio, **options))
 
     def start(self, joint, position=None, rate=0.0) -> Start:
-        """Say where a joint starts and how fast; saying it again replaces it.
+        """Set the initial position and rate of a joint; a second call replaces the first.
 
         Rates of ball and free joints are in the axes of the joint frame on the child, see :meth:`ball`.
         """

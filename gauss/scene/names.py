@@ -38,7 +38,7 @@ class SceneNames:
         return self.relations | self.contacts | self.set_valued
 
     def require_joint(self, name: str, what: str) -> "Joint":
-        """Return the joint of this name, or raise a SceneError that tells which joints exist."""
+        """Return the joint of this name, or raise a SceneError that names those that exist."""
         if name not in self.joints:
             raise SceneError(f"{what}: no joint {name!r}. {did_you_mean(name, self.joints)}")
         return self.joints[name]

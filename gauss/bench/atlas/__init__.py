@@ -1,4 +1,4 @@
-"""The stability atlas: where methods fail, and whether they say so."""
+"""The stability atlas: where methods fail, and whether they report it."""
 
 from gauss.bench.atlas.case import FailureCase
 from gauss.bench.atlas.instants import INSTANTS

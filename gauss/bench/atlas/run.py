@@ -76,6 +76,6 @@ def _cell(case: str, method: str, data) -> dict:
 def _row(reply: Reply) -> dict:
     if reply.outcome == "answered":
         return reply.value
-    # what raises anything but an error of gauss says that it fails, though not in words for users
+    # an exception that is no GaussError reports the failure, too, though not in words for users
     verdict = {"timed out": SLOW, "raised": HONEST, "crashed": SILENT}[reply.outcome]
     return {"verdict": verdict, "figure": np.nan, "seconds": np.nan, "words": reply.reason}

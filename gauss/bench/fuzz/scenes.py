@@ -1,6 +1,6 @@
 """Random scenes to be moved: a tree, a chain or loops, with a few elements of any kind put on them.
 
-A scene is told by a seed and its number, so that each can be made again by itself, also without some of its elements.
+A scene is given by a seed and its number, so that each can be made again by itself, also without some of its elements.
 """
 
 from collections.abc import Callable
