@@ -36,6 +36,7 @@ from gauss.dynamics.conditions import (
     explicit,
     few_bodies,
     few_contact_operations,
+    few_loops,
     has_contacts,
     large_loops,
     large_tree,
@@ -195,6 +196,12 @@ ACCELERATIONS = RuleTable((*_of_states(), Rule("state", "certified")), _refused_
 DERIVATIVES = RuleTable(
     (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),
     lambda ask, why: f"scene {ask.system.scene.name!r} cannot be differentiated: {why}.",
+)
+
+# Code of other languages.
+EXPORTS = RuleTable(
+    (Rule("state", "compiled", conditions=(compilable, traced_laws, few_loops)),),
+    lambda ask, why: f"scene {ask.system.scene.name!r} cannot be exported: {why}.",
 )
 
 
