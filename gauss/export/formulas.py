@@ -196,7 +196,8 @@ def latex_document(system: System | Scene, names: Sequence[str] | None = None) -
         import sympy
     require(system, (System, Scene), "export")
     system = compile_scene(system) if isinstance(system, Scene) else system
-    shown, values = [], {}
+    shown: list = []
+    values: dict = {}
     for name in names or _equations(system):
         found = to_sympy(system, name)
         used = set().union(*(one.free_symbols for one in found.results.values()))
