@@ -6,7 +6,7 @@ Q on the driven joint, −f Q on the driver (Rotor chains, section 6). With the 
 compulsion with the further load (W − Rᵀ) Q, where Q = −λ is the multiplier.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -106,14 +106,19 @@ def cut_rows(system: System, whole: System, stops: Sequence[ClosedStop], mode: C
     names = (*links, *(stop.name for stop in stops))
     R, W = (np.zeros((len(names), system.n_v)) for _ in range(2))
     for k, (name, link) in enumerate(links.items()):
-        for matrix, factors in ((R, link.acts_on), (W, joint_factors(link, mode.power_flow[name]))):
-            for joint, factor in factors.items():
-                matrix[k, system.column(joint)] += factor
+        _add_factors(R[k], system, link.acts_on)
+        _add_factors(W[k], system, joint_factors(link, mode.power_flow[name]))
     for k, stop in enumerate(stops, start=len(links)):
         R[k, stop.v] = W[k, stop.v] = stop.sign
     columns = [*(system.column(link.driven) for link in links.values()), *(stop.v for stop in stops)]
     units = system.scale.energy / system.scale.coordinates[columns]
     return CutRows(names, np.array([places[name] for name in names], dtype=int), R, W, units, tuple(stops))
+
+
+def _add_factors(row: np.ndarray, system: System, factors: Mapping[str, float]):
+    """Add factors of joint rates to a row (n_v,)."""
+    for joint, factor in factors.items():
+        row[system.column(joint)] += factor
 
 
 def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.ndarray:
