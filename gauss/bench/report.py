@@ -82,8 +82,9 @@ def _problems(rows) -> list[str]:
 def _errors(rows) -> list[str]:
     problems = [name for group, names in groups(rows).items() if group != INCONSISTENT for name in names]
     cells = cells_shown(rows)
+    forms = sorted({row["form"] for row in cells.values()} - {OWN}) or [MAIN_FORM]
     lines = [
-        f"## Errors, {MAIN_FORM}, level {MAIN_LEVEL}",
+        f"## Errors, {', '.join(forms)}, level {MAIN_LEVEL}",
         "",
         "In brackets: not certified. Bold: claimed, beyond. –: refused, or no finite "
         f"answer; {compiled.NAME}, which has no certificate: errors of joints alone. Kept: residuals are within the "

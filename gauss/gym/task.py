@@ -42,7 +42,8 @@ class Task:
     Raises
     ------
     ArgumentError
-        If the scene has no inputs, or one without limits, or the step does not divide the time of an action.
+        If the scene has no inputs, or one without limits, a time is not positive, or the step does not divide that of an
+        action.
     """
 
     scene: Scene
@@ -60,6 +61,9 @@ class Task:
         for given in self.scene.inputs.values():
             if given.limits is None:
                 raise ArgumentError(f"task: input {given.name!r} has no limits; actions need them.")
+        for name in ("rate", "duration", "step"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ArgumentError(f"task: {name}: expected a positive number, got {getattr(self, name)!r}.")
         if self.hold < 1 or abs(self.hold * self.step * self.rate - 1.0) > 1e-9:
             raise ArgumentError(f"task: the step of {self.step} s does not divide the time of an action, {1 / self.rate} s.")
 

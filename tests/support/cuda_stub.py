@@ -168,10 +168,10 @@ def check_fork(f, q, v):
 
 def main():
     """All checks; contexts are left as they were, and nothing stays on a device."""
-    cuda_ptx = cuda.ptx
-    cuda.ptx = lambda ir_text, capability: cuda_ptx(ir_text, capability) if ir_text else "nothing"
+    cuda_ptx, patched = cuda.ptx, cast(Any, cuda)
+    patched.ptx = lambda text, capability: cuda_ptx(text, capability) if text else "nothing"
     stub.stub_launch(launch)
-    devices.CudaDevice = Recorded  # type: ignore[misc]  # a class in place of a class
+    cast(Any, devices).CudaDevice = Recorded
     assert device_names() == ["stub 0", "stub 1"]
     system = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5]))
     q, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 300, 3))
