@@ -1,4 +1,4 @@
-"""Figure of a motion under servos: efforts, work, residuals of the relations, and the distance from singular configurations."""
+"""Figure of a motion under servos: efforts, work, residuals, and the distance from singular configurations."""
 
 import numpy as np
 from matplotlib.figure import Figure
