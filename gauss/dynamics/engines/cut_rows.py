@@ -104,21 +104,24 @@ def cut_rows(system: System, whole: System, stops: Sequence[ClosedStop], mode: C
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if mode.power_flow.get(name) and name in places}
     names = (*links, *(stop.name for stop in stops))
-    R, W = (np.zeros((len(names), system.n_v)) for _ in range(2))
-    for k, (name, link) in enumerate(links.items()):
-        _add_factors(R[k], system, link.acts_on)
-        _add_factors(W[k], system, joint_factors(link, mode.power_flow[name]))
-    for k, stop in enumerate(stops, start=len(links)):
-        R[k, stop.v] = W[k, stop.v] = stop.sign
+    held = [{stop.v: stop.sign} for stop in stops]
+    R = _matrix(system, [_places(system, link.acts_on) for link in links.values()] + held)
+    W = _matrix(system, [_places(system, joint_factors(link, mode.power_flow[name])) for name, link in links.items()] + held)
     columns = [*(system.column(link.driven) for link in links.values()), *(stop.v for stop in stops)]
     units = system.scale.energy / system.scale.coordinates[columns]
     return CutRows(names, np.array([places[name] for name in names], dtype=int), R, W, units, tuple(stops))
 
 
-def _add_factors(row: np.ndarray, system: System, factors: Mapping[str, float]):
-    """Add factors of joint rates to a row (n_v,)."""
-    for joint, factor in factors.items():
-        row[system.column(joint)] += factor
+def _places(system: System, factors: Mapping[str, float]) -> dict[int, float]:
+    """Factors by place in v instead of joint."""
+    return {system.column(joint): factor for joint, factor in factors.items()}
+
+
+def _matrix(system: System, rows: Sequence[Mapping[int, float]]) -> np.ndarray:
+    matrix = np.zeros((len(rows), system.n_v))
+    for k, row in enumerate(rows):
+        matrix[k, list(row)] = list(row.values())
+    return matrix
 
 
 def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.ndarray:

@@ -60,8 +60,7 @@ def with_extras(
         Of damping and friction that are left out, of limits that leave no motion, and of collision shapes and transmissions
         that are not modelled.
     """
-    if limits not in (None, *LIMITS):
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
+    _require_known(path, limits)
     source, left = guarded(path), []
     joints = [joint for joint in source.root.findall("joint") if joint.get("name") in scene.joints]
     if limits:
@@ -78,6 +77,11 @@ def with_extras(
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
     return scene
+
+
+def _require_known(path: Path, limits: str | None):
+    if limits not in (None, *LIMITS):
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
 
 
 def _named(text: str, names: Iterable[str | None]) -> list[str]:
