@@ -19,6 +19,7 @@ from gauss.codegen.ldlt import LDLT, least_degree
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.optimiser import one_tier
 from gauss.codegen.outlining import fresh_symbols, outlined
+from gauss.codegen.python_callback import PythonCallback, Receiver, callbacks_are_available
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
 from gauss.codegen.schedule import schedule
@@ -52,7 +53,9 @@ __all__ = [
     "Lanes",
     "NativeFunction",
     "POINTER",
+    "PythonCallback",
     "PythonWrapper",
+    "Receiver",
     "ROW",
     "Scalar",
     "Series",
@@ -60,6 +63,7 @@ __all__ = [
     "as_number",
     "batch_code",
     "branches",
+    "callbacks_are_available",
     "compile_notice",
     "constant_array",
     "content_digest",
