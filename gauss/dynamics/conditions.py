@@ -105,9 +105,14 @@ def few_bodies(ask: Question) -> list[str]:
     return [f"it has more than {LARGE_TREE_BODIES} bodies"] if is_large(ask.system) else []
 
 
+def few_loops(ask: Question) -> list[str]:
+    """The loops are few enough for straight-line code."""
+    return ["its loops are too many for straight-line code"] if has_large_loops(ask.system) else []
+
+
 def written_out(ask: Question) -> list[str]:
     """The tree and its loops are small enough for straight-line code."""
-    return few_bodies(ask) + (["its loops are too many for straight-line code"] if has_large_loops(ask.system) else [])
+    return few_bodies(ask) + few_loops(ask)
 
 
 def narrow(ask: Question) -> list[str]:

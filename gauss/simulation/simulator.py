@@ -135,7 +135,7 @@ class Simulator:
             warn_of_short_features(whole.name, problem.laws, self.step_size)
             problem = problem._replace(switching=Switching())
             self._run = run = _run_of(problem, plan.dynamics)
-            self._loop = run.prepared().entry
+            self._loop: Any = run.prepared().entry  # machine code, or steps that are called as it is
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
         n_u = len(self.inputs)
@@ -149,7 +149,7 @@ class Simulator:
 
     def _bind(self):
         """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
-        self._given = self._run.arrays(self._point, self._confirmed, self._grid, self._out)
+        self._given: tuple = self._run.arrays(self._point, self._confirmed, self._grid, self._out)
         self._times = self._grid[:, 0]
 
     def reset(self, state: State | None = None, *, seed: int | None = None, spread: float = 0.05) -> State:
@@ -225,7 +225,8 @@ class Simulator:
         if given is None or given.shape != self._u.shape or not isfinite(given @ given):
             given = checked_inputs(u, self.inputs, self.t)
         self._u[:] = given
-        if self._run.method.starts_from_accelerations:  # its method state holds those under the inputs before
+        if isinstance(self._run, CompiledFixedRun) and self._run.method.starts_from_accelerations:
+            # its method state holds the accelerations under the inputs before
             point = self._layout.point(self._point)
             rates = self._run.evaluated(point.state)
             self._point[:] = self._layout.pack(replace(point, rates=rates, method_state=rates.acceleration), self._u.copy())

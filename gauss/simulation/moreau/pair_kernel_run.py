@@ -90,7 +90,7 @@ class PairKernelRun(PythonRun):
         """Points of fixed steps; samples between them are the ends of separate shorter steps."""
         pairs = grid_of(method, point.state.t, self.end, self.h, samples, self.switching)
         self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.h)
-        holds = {}
+        holds: dict[int, int] = {}
         if self.held is not None:
             pairs, holds = with_samples(pairs, self.held.times[1:], self.h, samples is None)
             holds[0] = 0
@@ -106,7 +106,7 @@ class PairKernelRun(PythonRun):
                     point, done, self.steps = reached, done + 1, self.steps + 1
                     if point.state.t >= self.end:
                         self.stepper.check(point.state)
-                    yield point, lambda t, begin=begin: self.motion.beside(*begin, t)
+                    yield point, lambda t, state=begin[0], work=begin[1]: self.motion.beside(state, work, t)
 
     def _hold(self, k: int):
         """Set the inputs of a sample of the control law, at the present state."""
