@@ -142,11 +142,14 @@ class Simulator:
         self._u = self._point[run.layout.size - n_u :]
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
-        self._begun, self._steps = 0.0, 0
+        self._begun, self._steps, self._methods = 0.0, 0, (integrator, stabilisation)
         self._switches, self._warned = bool(run.program.watch), False
         self._measure: Kernel | None = None
         self._bind()
         self.reset()
+
+    def __reduce__(self):
+        return _again, ((self.system, self.step_size, *self._methods), self.snapshot())
 
     def _bind(self):
         """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
@@ -324,6 +327,13 @@ class Simulator:
         ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
         self._begun, self._steps = snapshot.begun, snapshot.steps
         self._run.take(snapshot.contacts)
+
+
+def _again(given: tuple, snapshot: SimulatorState) -> Simulator:
+    """Simulator of the same arguments in the same state, in another process."""
+    simulator = Simulator(*given)
+    simulator.restore(snapshot)
+    return simulator
 
 
 def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSteps:
