@@ -15,7 +15,7 @@ from gauss.scene.degrees import warn_of_start
 from gauss.scene.elastic import ElasticLink
 from gauss.scene.inputs import SENSORS, Input, InputBuilder, Output
 from gauss.scene.joint import Coupling, Joint
-from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
+from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start, StateLaw
 from gauss.scene.motions import Prescribed
 from gauss.scene.relation import Relation
 from gauss.scene.set_valued import LimitedDrive, SetValued
@@ -239,6 +239,50 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
     def elastic_link(self, name: str, driven, driver, ratio: float = 1.0, **options) -> ElasticLink:
         """Put a spring and damper, with or without backlash, between two joints; see :class:`gauss.scene.ElasticLink`."""
         return self.add(ElasticLink(name, name_of(driven), name_of(driver), ratio, **options))
+
+    def state(self, name: str, rate, start: float = 0.0, breaks=()) -> StateLaw:
+        """Add a state x of your own with the law ẋ = rate: a controller, a current, a muscle, a bristle.
+
+        Laws read it as ``motion.rate(name)``, and its integral over time as ``motion.coordinate(name)``; a trajectory,
+        outputs of the kind "rate" and linear models have it under its name. It is integrated with the motion, by every
+        method and on every route. An input that acts on it, ``scene.input("u", {name: factor})``, adds factor · u to ẋ.
+
+        Parameters
+        ----------
+        name : str
+            Name of the state; no joint has it.
+        rate : float or callable
+            Its time derivative: a constant, law(t) or law(t, motion), as of a drive.
+        start : float
+            Value at the start.
+        breaks : sequence of float
+            Times at which the law switches [s], for one that cannot be traced.
+
+        Returns
+        -------
+        StateLaw
+            What was added, the law of a joint of this name: gauss integrates x as the rate of a body with a moment of
+            inertia of 1 kg m² beside the mechanism, which acts on nothing. Energies leave it out.
+
+        Examples
+        --------
+        >>> import gauss
+        >>> scene = gauss.load("pendulum")
+        >>> scene.state("filtered", lambda t, at: (at.rate("A") - at.rate("filtered")) / 0.1).joint
+        'filtered'
+        """
+        law = StateLaw(f"rate of {values.text(name, 'name of a state')}", name, rate, None, breaks)
+        self._require_new(name, "state", self.joints | self.couplings | self._constraints)
+        self._require_new(law.name, "state", self.loads | self._constraints | self.inputs)
+        body = self.body(f"state {name}", 0.0, (1.0, 1.0, 1.0), inertia_as_given=True)
+        self.revolute(name, GROUND, body)
+        self.start(name, rate=values.number(start, f"state {name!r}: start", "1"))
+        return self.add(law)
+
+    @property
+    def states(self) -> dict[str, StateLaw]:
+        """States of one's own by name, see :meth:`state`."""
+        return {load.joint: load for load in self.loads.values() if isinstance(load, StateLaw)}
 
     def start(self, joint, position=None, rate=0.0) -> Start:
         """Say where a joint starts and how fast; saying it again replaces it.
