@@ -220,19 +220,16 @@ def linearise(
 def _without_integrals(system: System, C, places, A, B, N, states):
     """The model without the integrals over time of states of one's own on which nothing depends; states have their names."""
     own = system.scene.states
-    integrals = [k for k, place in enumerate(places) if system.coordinates[place] in own]
-    unused = {k for k in integrals if not A[:, k].any() and not C[:, k].any()}
-    kept = [k for k in range(len(A)) if k not in unused]
-    moved = [k for k in range(len(places)) if k not in unused]
-    names = {f"{name} rate": name for name in own} | {name: f"integral of {name}" for name in own}
-    return (
-        C[:, kept],
-        [places[k] for k in moved],
-        A[np.ix_(kept, kept)],
-        B[kept],
-        N[:, moved],
-        tuple(names.get(states[k], states[k]) for k in kept),
+    used = A.any(axis=0) | C.any(axis=0)
+    integrals = np.array(
+        [system.coordinates[place] in own for place in places] + [False] * (len(A) - len(places)), dtype=bool
     )
+    kept = used | ~integrals
+    moved = kept[: len(places)]
+    names = {f"{name} rate": name for name in own} | {name: f"integral of {name}" for name in own}
+    named = tuple(names.get(name, name) for name in np.array([*states, None], dtype=object)[:-1][kept])
+    left = [place for place, is_kept in zip(places, moved, strict=True) if is_kept]
+    return C[:, kept], left, A[np.ix_(kept, kept)], B[kept], N[:, moved], named
 
 
 def _described_by(system: System, N: np.ndarray, independent) -> np.ndarray:
@@ -273,11 +270,7 @@ def _input_slope(system: System, state: State, place: int) -> np.ndarray:
 def _output_rows(system: System, state: State, outputs, places, load):
     """∂y/∂(ξ, v, q̈) (p, 3 n_v), its part of q̈, and the names."""
     known, n = system.scene.outputs, system.n_v
-    names = (
-        outputs
-        if outputs is not None
-        else (tuple(known) or tuple(one for p in places if (one := system.coordinates[p]) not in system.scene.states))
-    )
+    names = _default_outputs(system, places) if outputs is None else outputs
     names = (names,) if isinstance(names, str) else tuple(names)
     own = system.accelerations(state, load)
     rows, labels = [], []
@@ -293,6 +286,12 @@ def _output_rows(system: System, state: State, outputs, places, load):
         labels.append(name)
     whole = np.concatenate(rows) if rows else np.zeros((0, 3 * n))
     return whole, whole[:, 2 * n :], tuple(labels)
+
+
+def _default_outputs(system: System, places) -> tuple[str, ...]:
+    """Outputs of the scene, or independent coordinates where it has none."""
+    coordinates = (system.coordinates[place] for place in places)
+    return tuple(system.scene.outputs) or tuple(name for name in coordinates if name not in system.scene.states)
 
 
 def _slopes_of(system: System, state: State, own: np.ndarray, output) -> np.ndarray:
