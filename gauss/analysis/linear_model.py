@@ -273,7 +273,7 @@ def _output_rows(system: System, state: State, outputs, places, load):
     names = _default_outputs(system, places) if outputs is None else outputs
     names = (names,) if isinstance(names, str) else tuple(names)
     own = system.accelerations(state, load)
-    rows, labels = [], []
+    rows, labels = [], list[str]()
     for name in names:
         if name in known:
             found = _slopes_of(system, state, own, known[name])

@@ -159,9 +159,9 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 
 def few_contact_operations(ask: Question) -> list[str]:
-    """The gap functions of contacts are short enough to be written out, or inputs are held, which no kernel of pairs has."""
+    """The gap functions of contacts are short enough to be written out."""
     scene = ask.system.scene
-    if ask.held or not shapes_in_contact(ask):
+    if not shapes_in_contact(ask):
         return []
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
     work = sum(_operations(scene.shapes[one.shape], scene.shapes[one.other]) for one in contacts)
@@ -186,7 +186,7 @@ def takes_pair_kernels(ask: Question) -> list[str]:
     system, scene = ask.system, ask.system.scene
     touching = {name for one in scene.contacts.values() if isinstance(one, Contact) for name in (one.shape, one.other)}
     found = [f"{name!r} has no radius" for name in sorted(touching) if _is_sharp(scene.shapes[name])]
-    if are_free_in_contact(system):
+    if are_free_in_contact(system) and not ask.held:
         return found
     if not system.Phi.any() or system.dynamics is None:
         found.append("it was built without machine code")

@@ -137,7 +137,7 @@ TERMS = {
 
 
 def state_function(
-    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None, device: str | None = None
+    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None, device=None
 ) -> Callable:
     """Compiled function of a state, or of several at once; see :meth:`gauss.System.function`.
 
@@ -155,6 +155,9 @@ def state_function(
     key = state_function, requests, columns, laws
     if device is None:
         return cached(system, key, lambda: _compiled(system, requests, columns, key))
+    from gauss.codegen.gpu.devices import device_name  # on demand: most systems stay on this CPU
+
+    device = device_name(device)
     return cached(system, (*key, device), lambda: _on_device(system, requests, columns, key, device))
 
 
@@ -273,7 +276,7 @@ class _Traced(NamedTuple):
 
 
 def _function(system: System, requests, columns) -> _Traced:
-    """What a function of requests is compiled from."""
+    """Traced function of requests, and its interface in Python."""
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
     limits = (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))
@@ -300,7 +303,7 @@ def _on_device(system: System, requests, columns, key, device: str) -> Callable:
     make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
     rows = cached_on_disk(system, (RowsOnDevice, *key, device), make)
     own = cached(system, key, lambda: _compiled(system, requests, columns, key))
-    return DeviceFunction(rows, function.interface, own, function.name)
+    return DeviceFunction(rows, own, function.name)
 
 
 def _compiled(system: System, requests, columns, key) -> Callable:
