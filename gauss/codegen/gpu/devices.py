@@ -6,7 +6,7 @@ from functools import cache
 from gauss.codegen.gpu.cuda import CudaDevice
 from gauss.codegen.gpu.device import Device
 from gauss.codegen.gpu.lane_by_lane import LaneByLane
-from gauss.errors import ArgumentError
+from gauss.errors import ArgumentError, DeviceError
 
 SINGLE = "float32"
 NAME = re.compile(rf"(?:cuda(?::(?P<number>\d{{1,3}}))?|(?P<lanes>lanes))(?P<single> {SINGLE})?")
@@ -43,6 +43,27 @@ def device_name(given) -> str:
 def is_single(name: str) -> bool:
     """Whether a name asks for single precision."""
     return name.endswith(SINGLE)
+
+
+def double_precision(given) -> str:
+    """Name of devices that move motions, which are checked to more digits than single precision has.
+
+    Parameters
+    ----------
+    given : str or sequence of str
+        As of :func:`device_name`.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no such name.
+    DeviceError
+        If it asks for single precision.
+    """
+    name = device_name(given)
+    if is_single(name):
+        raise DeviceError(f"device {name!r}: motions are in double precision; functions of a state take {SINGLE!r}.")
+    return name
 
 
 def devices(name: str) -> tuple[Device, ...]:
