@@ -14,6 +14,7 @@ import numpy as np
 
 import gauss
 
+OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "SPRING", "DAMPER", "PASSIVE", "ACTUATION", "CLAMPCTRL", "SENSOR")  # of MuJoCo
 PEERS: dict[str, Callable] = {}
 Work = dict[str, tuple[Callable[[], object], int]]  # what is run, and evaluations or steps of a motion in it
 
@@ -53,9 +54,9 @@ def _model(scene: gauss.Scene, step: float):
     spec.compiler.fusestatic = True
     model = spec.compile()
     model.opt.timestep, model.opt.integrator = step, mujoco.mjtIntegrator.mjINT_RK4
-    kept = {"mjDSBL_GRAVITY"} | ({"mjDSBL_CONSTRAINT", "mjDSBL_EQUALITY"} if model.neq else set())
+    off = OFF if model.neq else (*OFF, "CONSTRAINT", "EQUALITY")
     for name, bit in mujoco.mjtDisableBit.__members__.items():
-        if name.startswith("mjDSBL_") and name not in kept:
+        if name.removeprefix("mjDSBL_") in off:
             model.opt.disableflags |= int(bit)
     return model
 

@@ -286,3 +286,5 @@ def test_arrays_are_lent_until_they_are_given_back():
     assert np.array_equal(taken, given) and np.shares_memory(taken, given) and len(dlpack._lent) == kept + 1
     del taken
     assert len(dlpack._lent) == kept
+    Lent(given).__dlpack__()  # that nobody takes
+    assert len(dlpack._lent) == kept
