@@ -1,4 +1,4 @@
-"""What of an installation works: environment, processor, machine code, cache, solvers, optional packages."""
+"""State of an installation: environment, processor, machine code, cache, solvers, optional packages."""
 
 import os
 import time

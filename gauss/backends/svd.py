@@ -9,7 +9,7 @@ tells undetermined multipliers from undetermined accelerations.
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.equilibrate import equilibrate
+from gauss.backends.kkt import equilibrate
 from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.rank import KKT_RANK, numerical_rank
 from gauss.backends.recursion import Recursion

@@ -6,10 +6,11 @@ from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.device_module import DeviceModule, vector_width
 from gauss.codegen.disk_cache import from_disk, is_noted, note
 from gauss.codegen.emit import Writer, straight_line
-from gauss.codegen.expression import Entry, Expression, Graph, Scalar, as_number, graph_of, reachable
+from gauss.codegen.expression import Entry, Expression, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
+from gauss.codegen.graph import Graph
 from gauss.codegen.intrinsics import copy, external, intrinsic
 from gauss.codegen.ir_blocks import BODY, POINTER, Buffers, constant_array, counted_loop, endless_loop
 from gauss.codegen.kernel import Kernel, trace

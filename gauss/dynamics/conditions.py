@@ -103,9 +103,14 @@ def few_bodies(ask: Question) -> list[str]:
     return [f"it has more than {LARGE_TREE_BODIES} bodies"] if is_large(ask.system) else []
 
 
+def few_loops(ask: Question) -> list[str]:
+    """The loops are few enough for straight-line code."""
+    return ["its loops are too many for straight-line code"] if has_large_loops(ask.system) else []
+
+
 def written_out(ask: Question) -> list[str]:
     """The tree and its loops are small enough for straight-line code."""
-    return few_bodies(ask) + (["its loops are too many for straight-line code"] if has_large_loops(ask.system) else [])
+    return few_bodies(ask) + few_loops(ask)
 
 
 def narrow(ask: Question) -> list[str]:
@@ -154,9 +159,9 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 
 def few_contact_operations(ask: Question) -> list[str]:
-    """The gap functions of contacts are short enough to be written out, or inputs are held, which no kernel of pairs has."""
+    """The gap functions of contacts are short enough to be written out."""
     scene = ask.system.scene
-    if ask.held or not shapes_in_contact(ask):
+    if not shapes_in_contact(ask):
         return []
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
     work = sum(_operations(scene.shapes[one.shape], scene.shapes[one.other]) for one in contacts)
@@ -181,7 +186,7 @@ def takes_pair_kernels(ask: Question) -> list[str]:
     system, scene = ask.system, ask.system.scene
     touching = {name for one in scene.contacts.values() if isinstance(one, Contact) for name in (one.shape, one.other)}
     found = [f"{name!r} has no radius" for name in sorted(touching) if _is_sharp(scene.shapes[name])]
-    if are_free_in_contact(system):
+    if are_free_in_contact(system) and not ask.held:
         return found
     if not system.Phi.any() or system.dynamics is None:
         found.append("it was built without machine code")

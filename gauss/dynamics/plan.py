@@ -36,6 +36,7 @@ from gauss.dynamics.conditions import (
     explicit,
     few_bodies,
     few_contact_operations,
+    few_loops,
     has_contacts,
     large_loops,
     large_tree,
@@ -94,7 +95,7 @@ def _by_accelerations(ask: Question) -> bool:
 
 
 def _beyond_accelerations(ask: Question) -> str:
-    """What needs the equations of motion beyond the accelerations of single states; empty if nothing does."""
+    """Reason why equations of motion are needed beyond accelerations of single states; empty if there is none."""
     method = ask.method
     if method is not None and (method.implicit if isinstance(method, Library) else method.mechanical):
         return f"integrator {method.name!r}"
@@ -113,7 +114,7 @@ def _both(one: Callable[[Question], bool], other: Callable[[Question], bool]) ->
 _CODE = own_backend, compilable
 _WHOLE = *_CODE, written_out, traced_laws, narrow
 _STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
-_PAIR_KERNELS = own_backend, no_held_inputs, smooth(traced_laws), takes_pair_kernels
+_PAIR_KERNELS = own_backend, smooth(traced_laws), takes_pair_kernels
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
 _KERNEL_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
@@ -195,6 +196,12 @@ ACCELERATIONS = RuleTable((*_of_states(), Rule("state", "certified")), _refused_
 DERIVATIVES = RuleTable(
     (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),
     lambda ask, why: f"scene {ask.system.scene.name!r} cannot be differentiated: {why}.",
+)
+
+# Code of other languages.
+EXPORTS = RuleTable(
+    (Rule("state", "compiled", conditions=(compilable, traced_laws, few_loops)),),
+    lambda ask, why: f"scene {ask.system.scene.name!r} cannot be exported: {why}.",
 )
 
 

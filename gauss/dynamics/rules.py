@@ -105,7 +105,7 @@ class Plan:
 
 
 class Question(NamedTuple):
-    """What is to be computed: the facts that conditions of rules are evaluated on.
+    """Facts on which the conditions of rules are evaluated.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ class Question(NamedTuple):
 
 
 class Asked(Protocol):
-    """What every question of a table says."""
+    """Facts that every table of rules needs."""
 
     @property
     def stabilisation(self) -> str:

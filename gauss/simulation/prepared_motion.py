@@ -97,10 +97,11 @@ class PreparedMotion:
         """
         try:
             self._q[:], self._v[:] = self._origin.q if q is None else q, self._origin.v if v is None else v
-        except (TypeError, ValueError) as error:
-            raise StateError(
-                f"expected {self._q.size} coordinates and {self._v.size} rates, got {q!r} and {v!r}."
-            ) from error
+            fits = (q is None or len(q) == self._q.size) and (v is None or len(v) == self._v.size)  # numpy repeats a number
+        except (TypeError, ValueError):
+            fits = False
+        if not fits:
+            raise StateError(f"expected {self._q.size} coordinates and {self._v.size} rates, got {q!r} and {v!r}.")
         if not self._is_done():
             found = self.trajectory(self._q.copy(), self._v.copy())
             return found.q, found.v

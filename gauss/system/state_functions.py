@@ -185,14 +185,16 @@ class StateFunctions:
         ----------
         *parameters : str
             "mass:body" (1), "com:body" (3) in the body frame, "inertia:body" (6: xx, yy, zz, xy, xz, yz) about the centre of
-            mass in the axes of the body frame, "gravity" (3); any number of a load, as "stiffness:spring" (1); of trees,
-            lengths: "parent_at:joint" and "child_at:joint" (3), the joint point in the frame of either body.
+            mass in the axes of the body frame, "gravity" (3); any number of a load, as "stiffness:spring" (1); lengths:
+            "parent_at:joint" and "child_at:joint" (3), the joint point in the frame of either body.
 
         Returns
         -------
         callable
             An array (…, n_v, k) for each parameter of k values, at fixed coordinates and rates; with loops along the
-            constraints. Those of inverse dynamics, the regressor, are ``function("inverse_dynamics_by:mass:body", …)``.
+            constraints. A length that changes opens its loops: where coordinates and rates follow, ∂q̈/∂q dq + ∂q̈/∂v dv of
+            :attr:`acceleration_derivatives` is to be added. Those of inverse dynamics, the regressor, are
+            ``function("inverse_dynamics_by:mass:body", …)``.
 
         Raises
         ------

@@ -8,6 +8,7 @@ import ctypes
 import multiprocessing
 import re
 import threading
+from typing import Any, cast
 
 import numpy as np
 from cuda.bindings import driver
@@ -97,13 +98,13 @@ def refused(action, *words: str):
 
 
 def check_batches(system, q, v):
-    run = {"steps": 20, "step": 1e-3, "every": 10}
+    run: dict[str, Any] = {"steps": 20, "step": 1e-3, "every": 10}
     here = gauss.rollout(system, q, v, **run)
     for device in ("cuda", "cuda:1", ["cuda:0", "cuda:1"]):
         used.clear()
         assert np.array_equal(gauss.rollout(system, q, v, device=device, **run).q, here.q)
         assert set(used) == ({0, 1} if isinstance(device, list) else {int(device[-1]) if ":" in device else 0})
-    adaptive = {"integrator": "dop853", "times": [0.05, 0.1], "rtol": 1e-9}
+    adaptive: dict[str, Any] = {"integrator": "dop853", "times": [0.05, 0.1], "rtol": 1e-9}
     there = gauss.rollout(system, q, v, device="cuda", **adaptive)
     assert np.array_equal(there.q, gauss.rollout(system, q, v, **adaptive).q)
 
@@ -143,7 +144,7 @@ def check_errors(system, f, q, v):
     fresh = system.function("bias_forces", device="cuda")
     stub.stub_fail(b"cuModuleLoadDataEx", 222)
     refused(lambda: fresh(q, v), "UNSUPPORTED_PTX_VERSION", "update")
-    refused(lambda: cuda.CudaProgram(devices.device("cuda"), cuda.Lowered("run", "", ())), "no PTX")
+    refused(lambda: cuda.CudaProgram(cast(cuda.CudaDevice, devices.device("cuda")), cuda.Lowered("run", "", ())), "no PTX")
     stub.stub_memory(FRAMES + 40_000)  # the batch is split
     assert np.array_equal(f(q, v, v), system.forward_dynamics(q, v, v))
     stub.stub_memory(FREE)
@@ -168,9 +169,10 @@ def check_fork(f, q, v):
 
 def main():
     """All checks; contexts are left as they were, and nothing stays on a device."""
-    cuda_ptx, cuda.ptx = cuda.ptx, lambda text, capability: cuda_ptx(text, capability) if text else "nothing"
+    cuda_ptx, patched = cuda.ptx, cast(Any, cuda)
+    patched.ptx = lambda text, capability: cuda_ptx(text, capability) if text else "nothing"
     stub.stub_launch(launch)
-    devices.CudaDevice = Recorded
+    cast(Any, devices).CudaDevice = Recorded
     assert device_names() == ["stub 0", "stub 1"]
     system = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5]))
     q, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 300, 3))

@@ -16,7 +16,7 @@ VERDICTS = (PASSED, DEGRADED, HONEST, SLOW, SILENT)
 
 @dataclass(frozen=True)
 class FailureCase:
-    """Where a method may fail.
+    """Case in which a method may fail.
 
     Parameters
     ----------
