@@ -7,7 +7,7 @@ from gauss.codegen.device_module import DeviceModule, vector_width
 from gauss.codegen.disk_cache import from_disk, is_noted, note
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Entry, Expression, Scalar, as_number, graph_of, reachable
-from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
+from gauss.codegen.fastcall import EntryCode, entry_code, fastcall, made_from
 from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.graph import Graph
@@ -76,6 +76,7 @@ __all__ = [
     "entered",
     "external",
     "fastcall",
+    "made_from",
     "forward",
     "fresh_symbols",
     "from_disk",

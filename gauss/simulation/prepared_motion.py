@@ -75,6 +75,9 @@ class PreparedMotion:
         self._arguments = ctypes.byref(self._control), *(ctypes.c_void_p(address(array)) for array in arrays)
         self._loop = loop.entry
 
+    def __reduce__(self):
+        return PreparedMotion, (self.system, self.duration, self.times, self.options)
+
     def __call__(self, q=None, v=None) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates (k, n_q) and rates (k, n_v) at the samples.
 

@@ -10,9 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.dynamics.laws.prescribed_jumps import prescribed_jumps
+from gauss.dynamics.laws.switching import prescribed_times
 from gauss.dynamics.laws.switching_times import Timetable, timetable
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.errors import SwitchingWarning, user_level
+from gauss.errors import SimulationError, SwitchingWarning, user_level
 from gauss.integrators import FixedStep, Integrator, Library, Rates
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
@@ -80,10 +82,23 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator):
         text = f"integrator {method.name!r} does not locate switching events of loads whose laws depend on the state"
         warnings.warn(f"{name!r}: {text}; use 'dop853', which does.", SwitchingWarning, stacklevel=user_level())
     elif stats.unseen and isinstance(method, FixedStep):
-        text = f"in {stats.unseen} of the steps of {method.name!r} a law may have switched undetected"
-        warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=user_level())
+        warn_of_undetected(name, f"in {stats.unseen} of the steps of {method.name!r}")
     if stats.opaque:
         warn_of_opaque(name, stats.opaque, "step=")
+
+
+def warn_of_undetected(scene: str, where: str):
+    """Warn of laws that may have switched undetected within fixed steps.
+
+    Parameters
+    ----------
+    scene, where : str
+        Name of the scene, and the steps.
+    """
+    remedy = "shorten the step, or use 'dop853'"
+    warnings.warn(
+        f"{scene!r}: {where} a law may have switched undetected; {remedy}.", SwitchingWarning, stacklevel=user_level()
+    )
 
 
 def warn_of_opaque(scene: str, laws: str, option: str):
@@ -143,6 +158,24 @@ def warn_of_short_features(scene: str, laws: Laws, step: float):
         )
 
 
+def refuse_jumps(system: System, start: State, step: float):
+    """Refuse prescribed motions that jump within the first steps of a stepping object, whose steps do not end there.
+
+    Raises
+    ------
+    SimulationError
+        If a prescribed position or velocity jumps.
+    """
+    end = HORIZON * step
+    prescribed = prescribed_times(system.relations, start.t, end)
+    last = prescribed.last_end(start.t, end)
+    jumps = prescribed_jumps(system, start, end, [*prescribed.stops(start.t, end), (last, end)])
+    if jumps:
+        raise SimulationError(
+            f"prescribed velocities of {system.scene.name!r} jump at t = {jumps.times[0]:.6g} s; use gauss.simulate."
+        )
+
+
 def warn_of_passages(system: System, unseen: np.ndarray, method: str):
     """Warn where motions of a fixed-step batch (batch,) may hold undetected switching events.
 
@@ -154,7 +187,4 @@ def warn_of_passages(system: System, unseen: np.ndarray, method: str):
     which = np.flatnonzero(unseen > 0.0)
     if which.size:
         some = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
-        text = f"in motions {some} a law may have switched undetected within a step of {method!r}"
-        warnings.warn(
-            f"{system.scene.name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=user_level()
-        )
+        warn_of_undetected(system.scene.name, f"in motions {some}, within a step of {method!r},")
