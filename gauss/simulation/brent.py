@@ -28,15 +28,22 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
     ValueError
         If the signs are equal, or a value is NaN.
     """
+
+    def value(x: float) -> float:
+        found = float(function(x))
+        if isnan(found):
+            raise ValueError(f"the function is NaN at {x!r}; a root cannot be found.")
+        return found
+
     before, x = float(begin), float(end)
-    f_before, f = _value(function, before), _value(function, x)
-    if f_before == 0.0:
-        return before
-    if f != 0.0 and not _changes_sign(f_before, f):
+    f_before, f = value(before), value(x)
+    if f_before == 0.0 or f == 0.0:
+        return before if f_before == 0.0 else x
+    if not _differ(f_before, f):
         raise ValueError(f"the function has one sign at {begin!r} and at {end!r}.")
     other = f_other = last = step = 0.0
     for _ in range(MOST_ITERATIONS):
-        if _changes_sign(f_before, f):
+        if _differ(f_before, f):
             other, f_other, last = before, f_before, x - before
             step = last
         if abs(f_other) < abs(f):
@@ -45,24 +52,18 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
         least, half = (xtol + rtol * abs(x)) / 2.0, (other - x) / 2.0
         if f == 0.0 or abs(half) < least:
             return x
-        converges = abs(last) > least and abs(f) < abs(f_before)
-        tried = _interpolated((before, f_before), (x, f), (other, f_other)) if converges else NO_STEP
+        interpolates = abs(last) > least and abs(f) < abs(f_before)
+        tried = _interpolated((before, f_before), (x, f), (other, f_other)) if interpolates else NO_STEP
         last, step = (step, tried) if 2.0 * abs(tried) < min(abs(last), 3.0 * abs(half) - least) else (half, half)
         before, f_before = x, f
         x += step if abs(step) > least else copysign(least, half)
-        f = _value(function, x)
+        f = value(x)
     raise ValueError(f"no root was found within {MOST_ITERATIONS} iterations.")
 
 
-def _value(function: Callable[[float], float], x: float) -> float:
-    found = float(function(x))
-    if isnan(found):
-        raise ValueError(f"the function is NaN at {x!r}; a root cannot be found.")
-    return found
-
-
-def _changes_sign(one: float, other: float) -> bool:
-    return one != 0.0 and other != 0.0 and (one < 0.0) != (other < 0.0)
+def _differ(one: float, other: float) -> bool:
+    """Whether two numbers have different signs."""
+    return one < 0.0 < other or other < 0.0 < one
 
 
 def _interpolated(before: tuple[float, float], now: tuple[float, float], other: tuple[float, float]) -> float:
