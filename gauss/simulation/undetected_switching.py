@@ -20,13 +20,18 @@ from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
 
 PLACES = (0.187, 0.431, 0.569, 0.813)  # of the samples, relative to the step
-INCREMENT = 1e-4  # of the differences for y', relative to the step
+SHIFTS = -1e-4, 0.0, 1e-4  # of the samples of a difference for y', relative to the step
 LARGEST_DEFECT = 1e5  # over the tolerance
 REJECTED_SHARE = 0.5  # of a step with a larger defect that is tried next
 RESOLVED_STEP = 1e-6  # relative to the duration: the defect of shorter steps is not sampled
 HORIZON = 10_000  # steps of a stepping object, which has no end, in which features of laws of time are looked for
 RESOLVING_STEPS = 2.0  # steps that a feature of a law of time must last
 SPARSE_STEP = 0.01  # relative to the duration: longer steps with opaque laws may miss short features
+
+
+def defect_times(begin: float, h: float) -> np.ndarray:
+    """Times (12,) at which :func:`defect_is_large` asks for dense output [s]."""
+    return np.array([begin + (place + shift) * h for place in PLACES for shift in SHIFTS])
 
 
 def defect_is_large(
@@ -49,8 +54,8 @@ def defect_is_large(
     allowed : ndarray, shape (n_v,)
         Tolerance of the rates.
     """
-    for place in PLACES:
-        before, at, after = (dense(begin + (place + shift) * h)[0] for shift in (-INCREMENT, 0.0, INCREMENT))
+    for times in defect_times(begin, h).reshape(-1, len(SHIFTS)).tolist():
+        before, at, after = (dense(t)[0] for t in times)
         defect = (after.v - before.v) / (after.t - before.t) - evaluate(at).acceleration
         if (h * np.abs(defect) > LARGEST_DEFECT * allowed).any():
             return True

@@ -1,4 +1,4 @@
-"""A random scene moved by independent routes: whether they agree within the error that is claimed, and what is said.
+"""A random scene moved by independent routes: agreement within the claimed error, and warnings.
 
 The first route is machine code, by a method of the scene's own, with an estimate of the global error. The second is
 certified at every evaluation; where they differ by more than is claimed it is repeated by a tighter tolerance. Where they
@@ -40,7 +40,7 @@ class TimeUpError(KeyboardInterrupt):
 
 @dataclass
 class Route:
-    """Outcome "moved", "cut", "refused", "raised" or "timed out" of one route; why, its samples, and what was warned of."""
+    """Outcome of one route: "moved", "cut", "refused", "raised" or "timed out"; the reason, its samples and warnings."""
 
     outcome: str
     why: str = ""
@@ -53,7 +53,7 @@ class Route:
 def examine_motion(seed: int, number: int, without: tuple = ()) -> dict:
     """Row of a random scene: what it is, the verdict, how far apart two routes were, what was claimed, and why.
 
-    Verdicts: "agree"; "told": apart, but a warning or the estimated error says so; "refused" by all with a GaussError,
+    Verdicts: "agree"; "told": apart, but a warning or the estimated error reports it; "refused" by all with a GaussError,
     "refused once" by one; "sensitive": all three routes differ; and the bad ones, "silent": apart, and nothing says so;
     "raised": another exception; "timed out"; "stray": a warning that is none of gauss's.
     """
@@ -199,7 +199,7 @@ def _caught(move: Callable, seconds: float | None = None) -> Route:
 
 
 def _kind(warning) -> str:
-    """Name of a warning of gauss's; that of another with a mark, where it came from, and what it says."""
+    """Name of a warning of gauss's; that of another with a mark, its origin and its message."""
     ours = warning.category.__module__.startswith("gauss")
     return (
         warning.category.__name__

@@ -1,6 +1,6 @@
 """Random scenes to be moved: a tree, a chain or loops, with a few elements of any kind put on them.
 
-A scene is told by a seed and its number, so that each can be made again by itself, also without some of its elements.
+A scene is given by a seed and its number, so that each can be made again by itself, also without some of its elements.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ GROUND = "ground"
 
 @dataclass(frozen=True)
 class MovedScene:
-    """A random scene, and how it is to be moved.
+    """A random scene, and the settings of its motion.
 
     Parameters
     ----------
