@@ -14,6 +14,9 @@ from gauss import (
     errors as errors,
 )
 from gauss import (
+    export as export,
+)
+from gauss import (
     integrators as integrators,
 )
 from gauss import (

@@ -5,6 +5,7 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 
 from collections.abc import Callable
 
+from gauss.codegen import callbacks_are_available
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
@@ -98,6 +99,16 @@ def compilable(ask: Question) -> list[str]:
 def traced_laws(ask: Question) -> list[str]:
     """No law is an opaque callback."""
     return [f"the law of {name!r} cannot be traced ({why})" for name, why in ask.laws.reasons.items()]
+
+
+def has_opaque_laws(ask: Question) -> bool:
+    """Whether a law is an opaque callback."""
+    return bool(ask.laws.called)
+
+
+def callbacks(ask: Question) -> list[str]:
+    """All laws are traced, or machine code can call Python here."""
+    return [] if callbacks_are_available() else traced_laws(ask)
 
 
 def few_bodies(ask: Question) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
-from gauss.codegen.gpu.devices import SINGLE, device_name, is_single
+from gauss.codegen.gpu.devices import double_precision
 from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.moreau_step import moreau_stepper
@@ -17,7 +17,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
-from gauss.errors import DeviceError, SimulationError, did_you_mean, require
+from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
@@ -116,7 +116,7 @@ def rollout(
     require(system, (System,), "rollout")
     refuse_changed(system)
     _check_counts({"threads": threads})
-    device = None if device is None else _checked_device(device)
+    device = None if device is None else double_precision(device)
     if integrator in ADAPTIVE:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
         _refuse(integrator, "takes no control=: its steps are not those of the samples; use 'rk4'", control=control)
@@ -130,14 +130,6 @@ def rollout(
     with one_tier(_tier(q0, steps)):
         keep = 1 if every is None else every
         return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)
-
-
-def _checked_device(device) -> str:
-    """Name of the devices; motions are checked to more digits than single precision has."""
-    name = device_name(device)
-    if is_single(name):
-        raise DeviceError(f"device {name!r}: motions are in double precision; functions of a state take {SINGLE!r}.")
-    return name
 
 
 def _tier(q0, steps) -> str:
