@@ -68,7 +68,7 @@ from gauss.analysis.recommendation import advise
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
-from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes, resolve_overlaps
+from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import GaussError
@@ -79,7 +79,16 @@ from gauss.io.linkage import load_linkage
 from gauss.io.rotors import load_rotors, save_rotors
 from gauss.linkages import Linkage
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Simulator, SimulatorBatch, Trajectory, crossings, prepare, rollout, simulate
+from gauss.simulation import (
+    Simulator,
+    SimulatorBatch,
+    Trajectory,
+    crossings,
+    prepare,
+    resolve_overlaps,
+    rollout,
+    simulate,
+)
 from gauss.simulation.sweeps import load_sweep, sweep
 from gauss.system import State, System
 from gauss.view.viewer import show
