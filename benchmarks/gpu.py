@@ -14,6 +14,7 @@ benchmarks/results/gpu.csv and .md.
 import time
 from functools import partial
 from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ TITLES = ("scene", "work", "device", "one core of this CPU", "ratio", "per secon
 def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[dict], list[str]]:
     """Rows of all measurements."""
     import gauss
-    from gauss.codegen.gpu.cuda import device_names
+    from gauss.codegen.gpu.cuda_driver import device_names
     from gauss.codegen.gpu.devices import device as device_of
     from gauss.system import random_state
 
@@ -40,7 +41,7 @@ def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[di
         system = gauss.compile_scene(scene)
         some = [system.initial_state(s.q, s.v) for s in (random_state(system, rng, spread=0.2) for _ in range(FEW))]
         q, v = (np.tile(np.array([getattr(s, part) for s in some]), (-(-states // FEW), 1)) for part in "qv")
-        function = system.function("forward_dynamics", device=device)
+        function: Any = system.function("forward_dynamics", device=device)
         held = [place.put(array) for array in (q, v, np.zeros_like(v))]
         arguments = [(array, array.shape[1], 1) for array in held], place.put(np.zeros(len(q)))
         runs = {

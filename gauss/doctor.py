@@ -1,4 +1,4 @@
-"""What of an installation works: environment, processor, machine code, cache, solvers, optional packages."""
+"""State of an installation: environment, processor, machine code, cache, solvers, optional packages."""
 
 import os
 import time
@@ -13,7 +13,7 @@ from gauss.backends.backend import BACKENDS
 from gauss.bench.machine import header
 from gauss.codegen import cache_size, file_trust, object_cache, trace
 from gauss.codegen.cpython_layout import is_known
-from gauss.codegen.gpu.cuda import device_names
+from gauss.codegen.gpu.cuda_driver import device_names
 from gauss.codegen.gpu.devices import device
 from gauss.codegen.machine import width
 from gauss.codegen.optimiser import OPTIMISER

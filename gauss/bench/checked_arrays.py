@@ -1,4 +1,4 @@
-"""Arrays of files from anybody, looked at before they are believed: nothing is unpickled, no size fills the memory.
+"""Arrays of untrusted files, checked before use: nothing is unpickled, no size fills the memory.
 
 Sparse matrices of any file are checked entry by entry, for an index beyond the shape would read and write beyond the arrays.
 """

@@ -158,7 +158,7 @@ VERDICTS = {
 
 
 def _verdicts(rows) -> list[str]:
-    """What solvers make of problems that have no solution."""
+    """Verdicts of solvers on problems without a solution."""
     problems = groups(rows).get(INCONSISTENT, [])
     lines = []
     for problem in problems:
@@ -294,7 +294,7 @@ def _beside(line: dict) -> list[str]:
 
 
 def _honesty(rows) -> list[str]:
-    """Promises and certificates: the same questions to all who answered."""
+    """Promises and certificates: the same questions to all solvers that answered."""
     asked = [r for r in rows if r["group"] != INCONSISTENT and r["backend"] != compiled.NAME]
     by_level = {level: [r for r in asked if r["level"] == level] for level in (*LEVELS, OWN)}
     ours = by_level.pop(OWN)

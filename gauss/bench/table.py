@@ -89,7 +89,7 @@ class ResultTable:
 def write_table(path: Path, header: Iterable[str], rows: Sequence[dict], columns: Iterable[str] | None = None):
     """Write a finished table: the header as comments, then the columns, those of the first row when not given.
 
-    Cells that a row lacks stay empty.
+    Missing cells of a row stay empty.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "w", newline="", encoding="utf-8") as file:

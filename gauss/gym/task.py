@@ -17,7 +17,7 @@ def _never(q, v, u, y) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Task:
-    """What an environment simulates and rewards.
+    """Scene, reward and end of an environment.
 
     Functions take arrays of one motion or of many, so that one source serves both: q (…, n_q), v (…, n_v), u (…, n_u) and a
     dict y of the outputs of the scene, (…, m) each.

@@ -12,10 +12,11 @@ from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.losses import IdealCounterpart, JointAtRest, LossyGear
 from gauss.scene.motions import Guided, Prescribed
+from gauss.scene.names import GROUND
 from gauss.scene.pairs import PAIRS, Pair
 from gauss.scene.relation import Constraint, Relation
 from gauss.scene.rolling import KnifeEdge, Rolling
-from gauss.scene.scene import GROUND, Scene
+from gauss.scene.scene import Scene
 from gauss.scene.set_valued import JointDryFriction, JointFriction, LimitedDrive, SetValued, Slipping
 from gauss.scene.transmissions import Cam, LinearCoupling, Transmission
 from gauss.scene.unilateral import ClosedGap, OneSidedConstraint, Rope, Stop, Unilateral

@@ -44,7 +44,7 @@ class PreparedMotion:
             )
             self.system, self.duration, plan = problem.system, float(duration), plan_of(problem.question)
             name = self.system.scene.name
-            if plan.driver != "compiled loop" or isinstance(problem.method, FixedStep):
+            if plan.driver != "compiled loop" or problem.laws.called or isinstance(problem.method, FixedStep):
                 fixed = "the integrator has fixed steps, which gauss.Simulator makes"
                 why = fixed if isinstance(problem.method, FixedStep) else f"its driver is {plan.driver!r}"
                 why = "; ".join(map(str, plan.rejected)) or why

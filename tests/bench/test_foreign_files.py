@@ -1,4 +1,4 @@
-"""Files of problems from anybody: nothing is executed, nothing fills the memory, whatever is wrong is told with the file."""
+"""Files of problems from anybody: nothing is executed, nothing fills the memory, errors name the file."""
 
 import io
 import os

@@ -79,7 +79,7 @@ def test_machine_code_and_python_take_the_same_steps(case):
 
 
 def test_steps_that_have_to_be_looked_at_are_taken_by_python():
-    """Painlevé's rod: the first step has no accelerations, and is told of; all others are machine code again."""
+    """Painlevé's rod: the first step has no accelerations, and warns; all others are machine code again."""
     system = gauss.compile_scene(gauss.load("painleve_rod"))
     with pytest.warns(PainleveWarning, match="'C'"):
         fast = gauss.simulate(system, 0.05, integrator="time_stepping", step=5e-3, progress=False)

@@ -97,7 +97,7 @@ class _QpsReader:
                 take(words)
 
     def _section(self, words: list[str]) -> Callable[[list[str]], None] | None:
-        """What takes the lines of a section; nothing takes those of others."""
+        """Reader of the lines of a section; lines of other sections are skipped."""
         section = words[0]
         if section not in SECTIONS:
             raise FileError(f"{self.path}: section {section!r} is not read; known are {', '.join(SECTIONS)}.")

@@ -7,7 +7,7 @@ from gauss.codegen.kernels.call_table import CallTable
 from gauss.codegen.kernels.checked_recursion import CorrectedRecursion, Correction
 from gauss.codegen.kernels.checked_switch import CheckedSwitch
 from gauss.codegen.kernels.column_pivoting import Pivots
-from gauss.codegen.kernels.compiled_loop import Loop, address
+from gauss.codegen.kernels.compiled_loop import CallingLoop, Loop, address
 from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
 from gauss.codegen.kernels.energy_record import (
@@ -40,6 +40,7 @@ __all__ = [
     "Operand",
     "BlockLDLT",
     "CallTable",
+    "CallingLoop",
     "CallRecorder",
     "ContactForces",
     "Control",

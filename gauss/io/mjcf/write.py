@@ -60,7 +60,7 @@ class MjcfDocument:
     taken: set[tuple[str, str]] = field(default_factory=set)
 
     def add(self, parent: Element, tag: str, kind: str = "", **attributes) -> Element:
-        """Add an element; ``kind`` says among which elements its name must be unique."""
+        """Add an element; its name must be unique among elements of the ``kind``."""
         element = SubElement(parent, tag, {key.rstrip("_"): text(value) for key, value in attributes.items()})
         name = element.get("name")
         if name is not None:

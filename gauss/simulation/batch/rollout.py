@@ -1,11 +1,13 @@
 """Batch of motions of one system: all steps in machine code, in the lanes of vector registers."""
 
+from collections.abc import Sequence
 from numbers import Integral
 
 import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
+from gauss.codegen.gpu.devices import SINGLE, device_name, is_single
 from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.moreau_step import moreau_stepper
@@ -13,7 +15,7 @@ from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
-from gauss.errors import SimulationError, did_you_mean, require
+from gauss.errors import DeviceError, SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
@@ -49,7 +51,7 @@ def rollout(
     atol: float | tuple[float, float] | dict | None = None,
     threads: int | None = 1,
     control=None,
-    device: str | None = None,
+    device: str | Sequence[str] | None = None,
 ) -> Rollout:
     """Simulate a batch of initial states.
 
@@ -82,9 +84,10 @@ def rollout(
     control : array_like, shape (batch, k, n_u), optional
         Values of the inputs of the scene [N m, N] for each motion, with fixed steps: k rows, each held for ``steps`` / k
         steps and cut off at the limits of the inputs. They are zero when not given.
-    device : str, optional
-        "cuda" or "cuda:1": a GPU, one motion in a thread, needs cuda-bindings and a driver of NVIDIA. "lanes": the same
-        code on this CPU, one motion after the other, to check what a GPU computes. This CPU, in SIMD lanes, by default.
+    device : str or sequence of str, optional
+        "cuda" or "cuda:1": a GPU, one motion in a thread, needs cuda-bindings and a driver of NVIDIA; several share the
+        motions, ["cuda:0", "cuda:1"]. "lanes": the same code on this CPU, one motion after the other, to check what a GPU
+        computes. This CPU, in SIMD lanes, by default.
 
     Returns
     -------
@@ -110,6 +113,7 @@ def rollout(
     require(system, (System,), "rollout")
     refuse_changed(system)
     _check_counts({"threads": threads})
+    device = None if device is None else _checked_device(device)
     if integrator in ADAPTIVE:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
         _refuse(integrator, "takes no control=: its steps are not those of the samples; use 'rk4'", control=control)
@@ -123,6 +127,14 @@ def rollout(
     with one_tier(_tier(q0, steps)):
         keep = 1 if every is None else every
         return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)
+
+
+def _checked_device(device) -> str:
+    """Name of the devices; motions are checked to more digits than single precision has."""
+    name = device_name(device)
+    if is_single(name):
+        raise DeviceError(f"device {name!r}: motions are in double precision; functions of a state take {SINGLE!r}.")
+    return name
 
 
 def _tier(q0, steps) -> str:

@@ -33,7 +33,7 @@ DEFAULT_ATOL = 1e-9  # relative to the scale of the scene
 @named_arguments
 def sweep(
     scene: Scene | Callable[..., Scene],
-    vary: Mapping[str, Sequence[float]],
+    vary: Mapping[str, Sequence[float] | np.ndarray],
     duration: float,
     *,
     together: bool = False,
