@@ -5,9 +5,8 @@ those of the traced graph, forward and reverse (Griewank and Walther, Evaluating
 the computed motion, exact to round-off.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,14 +27,6 @@ from gauss.system import State, System
 
 TABLEAUS: dict[str, Tableau] = {"rk4": RK4, "dopri5": DOPRI5, "dop853": DOP853}
 PROJECTIONS = 2  # Newton steps in position after a step
-
-
-class StepKernels(NamedTuple):
-    """Machine code of (t, h, q, v, δ, u) → (q, v) after the step, of its change along a direction, and of the adjoint."""
-
-    move: Kernel
-    tangent: Kernel
-    adjoint: Kernel
 
 
 class MotionStep:
@@ -67,8 +58,7 @@ class MotionStep:
         self.sizes = {name: size_of(system, name) for name in self.parameters}
         self.inputs = tuple(system.scene.inputs)
         self.n_x, self.n_p = system.n_q + system.n_v, sum(self.sizes.values())
-        key = (MotionStep, integrator, self.parameters, self.laws.key)
-        self.kernels = cached_on_disk(system, key, self._kernels)
+        self.key = (MotionStep, integrator, self.parameters, self.laws.key)
 
     @cached_property
     def loads(self) -> list:
@@ -111,45 +101,54 @@ class MotionStep:
         mechanism = Mechanism(self.system, q, v, t)
         return [q, mechanism.nearest(v, mechanism.velocity_rhs)]
 
-    def _kernels(self) -> StepKernels:
-        n_q, n_v = self.system.n_q, self.system.n_v
-        sizes = 2, n_q, n_v, self.n_p
+    def _kernel(self, name: str, function: Callable, *sizes: int) -> Kernel:
+        """Machine code of a function of ((t, h), q, v, δ, …, u), kept with the system."""
 
-        def held(time):
-            return [time[0].graph.parameter(name) for name in self.inputs]  # in the order of the scene
+        def traced(time, *given):
+            inputs = [time[0].graph.parameter(one) for one in self.inputs]  # in the order of the scene
+            return function(time, inputs, *given)
 
-        def move(time, q, v, delta):
-            held(time)
-            return self.moved(time, q, v, delta)
+        sizes = 2, self.system.n_q, self.system.n_v, self.n_p, *sizes
+        make = lambda: Kernel(write(traced, *sizes, name=name), batch=name == "tangent")  # noqa: E731
+        return cached_on_disk(self.system, (*self.key, name), make)
 
-        def tangent(time, q, v, delta, direction):
-            given = [*q, *v, *held(time), *delta]
-            return forward(self.moved(time, q, v, delta), given, direction)
+    @cached_property
+    def move(self) -> Kernel:
+        """((t, h), q, v, δ, u) → (q, v) after the step."""
+        return self._kernel("move", lambda time, _, *given: self.moved(time, *given))
 
-        def adjoint(time, q, v, delta, weights):
-            given = [*q, *v, *held(time), *delta]
-            return reverse(weights @ self.moved(time, q, v, delta), given)
+    @cached_property
+    def tangent(self) -> Kernel:
+        """((t, h), q, v, δ, direction, u) → change of (q, v) after the step."""
 
-        return StepKernels(
-            Kernel(write(move, *sizes, name="move"), batch=False),
-            Kernel(write(tangent, *sizes, self.n_given, name="tangent")),
-            Kernel(write(adjoint, *sizes, self.n_x, name="adjoint"), batch=False),
-        )
+        def change(time, inputs, q, v, delta, direction):
+            return forward(self.moved(time, q, v, delta), [*q, *v, *inputs, *delta], direction)
+
+        return self._kernel("tangent", change, self.n_given)
+
+    @cached_property
+    def adjoint(self) -> Kernel:
+        """((t, h), q, v, δ, weights, u) → gradient (n_given,) of weights · (q, v) after the step."""
+
+        def gradient(time, inputs, q, v, delta, weights):
+            return reverse(weights @ self.moved(time, q, v, delta), [*q, *v, *inputs, *delta])
+
+        return self._kernel("adjoint", gradient, self.n_x)
 
     def after(self, t: float, h: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """(q, v) after a step under inputs u."""
-        return self.kernels.move(np.concatenate([[t, h], x, np.zeros(self.n_p), u]))
+        return self.move(np.concatenate([[t, h], x, np.zeros(self.n_p), u]))
 
     def change(self, t: float, h: float, x: np.ndarray, u: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Changes (n_x, k) of (q, v) after a step along directions (n_given, k)."""
         start = np.concatenate([[t, h], x, np.zeros(self.n_p)])
         count = directions.shape[1]
         given = [np.tile(part[:, None], count) for part in (start, u)]
-        return self.kernels.tangent(np.concatenate([given[0], directions, given[1]]))
+        return self.tangent(np.concatenate([given[0], directions, given[1]]))
 
     def gradient(self, t: float, h: float, x: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Gradient (n_given,) of weights · (q, v) after a step."""
-        return self.kernels.adjoint(np.concatenate([[t, h], x, np.zeros(self.n_p), weights, u]))
+        return self.adjoint(np.concatenate([[t, h], x, np.zeros(self.n_p), weights, u]))
 
 
 class _Equations:

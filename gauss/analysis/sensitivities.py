@@ -14,7 +14,7 @@ import numpy as np
 from gauss.analysis.motion_step import MotionStep
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
-from gauss.codegen import Kernel, reverse, write
+from gauss.codegen import Graph, reverse, substitute
 from gauss.dynamics import compile_scene
 from gauss.errors import ArgumentError, SimulationError, require
 from gauss.scene import Scene
@@ -246,14 +246,11 @@ class _Motion:
 
 def _loss(loss: Callable, system: System, end: np.ndarray) -> tuple[float, np.ndarray]:
     """Value of a function of (q, v), and its gradient (n_q + n_v,)."""
-
-    def values(q, v):
-        found = q[0].graph.lift(loss(q, v))
-        return found, reverse(found, [*q, *v])
-
+    symbols = Graph().symbols("x", system.n_q + system.n_v)
+    q, v = np.split(symbols, [system.n_q])
     try:
-        kernel = Kernel(write(values, system.n_q, system.n_v, name="loss"), batch=False)
+        found = symbols[0].graph.lift(loss(q, v))
     except TypeError as error:
         raise ArgumentError(f"motion_gradient: loss cannot be traced: {error}") from None
-    value, *gradient = kernel(end)
+    value, *gradient = (one.value for one in substitute([found, *reverse(found, symbols)], symbols, end))
     return float(value), np.array(gradient)
