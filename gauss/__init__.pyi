@@ -69,7 +69,7 @@ from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_g
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
-from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes
+from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes, resolve_overlaps
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import GaussError
@@ -144,6 +144,7 @@ __all__ = [
     "mobility",
     "paradoxes",
     "motion_gradient",
+    "resolve_overlaps",
     "prepare",
     "reactions",
     "rollout",

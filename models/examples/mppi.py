@@ -12,9 +12,10 @@ import gauss
 class Mppi:
     """Control law of a scene with inputs."""
 
-    def __init__(self, scene, cost, rows=50, samples=4096, rate=50.0, substeps=4, temperature=0.05):
+    def __init__(self, scene, cost, rows=50, samples=4096, rate=50.0, substeps=4, temperature=0.05, device=None):
         self.system, self.cost, self.shape = gauss.compile_scene(scene), cost, (samples, rows, len(scene.inputs))
         self.run = {"steps": rows * substeps, "step": 1.0 / (rate * substeps), "every": substeps, "threads": None}
+        self.run["device"] = device
         self.high = np.array([given.bounds[1] for given in scene.inputs.values()])
         self.plan, self.temperature = np.zeros(self.shape[1:]), temperature
         self.rng, self.seconds = np.random.default_rng(0), []
@@ -55,6 +56,6 @@ def panda():
 
 if __name__ == "__main__":
     scene, cost, duration = {"cart_pole": cart_pole, "panda": panda}[sys.argv[1] if sys.argv[1:] else "cart_pole"]()
-    law = Mppi(scene, cost)
+    law = Mppi(scene, cost, device=sys.argv[2] if sys.argv[2:] else None)  # "cuda": all samples at once on a GPU
     motion = gauss.simulate(law.system, duration, control=law, rate=50, integrator="rk4", step=5e-3)
     print(f"cost {cost(motion.q, motion.v)[[0, -1]].round(3)}, {1 / np.median(law.seconds):.1f} control steps a second")

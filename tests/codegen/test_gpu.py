@@ -211,6 +211,11 @@ def test_what_a_device_refuses():
         mass(q[:, :1])
     with pytest.raises(StateError, match="1 argument|expected q"):
         mass(q, v)
+    with pytest.raises(StateError, match="t: expected"):
+        mass(q, t=[0.0, 1.0])
+    with pytest.raises(DeviceError, match="one device"):
+        system.function("mass_matrix", device=["lanes", "lanes"])(q, stream=1)
+    assert mass(q[:0]).shape == (0, 2, 2)
     q[2] = np.nan
     with pytest.raises(StateError, match="finite") as caught:
         mass(q)
@@ -240,8 +245,10 @@ def test_batches_beyond_the_memory_of_a_device_are_split(monkeypatch):
 def test_single_precision_says_its_error():
     system = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5]))
     q, v = _states(system, 200)
+    shared = ["lanes float32", "lanes float32"]
     for name, given in (("mass_matrix", [q]), ("bias_forces", [q, v]), ("forward_dynamics", [q, v, v])):
         here, there = system.function(name), system.function(name, device="lanes float32")
+        assert np.array_equal(system.function(name, device=shared)(*given), there(*given))
         right, found = here(*given), there(*given)
         error = np.abs(found - right).max() / np.abs(right).max()
         assert 0.0 < there.error <= SINGLE_ERROR and error <= 4.0 * there.error  # which is that of some rows
@@ -254,6 +261,7 @@ def test_single_precision_says_its_error():
 
 def test_devices_have_names():
     names = {"cuda": "cuda:0", "cuda:1": "cuda:1", ("cuda:0", "cuda:1"): "cuda:0,cuda:1", "lanes float32": "lanes float32"}
+    names[("cuda float32", "cuda:1 float32")] = "cuda:0 float32,cuda:1 float32"
     for given, name in names.items():
         assert devices.device_name(given) == name == devices.device_name(name)
     for wrong in ("gpu", "", 0, [], ["cuda", 1], ["cuda", "lanes"], ["lanes", "lanes float32"], "cuda:-1", "cuda float16"):
@@ -285,4 +293,6 @@ def test_arrays_are_lent_until_they_are_given_back():
     taken = np.from_dlpack(Lent(given))
     assert np.array_equal(taken, given) and np.shares_memory(taken, given) and len(dlpack._lent) == kept + 1
     del taken
+    assert len(dlpack._lent) == kept
+    Lent(given).__dlpack__()  # that nobody takes
     assert len(dlpack._lent) == kept

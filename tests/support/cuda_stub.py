@@ -14,6 +14,7 @@ import numpy as np
 from cuda.bindings import driver
 
 import gauss
+from gauss import doctor
 from gauss.codegen import machine
 from gauss.codegen.gpu import cuda, devices
 from gauss.codegen.gpu.cuda_driver import device_names
@@ -185,6 +186,8 @@ def main():
     thread.start()
     thread.join()
     check_fork(f, q, v)
+    finding = doctor._gpu()
+    assert finding.works and "cuda:1 stub 1: programs run and are right" in finding.text
     assert stub.stub_rooms() == rooms and stub.stub_depth() == 1  # the context of the other library
     refused(lambda: devices.device("cuda:2"), "cuda:2")
     print("all checks passed")

@@ -141,6 +141,7 @@ class DeviceAdaptiveLoop(OnDevice):
     """Adaptive steps of a batch.
 
     Motions that are not at their end after some steps go on in threads side by side: a warp does not wait for one of them.
+    In between, only their numbers and states of progress travel.
 
     Parameters
     ----------

@@ -59,11 +59,13 @@ class DeviceFunction:
         DeviceError
             If the device has not enough memory, or an array lies on another one.
         """
+        if stream is not None and len(self.rows.devices) > 1:
+            raise DeviceError("stream: a stream is of one device, and several share this function.")
         devices = [device.on(stream) for device in self.rows.devices]
         views = [devices[0].view(given) for given in vectors]
         arrays = self._arrays(vectors, views)
         count = arrays[0].shape[0]
-        numbers = np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
+        numbers = self._numbers(t, count)
         if any(views):
             if len(devices) > 1:
                 raise DeviceError("device: several devices share arrays of this process; arrays on a device are on one.")
@@ -114,6 +116,13 @@ class DeviceFunction:
             shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(names, arrays, strict=True))
             raise StateError(f"{self.__name__}: batches of different lengths: {shapes}.")
         return arrays
+
+    def _numbers(self, t, count: int) -> np.ndarray:
+        """Time of each row."""
+        try:
+            return np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
+        except (TypeError, ValueError):
+            raise StateError(f"{self.__name__}: t: expected a number, or {count} of them, got {t!r}.") from None
 
     def _repair(self, arrays, numbers: np.ndarray, found, first: int):
         """Replace the results of rows that exceed a limit by those of the function on this CPU."""

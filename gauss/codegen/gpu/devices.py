@@ -6,7 +6,7 @@ from functools import cache
 from gauss.codegen.gpu.cuda import CudaDevice
 from gauss.codegen.gpu.device import Device
 from gauss.codegen.gpu.lane_by_lane import LaneByLane
-from gauss.errors import ArgumentError
+from gauss.errors import ArgumentError, DeviceError
 
 SINGLE = "float32"
 NAME = re.compile(rf"(?:cuda(?::(?P<number>\d{{1,3}}))?|(?P<lanes>lanes))(?P<single> {SINGLE})?")
@@ -26,23 +26,48 @@ def device_name(given) -> str:
     ArgumentError
         If it is no such name, or GPUs and this CPU are to share a batch.
     """
-    names = given.split(",") if isinstance(given, str) else given if isinstance(given, list | tuple) and given else [given]
-    found = [NAME.fullmatch(name.strip()) if isinstance(name, str) else None for name in names]
-    matches = [match for match in found if match]
-    if len(matches) < len(names):
+    matches = _matches(given)
+    if not matches or None in matches:
         raise ArgumentError(
             f"device: expected 'cuda', 'cuda:NUMBER' or 'lanes' (this CPU, lane by lane), several of them in a list, "
             f"or 'cuda {SINGLE}', got {given!r}."
         )
-    if len({match["lanes"] for match in matches}) > 1 or len({match["single"] for match in matches}) > 1:
+    found = [match.groupdict() for match in matches if match]
+    if len({(one["lanes"], one["single"]) for one in found}) > 1:
         raise ArgumentError(f"device: expected devices of one kind, in one precision, got {given!r}.")
-    own = ("lanes" if match["lanes"] else f"cuda:{int(match['number'] or 0)}" for match in matches)
-    return ",".join(own) + (matches[0]["single"] or "")
+    return ",".join((one["lanes"] or f"cuda:{int(one['number'] or 0)}") + (one["single"] or "") for one in found)
+
+
+def _matches(given) -> list[re.Match | None]:
+    """Matches of the single names; None of what is no name."""
+    names = given.split(",") if isinstance(given, str) else given if isinstance(given, list | tuple) else [given]
+    return [NAME.fullmatch(name.strip()) if isinstance(name, str) else None for name in names]
 
 
 def is_single(name: str) -> bool:
     """Whether a name asks for single precision."""
     return name.endswith(SINGLE)
+
+
+def double_precision(given) -> str:
+    """Name of devices that move motions, which are checked to more digits than single precision has.
+
+    Parameters
+    ----------
+    given : str or sequence of str
+        As of :func:`device_name`.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no such name.
+    DeviceError
+        If it asks for single precision.
+    """
+    name = device_name(given)
+    if is_single(name):
+        raise DeviceError(f"device {name!r}: motions are in double precision; functions of a state take {SINGLE!r}.")
+    return name
 
 
 def devices(name: str) -> tuple[Device, ...]:
@@ -62,7 +87,7 @@ def devices(name: str) -> tuple[Device, ...]:
     DeviceError
         If there is no driver, or no such device.
     """
-    own = device_name(name).partition(" ")[0].split(",")
+    own = device_name(name).removesuffix(f" {SINGLE}").replace(f" {SINGLE},", ",").split(",")
     return tuple(_device(None if one == "lanes" else int(one.partition(":")[2])) for one in own)
 
 

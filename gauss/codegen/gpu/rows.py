@@ -75,8 +75,10 @@ class RowsOnDevice(OnDevice):
         Arguments, results and limits; in single precision limits are no smaller than 1 %.
     is_single : bool
         Whether it computes in single precision.
-    operations, bytes : int
-        Operations of one evaluation, and bytes that a thread reads and writes.
+    operations : dict of str to int
+        Operations of one evaluation by kind.
+    bytes : int
+        Bytes that a thread reads and writes.
     """
 
     def __init__(self, name: str, function: Function, interface: Interface):
@@ -85,7 +87,7 @@ class RowsOnDevice(OnDevice):
             interface = replace(interface, limits=tuple(max(limit, SINGLE_LIMIT) for limit in interface.limits))
         super().__init__(name, device(name).lowered(rows_code(function, interface, self.is_single)))
         self.interface = interface
-        self.sizes, self.operations = interface.result_sizes(len(function.outputs)), sum(function.operations().values())
+        self.sizes, self.operations = interface.result_sizes(len(function.outputs)), function.operations()
         self.bytes = 8 * (sum(interface.sizes) + 1 + sum(self.sizes))
 
     def __call__(self, on: Device, count: int, vectors: Sequence, numbers: DeviceArray) -> tuple[list[DeviceArray], bool]:

@@ -17,8 +17,6 @@ from gauss.codegen.native_function import NativeFunction
 
 THREADS_PER_BLOCK = 128  # a multiple of the 32 of a warp; more leave a thread fewer registers
 INDEX = "llvm.nvvm.read.ptx.sreg."  # special registers of PTX
-# largest block of an entry: the assembler gives a thread as many registers as it leaves
-BOUND = '\n!nvvm.annotations = !{{!4096}}\n!4096 = !{{ptr @{name}, !"maxntidx", i32 {most}}}\n'
 WORD = ir.IntType(32)
 
 
@@ -61,7 +59,7 @@ class ThreadCode:
 
     def gpu_text(self) -> str:
         """Module with an entry ``name(*arguments)`` that a GPU calls in every thread."""
-        return self._with_entry(self._gpu_entry) + BOUND.format(name=self.name, most=THREADS_PER_BLOCK)
+        return self._with_entry(self._gpu_entry)
 
     def cpu_text(self) -> str:
         """Module with an entry ``name(threads, *arguments)`` that runs the threads one after the other."""

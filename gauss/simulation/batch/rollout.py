@@ -7,15 +7,17 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
-from gauss.codegen.gpu.devices import SINGLE, device_name, is_single
+from gauss.codegen.gpu.devices import double_precision
 from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.plan import plan_of
+from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
-from gauss.errors import DeviceError, SimulationError, did_you_mean, require
+from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
@@ -57,7 +59,8 @@ def rollout(
 
     With "rk4", "semi_implicit_euler" and "time_stepping" all motions make ``steps`` steps of one length; with "dop853" and
     "dopri5" each has step-size control of its own, by ``rtol`` and ``atol``, and samples at the same ``times`` by dense
-    output. Contacts, stops and friction take "time_stepping", whose motions follow one another in scalar code. The
+    output. Contacts, stops and friction take "time_stepping", whose motions follow one another in scalar code; with many
+    contacts of shapes each of them is made by :func:`gauss.simulate`. The
     accelerations are checked on the way by inverse dynamics, and loops by their constraint residuals. A motion that fails a
     check, or with a contact problem that machine code does not solve, is repeated by :func:`gauss.simulate`.
 
@@ -113,7 +116,7 @@ def rollout(
     require(system, (System,), "rollout")
     refuse_changed(system)
     _check_counts({"threads": threads})
-    device = None if device is None else _checked_device(device)
+    device = None if device is None else double_precision(device)
     if integrator in ADAPTIVE:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
         _refuse(integrator, "takes no control=: its steps are not those of the samples; use 'rk4'", control=control)
@@ -127,14 +130,6 @@ def rollout(
     with one_tier(_tier(q0, steps)):
         keep = 1 if every is None else every
         return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)
-
-
-def _checked_device(device) -> str:
-    """Name of the devices; motions are checked to more digits than single precision has."""
-    name = device_name(device)
-    if is_single(name):
-        raise DeviceError(f"device {name!r}: motions are in double precision; functions of a state take {SINGLE!r}.")
-    return name
 
 
 def _tier(q0, steps) -> str:
@@ -161,10 +156,13 @@ def _fixed(
     control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
-    batch = _begun(system, starts, method, control is not None, device)
-    times, t = _switching(system, starts, steps * step).times, step * every * np.arange(steps // every + 1)
+    t = step * every * np.arange(steps // every + 1)
     run = {"integrator": method.name, "step": step, "times": t}
     settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
+    if device is None and _has_pair_kernels(system, method, control is not None):
+        return _singly(system, starts, steps, run, settings, control)
+    batch = _begun(system, starts, method, control is not None, device)
+    times = _switching(system, starts, steps * step).times
     if times.switches.size:  # steps of a batch cannot end there
         return _singly(system, starts, steps, run, settings, control)
     samples = batch.run(steps, step, every, threads, control)
@@ -184,6 +182,13 @@ def _fixed(
     lost, repeated = tuple(map(int, np.flatnonzero(~finite))), tuple(map(int, doubtful))
     marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again}
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
+
+
+def _has_pair_kernels(system: System, method: FixedStep, held: bool) -> bool:
+    """Whether a motion is made by kernels of pairs of shapes, one after the other."""
+    if not method.nonsmooth:
+        return False
+    return plan_of(Question(system, Laws(system), method=method, held=held)).dynamics == "pair kernels"
 
 
 def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[int, float]:
