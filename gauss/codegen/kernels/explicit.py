@@ -23,7 +23,7 @@ def stride(n_y: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class ExplicitTrial(NativeFunction):
-    """Trial step: (point, *TRIAL_SETTINGS) → (point after, error, factor of the next step, cost, slopes).
+    """Trial step: ``(point, *TRIAL_SETTINGS)`` → (point after, error, factor of the next step, cost, slopes).
 
     Parameters
     ----------
