@@ -42,7 +42,7 @@ class ExplicitTrial(NativeFunction):
     finish : Function
         (point, h, change of y) → (point, y').
     control : Function
-        Step-size controller: (point, *TRIAL_SETTINGS, point after, indicators, error estimates) → (error, factor,
+        Step-size controller: ``(point, *TRIAL_SETTINGS, point after, indicators, error estimates)`` → (error, factor,
         evaluations, factorisations).
     """
 
