@@ -24,7 +24,7 @@ class Agreement(NamedTuple):
     """
 
     same: int
-    count: int
+    count: int  # type: ignore[assignment]  # the method of tuples of that name is not called
     tau: float
     shares: Mapping[str, tuple[float, float]]
 
@@ -34,7 +34,13 @@ def agreement(verdicts: Iterable[tuple[str, bool, bool]]) -> Agreement:
     by_solver: dict[str, list[tuple[bool, bool]]] = {}
     for solver, one, other in verdicts:
         by_solver.setdefault(solver, []).append((one, other))
-    shares = {solver: tuple(map(float, np.mean(pairs, axis=0))) for solver, pairs in by_solver.items()}
+    shares = {solver: _shares(pairs) for solver, pairs in by_solver.items()}
     every = [pair for pairs in by_solver.values() for pair in pairs]
     tau = float(kendalltau(*zip(*shares.values(), strict=True)).statistic) if len(shares) > 1 else float("nan")
     return Agreement(sum(one == other for one, other in every), len(every), tau, shares)
+
+
+def _shares(pairs: list[tuple[bool, bool]]) -> tuple[float, float]:
+    """Shares of problems solved by both judges."""
+    one, other = np.mean(pairs, axis=0)
+    return float(one), float(other)

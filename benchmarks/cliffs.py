@@ -15,6 +15,7 @@ Writes benchmarks/results/cliffs.csv and .md.
 import time
 import warnings
 from collections.abc import Callable
+from functools import partial
 from statistics import median
 
 import numpy as np
@@ -101,11 +102,12 @@ def _measured(make: Callable[[], gauss.Scene], element: str) -> dict:
     scene = make()
     ELEMENTS[element](scene, *_in_the_middle(scene))
     system = gauss.compile_scene(scene)
-    state, run = system.initial_state(), {"rtol": 1e-9, "progress": False}
-    plan, each = gauss.simulate(system, DURATION / 100, **run).stats.plan, list[float]()
+    state, move = system.initial_state(), partial(gauss.simulate, system, rtol=1e-9, progress=False)
+    plan, each = move(DURATION / 100).stats.plan, list[float]()
+    assert plan is not None
     while len(each) < ROUNDS and sum(each) < PATIENCE:
         begin = time.process_time()
-        motion = gauss.simulate(system, DURATION, **run)
+        motion = move(DURATION)
         each.append(time.process_time() - begin)
     for _ in range(3):
         system.accelerations(state)

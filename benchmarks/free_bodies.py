@@ -58,8 +58,8 @@ def bin_of_balls(n: int, friction: float = 0.5, wall: float = WALL, seed: int = 
     row = int(2.0 * wall / (2.2 * RADIUS))
     for i in range(n):
         layer, place = divmod(i, row * row)
-        x, y = ((k - 0.5 * (row - 1)) * 2.2 * RADIUS + 0.001 * rng.standard_normal() for k in divmod(place, row))
-        free_body(scene, f"ball {i}", 0.4 * RADIUS**2, (x, y, 1.2 * RADIUS + 2.1 * RADIUS * layer))
+        east, north = ((k - 0.5 * (row - 1)) * 2.2 * RADIUS + 0.001 * rng.standard_normal() for k in divmod(place, row))
+        free_body(scene, f"ball {i}", 0.4 * RADIUS**2, (east, north, 1.2 * RADIUS + 2.1 * RADIUS * layer))
         scene.sphere(f"sphere {i}", f"ball {i}", RADIUS)
     scene.contacts_all(friction=friction)
     return scene

@@ -11,6 +11,7 @@ Writes benchmarks/results/functions.csv and .md.
 """
 
 import os
+from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("GAUSS_TIER", "optimised")
@@ -75,8 +76,8 @@ class Peers:
     at: Configuration
     data: pin.Data
     frame: int
-    model: object = None
-    state: object = None
+    model: Any = None
+    state: Any = None
     body: int = 0
 
 
@@ -207,7 +208,7 @@ def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
     given |= {"acceleration": np.zeros(system.n_v), "load": np.zeros(system.n_v)}
     for function, (theirs, result) in (BY_PINOCCHIO | (OF_TREES if not system.has_closures else {})).items():
         full = f"{function}:{body}" if function in ("forward_kinematics", "jacobian", "jacobian_rate") else function
-        ours = system.forward_dynamics if function == "forward_dynamics" else system.function(full)
+        ours: Any = system.forward_dynamics if function == "forward_dynamics" else system.function(full)
         wrapper = ours.__self__.fallback
         arguments = [given[one].copy() for one in wrapper.interface.vectors]
         batches = [np.tile(one, (BATCH, 1)) for one in arguments]
@@ -225,7 +226,7 @@ def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
         found = ours(*arguments)
         found = np.concatenate([np.ravel(part) for part in (found if isinstance(found, tuple) else (found,))])
         expected = None if result is None else np.ravel(result(theirs(others), others))
-        line = {"mechanism": name, "function": function}
+        line: dict[str, str | float] = {"mechanism": name, "function": function}
         line |= {task: median(seconds[task]) if task in seconds else np.nan for task in COMPETITORS}
         yield line | {"agreement": np.nan if expected is None else difference(found, expected)}
 

@@ -5,47 +5,49 @@ Run it with:
     python -m benchmarks.gpu [--device cuda] [--states 1048576] [--rounds 7]
 
 States are random, starts meet the constraints. Arrays lie on the device before the clock starts; a run ends when all threads
-have. Forward dynamics come with their error check. Share of the peak: operations of an evaluation, multiply–adds as two,
-beside ``--peak`` in Tflop/s (34 of an H100 without tensor cores, as its maker states). Results are compared with those of
-this CPU. ``--device lanes`` runs the same threads one after the other on this CPU, to try the benchmark. Writes
-benchmarks/results/gpu.csv and .md.
+have. Forward dynamics come with their error check. Share of the peak: operations of an evaluation as
+:mod:`benchmarks.gpu_estimate` counts them, beside ``--peak`` in Tflop/s (34 of an H100 without tensor cores, as its maker
+states). Results are compared with those of this CPU. Beside them stand MuJoCo Warp and MJX on the same device
+(:mod:`benchmarks.gpu_peers`), where they are installed. ``--device lanes`` runs the same threads one after the other on this
+CPU, to try the benchmark. Writes benchmarks/results/gpu.csv and .md.
 """
 
 import time
 from functools import partial
 from statistics import median
+from typing import Any
 
 import numpy as np
 
+from benchmarks import gpu_peers
 from benchmarks.command import command
+from benchmarks.gpu_estimate import SCENES, flops
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
-from models.families import n_four_bar
 
-SCENES = {"Panda": "robot:panda", "four-bar": "four_bar", "Bricard linkage": "bricard"}
 STEPS, STEP, FEW = 50, 1e-4, 256  # of a motion; states that are compared
+PEERS = ("scene", "work", "engine", "its time", "per second", "gauss is faster by")
 TITLES = ("scene", "work", "device", "one core of this CPU", "ratio", "per second", "share of the peak", "difference")
 
 
 def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[dict], list[str]]:
     """Rows of all measurements."""
     import gauss
-    from gauss.codegen.gpu.cuda import device_names
+    from gauss.codegen.gpu.cuda_driver import device_names
     from gauss.codegen.gpu.devices import device as device_of
     from gauss.system import random_state
 
     rows, rng, place = [], np.random.default_rng(0), device_of(device)
-    scenes = {name: gauss.load(source) for name, source in SCENES.items()} | {"ladder of 10 four-bars": n_four_bar(10)}
-    for name, scene in scenes.items():
-        system = gauss.compile_scene(scene)
+    for name, make in SCENES.items():
+        system = gauss.compile_scene(scene := make())
         some = [system.initial_state(s.q, s.v) for s in (random_state(system, rng, spread=0.2) for _ in range(FEW))]
         q, v = (np.tile(np.array([getattr(s, part) for s in some]), (-(-states // FEW), 1)) for part in "qv")
-        function = system.function("forward_dynamics", device=device)
+        function: Any = system.function("forward_dynamics", device=device)
         held = [place.put(array) for array in (q, v, np.zeros_like(v))]
         arguments = [(array, array.shape[1], 1) for array in held], place.put(np.zeros(len(q)))
         runs = {
             "forward dynamics": (
-                partial(function.rows, len(q), *arguments),
+                partial(function.rows, place, len(q), *arguments),
                 partial(system.forward_dynamics, q, v, 0 * v),
                 1,
             ),
@@ -67,11 +69,12 @@ def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[di
                     "work": work,
                     "device": _seconds(there, rounds) / (len(q) * units),
                     "cpu": _seconds(here, rounds) / (len(known) * units),
-                    "operations": function.rows.operations if work == "forward dynamics" else "",
+                    "operations": flops(function.rows.operations) if work == "forward dynamics" else "",
                     "peak": peak,
                     "difference": difference / max(1.0, np.abs(known[:count]).max()),
                 }
             )
+        rows.extend(gpu_peers.rows(name, scene, q, v, STEPS, STEP, rounds))
     gpus = device_names() if device.startswith("cuda") else [f"device {device!r}"]
     return rows, [
         *header("numpy", "llvmlite", "cuda-bindings"),
@@ -93,11 +96,24 @@ def page(rows: list[dict], conditions) -> list[str]:
     """Lines of the page."""
     lines = []
     for row in rows:
-        share = 2.0 * row["operations"] / row["device"] / (row["peak"] * 1e12) if row["operations"] else None
+        if row.get("peer"):
+            continue
+        share = row["operations"] / row["device"] / (row["peak"] * 1e12) if row["operations"] else None
         times = f"{1e9 * row['device']:.3g} ns", f"{1e9 * row['cpu']:.3g} ns", f"{row['cpu'] / row['device']:.3g}"
         last = f"{1.0 / row['device']:.2e}", "–" if share is None else f"{share:.0%}", f"{row['difference']:.0e}"
         lines.append([row["scene"], row["work"], *times, *last])
-    return [*head("A GPU beside one core of a CPU", conditions), *table(TITLES, lines)]
+    ours = {(row["scene"], row["work"]): row["device"] for row in rows if not row.get("peer")}
+    beside = []
+    for row in (row for row in rows if row.get("peer")):
+        if not row.get("time"):
+            beside.append([row["scene"], row["work"], row["peer"], "–", "–", "–"])
+            continue
+        times = f"{1e9 * row['time']:.3g} ns", f"{1.0 / row['time']:.2e}"
+        beside.append(
+            [row["scene"], row["work"], row["peer"], *times, f"{row['time'] / ours[row['scene'], row['work']]:.3g}"]
+        )
+    there = head("A GPU beside one core of a CPU", conditions)
+    return [*there, *table(TITLES, lines), "", "## Other engines on the same device", "", *table(PEERS, beside)]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Scenes of long runs, what of their momentum is conserved, and how a trend is told from noise."""
+"""Scenes of long runs, the conserved part of their momentum, and trends beside noise."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -69,7 +69,7 @@ def trend(t: np.ndarray, values: np.ndarray, blocks: int = 20) -> tuple[float, f
     The line goes through the means of blocks, which are all but independent where single samples are not.
     """
     means = np.array([[part.mean() for part in np.array_split(x, blocks)] for x in ((t - t[0]) / (t[-1] - t[0]), values)])
-    slope, start = np.polyfit(*means, 1)
+    slope, start = np.polyfit(means[0], means[1], 1)
     left = means[1] - start - slope * means[0]
     scatter = np.sqrt(left @ left / (blocks - 2))
     return float(slope), float(scatter / np.sqrt(np.sum((means[0] - means[0].mean()) ** 2)))

@@ -71,7 +71,9 @@ def main():
         return
     theirs = published(given.folder / "results" / "qpbenchmark_results.csv")
     solvers = sorted(set(contestants()) & {solver for solver, *_ in theirs})
-    small = [one for one in of_folder(given.folder / "data") if one.matrices.q.size <= given.most]
+    small = [
+        one for one in of_folder(given.folder / "data") if one.matrices is not None and one.matrices.q.size <= given.most
+    ]
     levels = given.level or ["high"]
     for level in levels:
         measured = compare(given.work, backends=solvers, levels=[level], instances=small)
@@ -229,7 +231,14 @@ class SolverRecord(NamedTuple):
         return [self.solver, len(self.pairs), *solved, times, self.same, *only, *_reasons(self.pairs)]
 
 
-TITLES = ("solver", "problems", "solved here", "here in the published form", "published", "mean time here / published [ms]")
+TITLES: tuple[str, ...] = (
+    "solver",
+    "problems",
+    "solved here",
+    "here in the published form",
+    "published",
+    "mean time here / published [ms]",
+)
 TITLES += ("same verdict", "only here", "only published", "differ by form", "by version or machine")
 
 
@@ -272,7 +281,7 @@ def _control(records: list[SolverRecord]) -> str:
 
 
 def _reasons(cells) -> list[str]:
-    """How many verdicts differ by the form of the problem, and how many do not; – where that cannot be told."""
+    """How many verdicts differ by the form of the problem, and how many do not; – where that is unknown."""
     if any(ours.get("as_published", "") == "" for ours, _ in cells):
         return ["–", "–"]
     agreed = [ours["as_published"] == theirs["kept"] for ours, theirs in cells if ours["kept"] != theirs["kept"]]

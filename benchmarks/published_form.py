@@ -102,9 +102,9 @@ def published_form(path: Path, take: Callable) -> qpsolvers.Problem:
     G = sparse.vstack([sign * rows[:m][here] for sign, _, here in free], format="csc")
     h = np.concatenate([bound[here] for _, bound, here in free])
     A, b = rows[:m][held], upper[:m][held]
-    inequalities = (take(G), h) if h.size else (None, None)
-    equalities = (take(A), b) if b.size else (None, None)
-    return qpsolvers.Problem(take(data["P"].astype(float)), q, *inequalities, *equalities, lower[m:], upper[m:])
+    below = (take(G), h) if h.size else (None, None)
+    equal = (take(A), b) if b.size else (None, None)
+    return qpsolvers.Problem(take(data["P"].astype(float)), q, below[0], below[1], equal[0], equal[1], lower[m:], upper[m:])
 
 
 def _dense(matrix) -> np.ndarray:

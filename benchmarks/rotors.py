@@ -80,7 +80,11 @@ class MeasuredChain:
 
     def row(self, seconds: dict[str, float]) -> dict:
         """Row of the table, of the times of a call by kind."""
-        found = {"shafts": self.n, "drives": len(self.run.reduced.friction_drives), "coordinates": self.run.reduced.n_groups}
+        found: dict[str, float] = {
+            "shafts": self.n,
+            "drives": len(self.run.reduced.friction_drives),
+            "coordinates": self.run.reduced.n_groups,
+        }
         found |= {f"{kind}_us": 1e6 * seconds[kind] for kind in KINDS}
         return found | {
             "kernel_ns_per_shaft": 1e9 * seconds["kernel"] / self.n,

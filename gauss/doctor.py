@@ -1,4 +1,4 @@
-"""What of an installation works: environment, processor, machine code, cache, solvers, optional packages."""
+"""State of an installation: environment, processor, machine code, cache, solvers, optional packages."""
 
 import os
 import time
@@ -11,9 +11,10 @@ from gauss.analysis.crosscheck import crosscheck
 from gauss.backends import available
 from gauss.backends.backend import BACKENDS
 from gauss.bench.machine import header
-from gauss.codegen import cache_size, file_trust, object_cache, trace
+from gauss.codegen import cache_size, file_trust, object_cache, trace, write
 from gauss.codegen.cpython_layout import is_known
-from gauss.codegen.gpu.cuda import device_names
+from gauss.codegen.gpu.batches import DeviceKernel
+from gauss.codegen.gpu.cuda_driver import device_names
 from gauss.codegen.gpu.devices import device
 from gauss.codegen.machine import width
 from gauss.codegen.optimiser import OPTIMISER
@@ -144,12 +145,14 @@ def _gpu() -> Finding:
         names = device_names()
     except (DeviceError, MissingPackageError) as error:
         return Finding("GPU", f"none: {error}")
-    if not names:
-        return Finding("GPU", "none: the driver of NVIDIA has no device")
-    found = device("cuda").put(np.ones(1)).numpy()
-    if found != [1.0]:
-        return Finding("GPU", f"{', '.join(names)}: numbers do not come back", "restart the driver of NVIDIA", False)
-    return Finding("GPU", ", ".join(f"cuda:{number} {name}" for number, name in enumerate(names)))
+    texts = []
+    for number, name in enumerate(names):
+        own = f"cuda:{number}"
+        found = DeviceKernel(own, write(lambda x: x * x[0] + 1.0, 2))(np.array([[3.0], [5.0]]))
+        if (found.ravel() != [10.0, 16.0]).any():
+            return Finding("GPU", f"{own} {name}: programs give wrong numbers", "update the driver of NVIDIA", False)
+        texts.append(f"{own} {name}: programs run and are right, {device(own).free_bytes() / 1e9:.3g} GB free")
+    return Finding("GPU", "; ".join(texts) or "none: the driver of NVIDIA has no device")
 
 
 def _motion() -> Finding:

@@ -106,7 +106,7 @@ class UnphysicalInertiaWarning(UserWarning):
 
 
 class StartWarning(UserWarning):
-    """A joint starts beyond its limits, at an angle that was probably meant in degrees, or not where it was told to."""
+    """A joint starts beyond its limits, at an angle that was probably meant in degrees, or not where the scene puts it."""
 
 
 class InconsistentConstraintsWarning(UserWarning):

@@ -116,7 +116,7 @@ def _pendulum(name: str, duration: float, side: float, **more) -> BenchmarkProbl
 def _ladder(n: int, duration: float, **more) -> BenchmarkProblem:
     def seen(motion):
         crank = motion.body("crank0")  # its middle is half way to B0
-        x, y, spin = *2.0 * crank.com[:, :2].T, crank.angular_velocity[:, 2]
+        (x, y), spin = 2.0 * crank.com[:, :2].T, crank.angular_velocity[:, 2]
         return np.column_stack([x, y, -spin * y, spin * x])
 
     return BenchmarkProblem(

@@ -41,6 +41,7 @@ from benchmarks.loop_robots.robots import Robot, robots  # noqa: E402
 from gauss.bench.contest import OURS, Competitor, interleaved, repeated  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.dynamics.projection import position_residual_of, relative  # noqa: E402
+from gauss.errors import SimulationError  # noqa: E402
 
 ROOT = Path(__file__).parent.parent.parent
 CALLS, BATCH = 200, 1024
@@ -132,7 +133,7 @@ def _motion(robot: Robot, seconds: float) -> dict:
     start = robot.instants()[0].state
     try:
         motion = gauss.simulate(system, seconds, state=start, times=times, rtol=1e-10, progress=False)
-    except gauss.SimulationError as error:
+    except SimulationError as error:
         print(robot.name, error, flush=True)
         motion = error.trajectory
     spent = time.process_time() - begin

@@ -6,7 +6,7 @@ Run it with:
 
 Every scene is moved by every method with settings from coarse to fine. The error is how far the centres of mass are from
 where a reference has them at the end, the largest of all [m]. Runs are timed on a wall clock, the best of up to four; the
-time to make machine code is told apart. What is in benchmarks/results/work_precision.csv already is not measured again; with
+time to make machine code stands apart. What is in benchmarks/results/work_precision.csv already is not measured again; with
 ``--report`` nothing is, and the report, the charts and a section of benchmarks/README.md are made of what is there.
 
 Settings of the peers:

@@ -39,7 +39,7 @@ def main():
 
 
 def _measure(case: TimedScene, table: "report.AttemptTable", patience: float):
-    """All attempts of a case that the table lacks."""
+    """All attempts of a case that are missing in the table."""
     system = gauss.compile_scene(case.make())
     methods = [*METHODS, *SUNDIALS] if system.n_v <= WIDE else EXPLICIT
     wanted = [method for method in methods if not table.has_method(case.name, "gauss", method)]

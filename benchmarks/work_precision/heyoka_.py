@@ -38,7 +38,7 @@ class HeyokaTaylor:
     kind : type
         Numbers: float, or numpy's longdouble.
 
-    Of few operations heyoka writes straight-line code, as it does unless it is told otherwise: twice as fast as its compact
+    Of few operations heyoka writes straight-line code, as is its default: twice as fast as its compact
     code, but compiled in a time that grows with their number and the square of the order.
     """
 

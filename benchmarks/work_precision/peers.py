@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def attempts(case: TimedScene, system: System, against: ReferencePositions, pati
 def _prepared(module, engine: str, system: System):
     """Function (method, setting, duration) → centres of mass, or a function that finds them."""
     if engine == "heyoka":
-        kept = {}
+        kept: dict[float, Any] = {}
 
         def taylor(method, tolerance, duration):
             if tolerance not in kept:

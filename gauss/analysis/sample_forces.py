@@ -71,9 +71,9 @@ def sample_forces(trajectory: Trajectory, backend) -> SampleForces:
 
 
 def kept_with(trajectory: Trajectory, what: str, backend, find: Callable[[], T]) -> T:
-    """What is found for all samples, kept with the motion for a backend that is given by its name.
+    """Result of a function for all samples, kept with the motion for a backend that is given by its name.
 
-    Laws of loads are those of now: with another traced law it is found anew, with an opaque one, which may change, always.
+    Laws of loads are compared: with another traced law it is found anew, with an opaque one, which may change, always.
     """
     laws = Laws(trajectory.system)
     if laws.called or not isinstance(backend, str):

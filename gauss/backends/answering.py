@@ -22,7 +22,7 @@ from gauss.errors import BackendError
 
 DOUBLE = np.dtype(float)
 OURS = "gauss."  # modules whose classes write to nothing that they are given
-REAL_KINDS = "fiu"  # kinds of arrays of real numbers; others might be converted, but hardly mean what they then say
+REAL_KINDS = "fiu"  # kinds of arrays of real numbers; others might be converted, but hardly mean these numbers
 
 
 def certified(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solution:
@@ -75,7 +75,7 @@ def _factored_answer(
 
 
 def call(method: Callable, *given):
-    """Result of a method of somebody else.
+    """Result of a foreign method.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def call(method: Callable, *given):
         return method(*given)
     except (KeyboardInterrupt, SystemExit, BackendError):
         raise
-    except np.linalg.LinAlgError as error:  # numpy says best what is wrong with a matrix
+    except np.linalg.LinAlgError as error:  # numpy's message names the fault of the matrix
         raise BackendError(str(error)) from error
     except BaseException as error:  # panics of Rust code are no Exceptions
         raise BackendError(f"failed: {raised(error)}") from error

@@ -1,4 +1,4 @@
-"""What a backend is: compulsion → answer. Any object of this form is one, whoever wrote it."""
+"""Protocol of a backend: compulsion → answer. Any object of this form is one."""
 
 from typing import Protocol, runtime_checkable
 

@@ -7,7 +7,7 @@ factorisation is found by the second step, unless it is wrong in just the direct
 another kind, or :mod:`gauss.analysis.crosscheck`, would find that.
 
 The same step corrects the multipliers, and these are returned: a backend need not give any. They are judged for themselves,
-constraint by constraint: near a singular configuration reactions may lack the digits that all accelerations have.
+constraint by constraint: near a singular configuration reactions may have fewer correct digits than accelerations.
 
 The size of the step is the error of the answer (measured over a dozen backends: ratio to the true error 1.000 ± 0.0004), as
 far as residuals show it. Added are the size of a second step, for the error of the factorisation itself, and a bound of the
@@ -181,7 +181,7 @@ def _complementarity(compulsion: Compulsion, answer: Answer) -> float:
 
 
 def _undetermined(basis: np.ndarray) -> np.ndarray:
-    """Which multipliers (r,) redundant rows leave undetermined, by the null space (r, k); empty when all are unique."""
+    """Multipliers (r,) that redundant rows leave undetermined, by the null space (r, k); empty when all are unique."""
     if not basis.shape[1]:
         return np.zeros(0, dtype=bool)
     sizes = np.linalg.norm(basis / np.linalg.norm(basis, axis=0), axis=1)

@@ -149,7 +149,7 @@ class Compulsion:
         return from_blocks(entries, (self.structure.n_rows, width))
 
     def read_only(self) -> "Compulsion":
-        """Return the same problem with views that cannot be written to, for methods of somebody else."""
+        """Return the same problem with read-only views, for foreign methods."""
         views: dict[str, Any] = {name: _view(getattr(self, name)) for name in VECTORS}
         views |= {name: tuple(tuple(map(_view, row)) for row in getattr(self, name)) for name in ("A_blocks", "B_blocks")}
         return replace(self, **views)

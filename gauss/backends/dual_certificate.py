@@ -18,7 +18,7 @@ LEAST_SHARE = 1e-3  # of the largest acceleration, or force on a body: smaller o
 
 @dataclass(frozen=True)
 class DualCertificate:
-    """What residuals and one refinement step say about the multipliers of an answer.
+    """Estimated error of the multipliers of an answer, by residuals and one refinement step.
 
     Multipliers along the null space of redundant rows (``undetermined`` in :class:`Certificate`) are not judged: any of them
     give the same motion.

@@ -1,4 +1,4 @@
-"""Which factorisation of the KKT system suits a compulsion: by the spanning tree, sparse, or by singular values."""
+"""Choice of the factorisation of the KKT system: by the spanning tree, sparse, or by singular values."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -17,7 +17,7 @@ SPARSE_FROM_ROWS = 150  # rows outside the tree from which on a sparse factorisa
 
 
 def factors(compulsion: Compulsion) -> tuple[Callable[..., KKTFactor], ...]:
-    """Factorisations by the tree in the order in which they are tried; the last one tells redundant rows best."""
+    """Factorisations by the tree in the order in which they are tried; the last one finds redundant rows best."""
     n_outside = outside(compulsion.structure)[0].size
     return (SparseFactor, Factor) if n_outside > SPARSE_FROM_ROWS else (Factor,)
 

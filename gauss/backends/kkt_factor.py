@@ -1,4 +1,4 @@
-"""A factorisation of the KKT system, and what it says of an answer: its error, as far as residuals show it and beyond.
+"""A factorisation of the KKT system, and the error of an answer by it: from residuals, and beyond them.
 
     Φ a + Aᵀ λ + G_aᵀ μ = r1,   A a + B q̈ = r2,   Bᵀ λ + G_qᵀ μ = r3,   G (a, q̈) = r4 (active rows)
 

@@ -78,7 +78,7 @@ def _doubles():
 
 
 def outcome(solution: qpsolvers.Solution, solver: str) -> Outcome:
-    """What a solution of qpsolvers says."""
+    """Status and values of a solution of qpsolvers."""
     if solution.x is None:
         return Outcome(None, None, None, False, f"{solver}: found no solution")
     message = f"{solver}: {'solved' if solution.found else 'claims no solution'}"

@@ -199,6 +199,6 @@ class Solution:
 
     @property
     def answer(self) -> Answer:
-        """What the backend said, with the multipliers that are returned."""
+        """Answer of the backend, with the multipliers that are returned."""
         fields = (self.a, self.qdd, self.multipliers, self.inequality_multipliers)
         return Answer(*fields, self.status.found, self.status.message, self.iterations)

@@ -80,7 +80,7 @@ class Bounds(NamedTuple):
 
     @classmethod
     def of_rows(cls, K: sparse.csr_matrix, k: np.ndarray) -> "Bounds":
-        """Bounds that K x ≤ k says."""
+        """Bounds of K x ≤ k."""
         places, signs, bounds = K.indices, np.sign(K.data), k / K.data
         lower, upper = np.full(K.shape[1], -np.inf), np.full(K.shape[1], np.inf)
         np.maximum.at(lower, places[signs < 0.0], bounds[signs < 0.0])

@@ -1,4 +1,4 @@
-"""Arrays of files from anybody, looked at before they are believed: nothing is unpickled, no size fills the memory.
+"""Arrays of untrusted files, checked before use: nothing is unpickled, no size fills the memory.
 
 Sparse matrices of any file are checked entry by entry, for an index beyond the shape would read and write beyond the arrays.
 """
@@ -11,6 +11,7 @@ from scipy import sparse
 
 LARGEST_FILE = 2e9  # bytes of all arrays of a file, unpacked
 REAL_KINDS = "biuf"  # kinds of arrays that hold real numbers
+ASYMMETRY_RELATIVE = 1e-9  # of the largest entry: Hessians of others are symmetric to rounding, or are one triangle
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray | None]:
@@ -88,13 +89,30 @@ def require_real(**parts):
             raise ValueError(f"{name} holds nan.")
 
 
+def require_symmetric(name: str, matrix):
+    """Refuse a matrix that is not symmetric, as one triangle: solvers read the one or the other, or both.
+
+    Raises
+    ------
+    ValueError
+        Naming the matrix.
+    """
+    found = sparse.csc_array(matrix)
+    if found.shape[0] != found.shape[1]:
+        raise ValueError(f"{name} has shape {found.shape}, expected a square matrix.")
+    difference, largest = (float(abs(one).max()) if one.nnz else 0.0 for one in (found - found.T, found))
+    if difference > ASYMMETRY_RELATIVE * largest:
+        raise ValueError(f"{name} is not symmetric, by {difference:.3g} of {largest:.3g}; expected both of its triangles.")
+
+
 def require_programme(P, q, A, b, G, h):
     """Refuse matrices and vectors that are no quadratic programme.
 
     Raises
     ------
     ValueError
-        If shapes do not belong together, numbers but right-hand sides of inequalities are not finite, or nothing is asked.
+        If shapes do not belong together, P is not symmetric, numbers but right-hand sides of inequalities are not finite,
+        or nothing is asked.
     """
     n = np.size(q)
     expected = {"P": (n, n), "q": (n,), "A": (np.size(b), n), "b": (np.size(b),), "G": (np.size(h), n), "h": (np.size(h),)}
@@ -106,3 +124,4 @@ def require_programme(P, q, A, b, G, h):
             raise ValueError(f"{name} holds numbers that are not finite.")
     if not n:
         raise ValueError("it has no unknowns.")
+    require_symmetric("P", P)

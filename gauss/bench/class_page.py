@@ -97,7 +97,7 @@ def at_main_level(rows) -> list[dict]:
 
 
 def _by_level(rows, names: list[str]) -> list[str]:
-    """What each solver kept, had right and took at every level, on the problems that were asked at all of them."""
+    """Kept promises, right answers and times of each solver at every level, on the problems asked at all of them."""
     levels = [level for level in LEVELS if any(row["level"] == level for row in rows)]
     common = set.intersection(*({row["problem"] for row in rows if row["level"] == level} for level in levels or [OWN]))
     found = _lines_by_level(rows, names, levels, common)
@@ -199,7 +199,7 @@ def _sentences(
 
 
 def sentence(name: str, mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]) -> str:
-    """What the numbers say of a solver."""
+    """Sentence on a solver, from its numbers."""
     found = mine[name]
     count, right = len(found), sum(map(is_right, found))
     if not right:

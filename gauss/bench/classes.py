@@ -101,7 +101,7 @@ def name_of(kind: str) -> str:
 
 
 def story_of(kind: str) -> str:
-    """What is in a class."""
+    """Content of a class."""
     return STORIES.get(kind) or CLASSES[suite_class(kind)]
 
 

@@ -23,7 +23,7 @@ ROUNDS = 15  # timed calls, fewer when they take long ...
 FEWEST = 3  # ... but not fewer than these, as quartiles need them
 BUDGET = 0.1  # [s] for them
 WALL_PER_CPU = 10.0  # times: wall time of a call that counts as one of CPU time, where less was used
-INTERRUPTION = 2e-5  # [s] of wall time beyond CPU time that tell of other processes; clocks differ by a few microseconds
+INTERRUPTION = 2e-5  # [s] of wall time beyond CPU time that show other processes; clocks differ by a few microseconds
 GRACE = 2.0  # of the limit, time after which a call is ended with its process
 
 
@@ -39,7 +39,7 @@ UNKNOWN = Times(np.nan, np.nan, np.nan)
 
 
 def timed(call: Callable[[], Any], limit: float, compiles: bool = False) -> tuple[list, list[float]]:
-    """What the calls returned, and their times [s]: the cold one first, then warm ones.
+    """Results of the calls, and their times [s]: the cold one first, then warm ones.
 
     A cold call that takes longer than the limit is the only one, unless it ``compiles``, which later ones do not.
     In a worker, a call that takes twice the limit ends with its process.
@@ -145,7 +145,7 @@ DAQP = {-1: "infeasible", -2: "cycles", -3: "unbounded", -4: "iteration limit", 
 
 
 def asked_daqp(problem, settings: dict) -> tuple:
-    """What DAQP itself returns for a problem of qpsolvers: x, objective, exit flag, information."""
+    """Result of DAQP itself for a problem of qpsolvers: x, objective, exit flag, information."""
     import daqp
 
     rows = np.vstack([part for part in (problem.G, problem.A) if part is not None])

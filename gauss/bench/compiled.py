@@ -1,4 +1,4 @@
-"""What gauss itself needs for the same accelerations: the machine code traced for the scene, assembly included."""
+"""Time of gauss itself for the same accelerations: the machine code traced for the scene, assembly included."""
 
 import time
 from statistics import median

@@ -16,7 +16,7 @@ Clock = Callable[[], float]  # s: time.process_time or time.perf_counter
 
 @dataclass(frozen=True)
 class Competitor:
-    """What is timed.
+    """Work that is timed.
 
     Parameters
     ----------

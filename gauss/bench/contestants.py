@@ -1,4 +1,4 @@
-"""How a QP solver of the comparison is called: its problem made ready first, then nothing but the call under the clock."""
+"""Calls of QP solvers of the comparison: the problem is made ready first, then only the call is timed."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -68,7 +68,7 @@ def ready(solver: str, programme: Programme, level: str) -> Ready:
 
 
 def started(solver: str, programme: Programme, level: str, start: np.ndarray) -> Ready | None:
-    """As :func:`ready`, but the call starts at a point (n,); None if there is no way to tell the solver."""
+    """As :func:`ready`, but the call starts at a point (n,); None if the solver takes none."""
     if solver not in WARM:
         return None
     problem, chosen = qpsolvers_.converted(programme, solver), settings(solver, level)
@@ -110,7 +110,7 @@ def imported(solver: str) -> Callable[[], Callable[[Programme], Outcome]]:
     module, _, name = solver.partition(":")
     try:
         return getattr(import_module(module), name)
-    except Exception as error:  # whatever a module of somebody else raises
+    except Exception as error:  # any error of a foreign module
         raise BackendError(
             f"solver {solver!r}: {type(error).__name__}: {error}. Expected module:Class, importable from here, whose "
             "objects are called with a gauss.backends.programme.Programme and return an Outcome."

@@ -1,6 +1,7 @@
 """Files of problems in a folder as instances of the comparison, in the formats in which others write theirs."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ def of_folder(folder: Path) -> Iterator[Instance]:
     FileError
         If there is none, or one cannot be read.
     """
-    paths = sorted(path for path in Path(folder).glob("*") if path.suffix in READERS and path.is_file())
+    paths = sorted(path for path in Path(folder).glob("*") if path.suffix.lower() in READERS and path.is_file())
     if not paths:
         raise FileError(f"{folder}: no {' or '.join(READERS)} files of problems.")
     for path in paths:
@@ -37,7 +38,7 @@ def of_folder(folder: Path) -> Iterator[Instance]:
 def _read(path: Path, group: str) -> Instance:
     """Instance of a file; whatever is wrong with it, a FileError names it."""
     try:
-        found = READERS[path.suffix](path, group)
+        found = READERS[path.suffix.lower()](path, group)
         assert found.matrices is not None  # programmes of files are no compulsions
         require_programme(*found.matrices)
     except FileError:
@@ -106,8 +107,8 @@ def _of_mat(path: Path, group: str) -> Instance:
     return of_arrays(path.stem, group, P, q, rows[held], upper[held], *_stacked(sides))
 
 
-def _of_qps(path: Path, _: str) -> Instance:
-    return of_suite_instance(read_qps(path))
+def _of_qps(path: Path, group: str) -> Instance:
+    return replace(of_suite_instance(read_qps(path)), group=group)
 
 
 def _of_fclib(path: Path, _: str) -> Instance:

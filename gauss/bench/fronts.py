@@ -14,7 +14,7 @@ from gauss.bench.verdicts import truth
 
 
 class FrontPoint(NamedTuple):
-    """Where a solver stands: time over that of the fastest, and error."""
+    """Point of a solver: time over that of the fastest, and error."""
 
     ratio: float
     error: float
@@ -71,7 +71,7 @@ def _several_levels(rows) -> bool:
 
 
 def _panels(found: dict[str, list[dict]]) -> dict[str, dict[str, FrontPoint]]:
-    """Points of each problem, by the names of those who answered it."""
+    """Points of each problem, by the names of the solvers that answered it."""
     panels: dict[str, dict[str, tuple[float, float]]] = {}
     for name, rows in found.items():
         for row in rows:

@@ -35,7 +35,7 @@ class Matrices(NamedTuple):
 
 @dataclass(frozen=True)
 class Instance:
-    """What solvers are asked, and what is right.
+    """Programme that solvers are given, and its solution.
 
     Parameters
     ----------

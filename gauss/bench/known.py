@@ -1,4 +1,4 @@
-"""What is known of a programme, and how far an answer is from it: in x, and in the multipliers that the rows determine."""
+"""Known solution of a programme, and errors of an answer: of x, and of the multipliers that the rows determine."""
 
 from dataclasses import dataclass
 
@@ -70,7 +70,7 @@ class KnownSolution:
 
 
 def known(programme, x, units=None, multipliers=None, held=None, unique: bool = True) -> KnownSolution:
-    """What is known of a programme with matrices P, q, A, b, G, h.
+    """Known solution of a programme with matrices P, q, A, b, G, h.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def known(programme, x, units=None, multipliers=None, held=None, unique: bool = 
 
 
 def scales(programme, x: np.ndarray, units: np.ndarray) -> np.ndarray:
-    """What errors of unknowns (n,) are compared with: the largest of the same unit, or the median of these without rows.
+    """Scales of the errors of unknowns (n,): the largest of the same unit, or the median of these without rows.
 
     The median, for what rows keep from next to no mass says nothing of the others. Units whose unknowns all rest, with and
     without rows, are compared with what has the energy ½ P_jj x_j² of the largest of all.

@@ -48,7 +48,7 @@ class Promise(NamedTuple):
 
 @dataclass(frozen=True)
 class SolverPolicy:
-    """What a solver gets beside the tolerances of qpbenchmark, and what its claim promises.
+    """Settings of a solver beside the tolerances of qpbenchmark, and the promise of its claim.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def settings(solver: str, level: str) -> dict:
 
 
 def promise(solver: str, level: str) -> Promise:
-    """What a solver's claim of success at a level promises."""
+    """Promise of a solver's claim of success at a level."""
     policy = POLICIES.get(solver, OF_ANYBODY)
     if not policy.has_tolerance:
         return Promise(LOOSEST, LOOSEST, np.inf)

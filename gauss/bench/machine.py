@@ -32,7 +32,7 @@ def libraries() -> str:
 
 
 def _load() -> str:
-    """How busy the machine is when the measurement starts: single times on one that is shared are no records."""
+    """Load of the machine when the measurement starts: single times on a shared one are no records."""
     return f", load average {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
 
 

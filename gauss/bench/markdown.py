@@ -4,6 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+BAR = "\\|"  # within a cell
+
 
 def head(title: str, conditions: Iterable[str]) -> list[str]:
     """Title of a page, and the conditions of the measurement as a list."""
@@ -16,8 +18,8 @@ def when_and_where(conditions: Sequence[str]) -> str:
 
 
 def row(cells: Iterable) -> str:
-    """Line of a table."""
-    return f"| {' | '.join(map(str, cells))} |"
+    """Line of a table; a stroke within a cell is escaped."""
+    return f"| {' | '.join(str(cell).replace('|', BAR) for cell in cells)} |"
 
 
 def table(titles: Sequence[str], rows: Iterable[Iterable]) -> list[str]:

@@ -137,7 +137,7 @@ def _loaded(backend: str, level: str, kind: str):
 
 
 def _judged(instance: Instance, programme: Programme, outcome: Outcome, promised: Promise) -> dict:
-    """Residuals of what a solver says, how much they exceed what it promises, its error, and the certificate."""
+    """Residuals of an answer, their excess over the promise of the solver, its error, and the certificate."""
     row = {"claimed": outcome.found, "iterations": outcome.iterations, "reason": outcome.message, "outcome": "refused"}
     if outcome.x is None:
         return row
@@ -187,7 +187,7 @@ def _floors(programme: Programme, x, y, z) -> np.ndarray:
 
 
 def _certified(instance: Instance, answer: Answer) -> dict:
-    """Error of an answer, and what the certificate says of it."""
+    """Error of an answer, and its certificate."""
     compulsion = instance.compulsion
     assert compulsion is not None  # certificates are of compulsions
     certificate = certify(compulsion, answer)

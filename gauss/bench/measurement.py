@@ -12,7 +12,7 @@ from gauss.errors import BackendError, did_you_mean
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a command of ``gauss bench`` measures.
+    """Measurement of a command of ``gauss bench``.
 
     Parameters
     ----------

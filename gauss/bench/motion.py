@@ -170,7 +170,7 @@ def _line(row) -> list[str]:
 
 
 def _summary(rows) -> list[str]:
-    """Lines that say which backends serve a purpose in all scenes that are measured."""
+    """Lines on the backends that serve a purpose in all measured scenes."""
     limits = [*(limit for limit, _ in PURPOSES), np.inf]
     methods: dict[str, float] = {}
     for row in rows:

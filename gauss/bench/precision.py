@@ -30,7 +30,7 @@ USUAL = ("dop853", "taylor", "dopri5", "rk4", "semi_implicit_euler", "verlet", "
 TOLERANCES = tuple(10.0**-k for k in range(3, 15))
 DIVISIONS = tuple(2**k for k in range(5, 21, 2))  # of the duration, into fixed steps
 LOST = 10.0  # m: a motion that is off by more has nothing to do with the reference
-TWO = ("dopri5", "dop853")  # a reference, and what tells how good it is
+TWO = ("dopri5", "dop853")  # a reference, and its check
 FINEST = 1e-14
 STEPS = 2**14  # of the finest run from which time stepping is extrapolated
 SENTENCE = 120  # letters of a reason, at most
@@ -72,13 +72,13 @@ class Attempt:
 
     @property
     def failed(self) -> bool:
-        """Whether there is no result, or one that is beside the point."""
+        """Whether there is no result, or none of use."""
         return bool(self.reason)
 
 
 @dataclass(frozen=True)
 class ReferencePositions:
-    """Where the centres of mass are at the end (n, 3), and how far that may be off [m]."""
+    """Final positions of the centres of mass (n, 3), and bounds of their errors [m]."""
 
     positions: np.ndarray
     uncertainty: float
@@ -103,7 +103,7 @@ def usual(system: System) -> tuple[str, ...]:
 
 
 def reference(system: System, duration: float, steps: int | None = None) -> ReferencePositions:
-    """Reference of a motion by the finest run of one method; another method tells how good it is.
+    """Reference of a motion by the finest run of one method; another method estimates its error.
 
     Where contacts have friction, it is extrapolated from time stepping with up to so many ``steps``, ``STEPS`` when not
     given; see :mod:`gauss.bench.extrapolation`.

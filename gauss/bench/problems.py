@@ -1,4 +1,4 @@
-"""Gauss problems of real mechanisms, from gentle to nearly inconsistent; each says what is hard about it."""
+"""Gauss problems of real mechanisms, from gentle to nearly inconsistent; each with its difficulty."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

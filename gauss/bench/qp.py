@@ -169,7 +169,7 @@ def _add_compiled(table: ResultTable, instance: Instance):
 
 
 def _row(reply: Reply) -> dict:
-    """What a worker measured, or what became of it."""
+    """Measurement of a worker, or the outcome of its call."""
     if reply.outcome == "answered":
         return reply.value
     return unanswered() | {"outcome": "refused" if reply.outcome == "raised" else reply.outcome, "reason": reply.reason}

@@ -27,7 +27,7 @@ GUESSES = ("daqp", "clarabel", "piqp")  # of the active rows, in turn until one 
 
 @dataclass(frozen=True)
 class ReferenceSolution:
-    """What is right, to far more digits than a double holds.
+    """Solution to far more digits than a double holds.
 
     Parameters
     ----------

@@ -82,8 +82,9 @@ def _problems(rows) -> list[str]:
 def _errors(rows) -> list[str]:
     problems = [name for group, names in groups(rows).items() if group != INCONSISTENT for name in names]
     cells = cells_shown(rows)
+    forms = sorted({row["form"] for row in cells.values()} - {OWN}) or [MAIN_FORM]
     lines = [
-        f"## Errors, {MAIN_FORM}, level {MAIN_LEVEL}",
+        f"## Errors, {', '.join(forms)}, level {MAIN_LEVEL}",
         "",
         "In brackets: not certified. Bold: claimed, beyond. –: refused, or no finite "
         f"answer; {compiled.NAME}, which has no certificate: errors of joints alone. Kept: residuals are within the "
@@ -157,7 +158,7 @@ VERDICTS = {
 
 
 def _verdicts(rows) -> list[str]:
-    """What solvers make of problems that have no solution."""
+    """Verdicts of solvers on problems without a solution."""
     problems = groups(rows).get(INCONSISTENT, [])
     lines = []
     for problem in problems:
@@ -293,7 +294,7 @@ def _beside(line: dict) -> list[str]:
 
 
 def _honesty(rows) -> list[str]:
-    """Promises and certificates: the same questions to all who answered."""
+    """Promises and certificates: the same questions to all solvers that answered."""
     asked = [r for r in rows if r["group"] != INCONSISTENT and r["backend"] != compiled.NAME]
     by_level = {level: [r for r in asked if r["level"] == level] for level in (*LEVELS, OWN)}
     ours = by_level.pop(OWN)

@@ -1,4 +1,4 @@
-"""What a kept workspace and a warm start are worth along a motion, step by step, beside solving from nothing."""
+"""Gain of a kept workspace and of a warm start along a motion, step by step, beside solving from nothing."""
 
 import time
 from collections.abc import Callable
@@ -76,7 +76,7 @@ def _row(mode: str, error: float, figures: list[tuple[float, ...]]) -> dict:
 
 
 def _timed(call: Callable) -> tuple[Any, float]:
-    """What a call returns, and its time [s]."""
+    """Result of a call, and its time [s]."""
     begin = time.perf_counter()
     found = call()
     return found, time.perf_counter() - begin

@@ -65,7 +65,7 @@ def _compared(name: str, level: str) -> list[str]:
 
 
 def _way(name: str) -> tuple[str, str, str]:
-    """What a solver is called through, the matrices that it gets, and what its library reports."""
+    """Interface of a solver, its matrices, and the times that its library reports."""
     if name in WAYS:
         return WAYS[name]
     if ":" in name or name not in qpsolvers.available_solvers:

@@ -18,7 +18,7 @@ CONES, COULOMB, STAGES, ROWS = "cones", "coulomb", "stages", "rows"
 
 @dataclass(frozen=True)
 class ProgrammeStructure:
-    """What solvers of one kind need to know of a programme beside its matrices.
+    """Structure of a programme beside its matrices, for solvers of one kind.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Classes of the suite as the comparison takes them: programmes, verdicts, and where warm starts begin."""
+"""Classes of the suite in the form of the comparison: programmes, verdicts, and starts of warm starts."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,7 +25,7 @@ def suite_class(kind: str) -> str:
 
 
 def of_suite(kind: str, names: list[str]) -> Iterator[Instance]:
-    """Instances of a class by name; steps of a sequence start at the answer of the step before, whoever is asked."""
+    """Instances of a class by name; steps of a sequence start at the reference of the step before."""
     kind = suite_class(kind)
     order = [recipe.name for recipe in recipes(kind)]
     for name in names:

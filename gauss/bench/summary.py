@@ -1,4 +1,4 @@
-"""What the rows of the comparison say together: shares and means over equal sets of problems, and who is fastest.
+"""Summary of the rows of the comparison: shares and means over equal sets of problems, and the fastest solvers.
 
 One rule for all backends, gauss's own among them: an answer is right if its error beside the reference is at most
 1e-6, that of its multipliers at most 1e-3, and in time. A solver that was asked for a tolerance is judged by residuals,
@@ -103,7 +103,7 @@ def checksum(rows) -> str:
 
 
 def not_asked(rows) -> list[str]:
-    """Lines of Markdown that say which solvers take how many of the problems, and why not all; none where all do."""
+    """Lines of Markdown on solvers that take not all of the problems, with reasons; none where all do."""
     count: dict[tuple[str, str], set[str]] = {}
     for row in rows:
         if row["outcome"] == NOT_ASKED:
@@ -233,7 +233,7 @@ def profile(rows, problems: list[str], form: str, level: str, accuracy: float, r
 
 
 def verdict(row) -> str:
-    """What a backend makes of an inconsistent problem: says so, gives up, or claims success, within its tolerance or not."""
+    """Verdict of a backend on an inconsistent problem: reported, given up, or claimed solved, within tolerance or not."""
     if row["claimed"] and row["level"] in LEVELS:
         return "broken" if is_broken(row) else "within"
     if row["claimed"]:

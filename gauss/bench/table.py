@@ -27,21 +27,26 @@ class ResultTable:
     Raises
     ------
     FileError
-        If the file holds rows of other versions, of another machine, or of another table.
+        If the file holds rows of other versions, of another machine, or of another table, or cannot be read or written.
     """
 
     def __init__(self, path: Path, header: list[str], keys: tuple[str, ...], values: tuple[str, ...], fresh: bool):
         self.path, self.keys, self.columns = path, keys, (*keys, *values)
         self.rows: dict[tuple, dict] = {}
         comments = [f"# {line}\n" for line in header]
-        if path.exists() and not fresh:
-            self._take_up(comments)
-            self._drop_half_a_row()
-        else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with open(path, "w", newline="", encoding="utf-8") as file:
-                file.writelines(comments)
-                csv.writer(file).writerow(self.columns)
+        try:
+            if path.exists() and not fresh:
+                self._take_up(comments)
+                self._drop_half_a_row()
+            else:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with open(path, "w", newline="", encoding="utf-8") as file:
+                    file.writelines(comments)
+                    csv.writer(file).writerow(self.columns)
+        except UnicodeDecodeError:
+            raise FileError(f"{path} is no table of words and numbers; --fresh starts over.") from None
+        except (OSError, csv.Error) as error:
+            raise FileError(f"{path}: {error}") from None
 
     def add(self, row: dict):
         """Write a row at once, in the place of one of the same key."""
@@ -84,7 +89,7 @@ class ResultTable:
 def write_table(path: Path, header: Iterable[str], rows: Sequence[dict], columns: Iterable[str] | None = None):
     """Write a finished table: the header as comments, then the columns, those of the first row when not given.
 
-    Cells that a row lacks stay empty.
+    Missing cells of a row stay empty.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with open(path, "w", newline="", encoding="utf-8") as file:

@@ -22,7 +22,7 @@ STARTING = threading.Lock()  # the environment that a new process inherits is th
 
 @dataclass(frozen=True)
 class Reply:
-    """What became of a call.
+    """Outcome of a call.
 
     Parameters
     ----------

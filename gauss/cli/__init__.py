@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gauss.cli import bench, docs, doctor, linkage, rotors, run, scenes, show, sweep
+from gauss.cli import bench, docs, doctor, export, linkage, rotors, run, scenes, show, sweep
 from gauss.errors import GaussError
 from gauss.versions import VERSION
 
@@ -21,6 +21,7 @@ for command in (
     show.show,
     scenes.check,
     scenes.explain,
+    export.export,
     linkage.linkage,
     rotors.rotors,
     scenes.models,

@@ -204,7 +204,7 @@ def motion(
 
 
 def _report(table, written):
-    """Say what was written."""
+    """Print the files that were written."""
     typer.echo(f"{len(table.rows)} rows in {table.path}")
     for path in written:
         typer.echo(f"written: {path}")

@@ -1,4 +1,4 @@
-"""What several commands share: arguments, loading, figures, conclusions."""
+"""Arguments, loading, figures and conclusions of several commands."""
 
 from importlib import import_module
 from typing import Annotated, Any
@@ -22,6 +22,7 @@ READS: dict[str, dict[str, object]] = {
     "stops": {"limits": "stops"},
     "resistance": {"resistance": True},
     "collisions": {"collisions": True},
+    "motors": {"motors": True},
     "contacts": {"contacts": True},
     "inertia": {"inertia": "as given"},
 }
@@ -66,7 +67,7 @@ def started(scene, start, speed):
 
 
 def tolerances(entries: list[str] | None):
-    """Absolute local error as :func:`gauss.simulate` takes it, from what ``--atol`` says; None if that is nothing."""
+    """Absolute local error as :func:`gauss.simulate` takes it, from ``--atol``; None without it."""
     found: dict = {}
     for entry in entries or ():
         name, _, value = entry.rpartition("=")
@@ -90,7 +91,7 @@ INTERRUPTED = 130  # exit code, by the custom of shells: 128 and the number of t
 
 
 def as_far_as_it_came(make):
-    """What is made, and whether Ctrl-C ended it before its end: a motion is kept as far as it came.
+    """Result of a function, and whether Ctrl-C ended it early: a motion is kept up to then.
 
     Raises
     ------

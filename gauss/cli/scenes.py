@@ -25,7 +25,7 @@ def check(
 
 
 def explain(scene: SceneName, root: Root = "fixed", read: Read = None):
-    """Say what a scene consists of, what it can do, how it is solved, what that costs, and which method fits."""
+    """Describe a scene: elements, mobility, reductions and plan, cost, and a recommended method."""
     found = load(scene, root, read)
     if isinstance(found, gauss.Scene):
         system = gauss.compile_scene(found)

@@ -41,7 +41,7 @@ def sweep(
     ] = None,
     root: Root = "fixed",
 ):
-    """Simulate a scene with many values of its masses, lengths, starts, … and say what became of them."""
+    """Simulate a scene with many values of its masses, lengths, starts, …, and report their outcomes."""
     found = load(scene, root)
     if not isinstance(found, gauss.Scene):
         raise FileError(f"{scene}: servos are not simulated in sweeps; sweep the scene without them.")

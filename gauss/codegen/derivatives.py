@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, reachable
+from gauss.codegen.expression import Expression, reachable
+from gauss.codegen.graph import Graph
 
 # partial derivatives of a node y by its operands; one and zero are constants of its graph
 _PARTIALS: dict[str, Callable[..., tuple]] = {

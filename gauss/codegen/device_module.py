@@ -12,6 +12,10 @@ class DeviceModule(ir.Module):
     """Module whose functions run on one thread of a GPU each, or lane by lane on this CPU."""
 
 
+class SingleDeviceModule(DeviceModule):
+    """The same in single precision: traced functions compute so, memory and transcendental functions are double."""
+
+
 def vector_width(module: ir.Module) -> int:
     """Doubles in one vector register of the processor that a module is for."""
     return 1 if isinstance(module, DeviceModule) else width()

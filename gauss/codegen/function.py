@@ -8,7 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, graph_of, reachable
+from gauss.codegen.expression import Expression, graph_of, reachable
+from gauss.codegen.graph import Graph
 from gauss.errors import judged_later
 
 

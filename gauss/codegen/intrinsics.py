@@ -5,7 +5,7 @@ from llvmlite import ir
 
 def intrinsic(module: ir.Module, name: str, kind: ir.Type, arguments: int) -> ir.Function:
     """Declare e.g. ``llvm.sqrt.v8f64``, all arguments and the result of one type."""
-    suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
+    suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f32" if isinstance(kind, ir.FloatType) else "f64"
     return external(module, f"{name}.{suffix}", kind, [kind] * arguments)
 
 

@@ -6,9 +6,11 @@ from contextlib import contextmanager
 import numpy as np
 from llvmlite import ir
 
+from gauss.codegen.device_module import SingleDeviceModule
 from gauss.codegen.intrinsics import external
 from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes
 from gauss.codegen.recurrences import LINE
+from gauss.codegen.single_lanes import SingleLanes
 from gauss.codegen.text_builder import TextBuilder
 
 POINTER, BYTES = DOUBLE.as_pointer(), ir.IntType(8).as_pointer()
@@ -27,7 +29,7 @@ def begin_function(module: ir.Module, name: str, width: int, kind: ir.FunctionTy
     b = TextBuilder(body.append_basic_block("entry"))
     if width > 1:
         _at_a_page(b)
-    return body, Lanes(module, width, b)
+    return body, SingleLanes(module, b) if isinstance(module, SingleDeviceModule) else Lanes(module, width, b)
 
 
 def _at_a_page(b: ir.IRBuilder):

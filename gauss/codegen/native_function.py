@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen.expression import Expression, Graph, graph_of
+from gauss.codegen.expression import Expression, graph_of
+from gauss.codegen.graph import Graph
 from gauss.codegen.ir_blocks import BODY
 
 if TYPE_CHECKING:

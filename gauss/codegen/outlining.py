@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, reachable
+from gauss.codegen.expression import Expression, reachable
 from gauss.codegen.function import Function
+from gauss.codegen.graph import Graph
 
 
 def outlined(outputs, symbols, name: str) -> tuple[Function, list[Expression]]:

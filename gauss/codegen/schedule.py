@@ -12,8 +12,9 @@ so that few are spilled (Sethi and Ullman, J. ACM 17, 1970).
 from collections import Counter
 from typing import NamedTuple
 
-from gauss.codegen.expression import Expression, Graph
+from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
+from gauss.codegen.graph import Graph
 from gauss.codegen.multiply_add import fused
 
 # latencies, in units of an addition

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from gauss.codegen.expression import Expression, Graph
+    from gauss.codegen.expression import Expression
+    from gauss.codegen.graph import Graph
 
 
 def _add(graph: "Graph", x: "Expression", y: "Expression") -> "Expression | None":

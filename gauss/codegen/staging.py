@@ -9,8 +9,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from gauss.codegen.expression import COMMUTATIVE, Expression, Graph, graph_of, reachable
+from gauss.codegen.expression import Expression, graph_of, reachable
 from gauss.codegen.function import Function, traced
+from gauss.codegen.graph import COMMUTATIVE, Graph
 
 REPEATED = ("neg", "less", "less_equal")  # signs fold, and conditions are no numbers: each function evaluates its own
 

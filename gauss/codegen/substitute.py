@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from gauss.codegen.expression import BINARY, UNARY, Expression, reachable
+from gauss.codegen.expression import Expression, reachable
+from gauss.codegen.graph import BINARY, UNARY
 
 
 def substitute(outputs, symbols, values) -> np.ndarray:

@@ -5,7 +5,8 @@ The legs of a parallel robot are such parts (Larsen and Amarasinghe, PLDI 2000; 
 
 from collections.abc import Iterator
 
-from gauss.codegen.expression import COMMUTATIVE, Expression
+from gauss.codegen.expression import Expression
+from gauss.codegen.graph import COMMUTATIVE
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.schedule import Schedule
 

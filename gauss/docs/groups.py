@@ -71,7 +71,7 @@ GROUPS = (
         "Freedoms, ways of assembly, states of rest, linear models and their modes, derivatives, and the check against "
         "Pinocchio.",
         _of("gauss", "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes")
-        + _of("gauss", "derivatives crosscheck paradoxes"),
+        + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps"),
     ),
     Group(
         "view",
@@ -87,6 +87,12 @@ GROUPS = (
         _of("gauss.math"),
     ),
     Group(
+        "actuators",
+        "Actuators with states",
+        "Motors, controllers, filters, muscles and friction with states of their own, made of :meth:`gauss.Scene.state`.",
+        _of("gauss.scene.actuators", "dc_motor pi_controller low_pass muscle lugre_friction"),
+    ),
+    Group(
         "linkages",
         "Planar linkages",
         "Assur groups: positions in closed form, reactions, a cycle in one call, balancing. Guide: :doc:`/guides/linkages`.",
@@ -98,6 +104,12 @@ GROUPS = (
         "Servo-constraints",
         "Relations held by controlled forces. Guide: :doc:`/guides/servo`.",
         _of("gauss.servo"),
+    ),
+    Group(
+        "export",
+        "Code of other languages",
+        "Functions of a state as C99, CasADi, JAX and formulas. Guide: :doc:`/guides/export`.",
+        _of("gauss.export"),
     ),
     Group(
         "gym",

@@ -1,4 +1,4 @@
-"""What a system is asked at one instant: accelerations, consistent states, mobility, assembly modes, derivatives."""
+"""Mechanics of a system at one instant: accelerations, consistent states, mobility, assembly modes, derivatives."""
 
 from gauss.lazy import attach
 

@@ -118,7 +118,7 @@ def forward_dynamics(system: System) -> Callable:
     return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
 
 
-def forward_dynamics_on_device(system: System, device: str) -> "DeviceFunction":
+def forward_dynamics_on_device(system: System, device) -> "DeviceFunction":
     """Function (q, v, load, t=0.0) → q̈ of batches on a device; rows that fail the check are repeated on this CPU.
 
     Raises
@@ -127,9 +127,10 @@ def forward_dynamics_on_device(system: System, device: str) -> "DeviceFunction":
         If the system cannot be compiled as a whole, with the reasons.
     """
     from gauss.codegen.gpu.device_function import DeviceFunction
+    from gauss.codegen.gpu.devices import device_name
     from gauss.codegen.gpu.rows import RowsOnDevice
 
-    laws = Laws(system)
+    laws, device = Laws(system), device_name(device)
     BATCHES.plan(Question(system, laws))
     limits = (ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE)
     interface = Interface(_sizes(system), "t", limits, ((system.n_v,),))
@@ -140,7 +141,7 @@ def forward_dynamics_on_device(system: System, device: str) -> "DeviceFunction":
 
     key = forward_dynamics_on_device, laws.key, device
     rows = cached_on_disk(system, key, make)
-    return cached(system, (DeviceFunction, *key), lambda: DeviceFunction(rows, interface, forward_dynamics(system), NAME))
+    return cached(system, (DeviceFunction, *key), lambda: DeviceFunction(rows, forward_dynamics(system), NAME))
 
 
 def compiled(system: System, laws: Laws, plan: Plan) -> Callable:

@@ -5,6 +5,7 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 
 from collections.abc import Callable
 
+from gauss.codegen import callbacks_are_available
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
@@ -22,7 +23,9 @@ MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per b
 WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
-MOST_CONTACT_OPERATIONS = 3_000  # of the gap functions up to which it is: more take longer to compile than kernels of pairs
+# Operations of the gap functions up to which a step is compiled with them: more take longer to compile than kernels of pairs
+# of shapes, whose steps are as fast.
+MOST_CONTACT_OPERATIONS = 1_000
 CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordinates of the scene, measured
     ("HalfSpace", "Sphere"): 122,
     ("Sphere", "Sphere"): 661,
@@ -98,14 +101,29 @@ def traced_laws(ask: Question) -> list[str]:
     return [f"the law of {name!r} cannot be traced ({why})" for name, why in ask.laws.reasons.items()]
 
 
+def has_opaque_laws(ask: Question) -> bool:
+    """Whether a law is an opaque callback."""
+    return bool(ask.laws.called)
+
+
+def callbacks(ask: Question) -> list[str]:
+    """All laws are traced, or machine code can call Python here."""
+    return [] if callbacks_are_available() else traced_laws(ask)
+
+
 def few_bodies(ask: Question) -> list[str]:
     """The tree is small enough for straight-line code."""
     return [f"it has more than {LARGE_TREE_BODIES} bodies"] if is_large(ask.system) else []
 
 
+def few_loops(ask: Question) -> list[str]:
+    """The loops are few enough for straight-line code."""
+    return ["its loops are too many for straight-line code"] if has_large_loops(ask.system) else []
+
+
 def written_out(ask: Question) -> list[str]:
     """The tree and its loops are small enough for straight-line code."""
-    return few_bodies(ask) + (["its loops are too many for straight-line code"] if has_large_loops(ask.system) else [])
+    return few_bodies(ask) + few_loops(ask)
 
 
 def narrow(ask: Question) -> list[str]:
@@ -154,9 +172,9 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 
 def few_contact_operations(ask: Question) -> list[str]:
-    """The gap functions of contacts are short enough to be written out, or inputs are held, which no kernel of pairs has."""
+    """The gap functions of contacts are short enough to be written out."""
     scene = ask.system.scene
-    if ask.held or not shapes_in_contact(ask):
+    if not shapes_in_contact(ask):
         return []
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
     work = sum(_operations(scene.shapes[one.shape], scene.shapes[one.other]) for one in contacts)
@@ -181,7 +199,7 @@ def takes_pair_kernels(ask: Question) -> list[str]:
     system, scene = ask.system, ask.system.scene
     touching = {name for one in scene.contacts.values() if isinstance(one, Contact) for name in (one.shape, one.other)}
     found = [f"{name!r} has no radius" for name in sorted(touching) if _is_sharp(scene.shapes[name])]
-    if are_free_in_contact(system):
+    if are_free_in_contact(system) and not ask.held:
         return found
     if not system.Phi.any() or system.dynamics is None:
         found.append("it was built without machine code")

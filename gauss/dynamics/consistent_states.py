@@ -202,7 +202,7 @@ def _check_start(system: System, state: State, where: str, pose: AssembledPose):
 
 
 def _against(system: System, pose: AssembledPose) -> str:
-    """What stands against the assembly: starts that were tried in vain, directions in which the loops cannot move."""
+    """Obstacles of the assembly: starts that failed, directions in which the loops cannot move."""
     words = f"So it is from {pose.starts} other starts, up to {SPREAD:g} rad away. " if pose.starts else ""
     if pose.is_met:
         return words

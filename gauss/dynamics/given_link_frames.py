@@ -58,6 +58,43 @@ def ungrouped(subsystem: Subsystem) -> GivenLinkFrames:
     return replace(subsystem, links=subsystem.links | links)
 
 
+def with_moved_joint(subsystem: Subsystem, index: int, body: int, shift) -> GivenLinkFrames:
+    """Subsystem, its inertias not regrouped, whose joint has another place on one of its bodies.
+
+    Parameters
+    ----------
+    subsystem : Subsystem
+        The subsystem.
+    index, body : int
+        The joint, and the body on which it moves.
+    shift : ndarray, shape (3,)
+        Displacement of the joint in the principal central frame of the body [m], floats or expressions.
+    """
+    given = ungrouped(subsystem)
+    links, sides, turned = dict(given.links), dict(given.sides), given.links[body].R_central.T @ shift
+    outer = next((edge.outer for edge in given.tree if edge.constraint == index), None)
+
+    def on_body(k: int, by):
+        """The joint k with its place on the body displaced by a vector of the link frame."""
+        R, p = sides[k][body]
+        sides[k] = sides[k] | {body: (R, p + by)}
+
+    if outer is None:
+        on_body(index, turned)
+    elif outer != body:
+        links[outer] = links[outer]._replace(p=links[outer].p + turned)
+    else:  # the link frame moves with the joint, and all else on the body against it
+        link = links[body]._replace(p_central=links[body].p_central + shift)
+        links[body] = own_inertia(link, given.Phi[6 * body : 6 * body + 6])
+        for edge in given.tree:
+            if edge.inner == body:
+                links[edge.outer] = links[edge.outer]._replace(p=links[edge.outer].p - turned)
+        for k in given.loop_joints:
+            if body in sides[k]:
+                on_body(k, -turned)
+    return replace(given, links=links, sides=sides)
+
+
 def own_inertia(link: Link, Phi) -> Link:
     """Link with the inertia of a body with moments and mass Φ (6,)."""
     R, mass = link.R_central, Phi[3]

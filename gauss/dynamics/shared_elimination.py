@@ -53,7 +53,7 @@ class SharedElimination:
         return (self._functions[name].inlined if short else self._functions[name])(*given)
 
     def place(self, t, q, often: bool = False) -> np.ndarray:
-        """What depends on (t, q) alone, for the other functions."""
+        """Quantities of (t, q) alone that the other functions share."""
         return self._found("place", t, q, often=often)
 
     def loop_residual(self, t, q) -> np.ndarray:

@@ -137,7 +137,7 @@ TERMS = {
 
 
 def state_function(
-    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None, device: str | None = None
+    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None, device=None
 ) -> Callable:
     """Compiled function of a state, or of several at once; see :meth:`gauss.System.function`.
 
@@ -150,6 +150,35 @@ def state_function(
     SimulationError
         If the law of a load cannot be compiled.
     """
+    requests, columns = _requested(system, names, reference, independent)
+    laws = _traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""
+    key = state_function, requests, columns, laws
+    if device is None:
+        return cached(system, key, lambda: _compiled(system, requests, columns, key))
+    from gauss.codegen.gpu.devices import device_name  # on demand: most systems stay on this CPU
+
+    device = device_name(device)
+    return cached(system, (*key, device), lambda: _on_device(system, requests, columns, key, device))
+
+
+def traced_function(
+    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None
+) -> tuple[Function, Interface]:
+    """Trace of a function of a state, or of several at once, with its arguments and the shapes of its results.
+
+    The last outputs of the trace are error measures, one for each limit of the interface.
+
+    Raises
+    ------
+    ArgumentError, StateError, SimulationError
+        As of :func:`state_function`.
+    """
+    found = _function(system, *_requested(system, names, reference, independent))
+    return found.trace(), found.interface
+
+
+def _requested(system: System, names: Sequence[str], reference: str, independent):
+    """Requests for names, and the places of independent coordinates if these are given."""
     if reference not in REFERENCES:
         raise ArgumentError(f"reference: no axes {reference!r}. {did_you_mean(reference, REFERENCES)}")
     requests = tuple(_request(system, name, reference) for name in names)
@@ -160,11 +189,7 @@ def state_function(
         raise ArgumentError("null_space: expected the names of independent joints, independent=(…).")
     if columns is not None or "loop_constraints" in names:
         refuse_changed(system)
-    laws = _traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""
-    key = state_function, requests, columns, laws
-    if device is None:
-        return cached(system, key, lambda: _compiled(system, requests, columns, key))
-    return cached(system, (*key, device), lambda: _on_device(system, requests, columns, key, device))
+    return requests, columns
 
 
 def evaluate(system: System, names, given: dict, t, reference: str, independent) -> dict:
@@ -251,7 +276,7 @@ class _Traced(NamedTuple):
 
 
 def _function(system: System, requests, columns) -> _Traced:
-    """What a function of requests is compiled from."""
+    """Traced function of requests, and its interface in Python."""
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
     limits = (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))
@@ -278,7 +303,7 @@ def _on_device(system: System, requests, columns, key, device: str) -> Callable:
     make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
     rows = cached_on_disk(system, (RowsOnDevice, *key, device), make)
     own = cached(system, key, lambda: _compiled(system, requests, columns, key))
-    return DeviceFunction(rows, function.interface, own, function.name)
+    return DeviceFunction(rows, own, function.name)
 
 
 def _compiled(system: System, requests, columns, key) -> Callable:

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 
 from gauss.dynamics.outputs import split
-from gauss.errors import SimulationError
+from gauss.errors import ArgumentError, SimulationError
 from gauss.gym.task import Task
 from gauss.simulation import Simulator
 
@@ -44,17 +44,25 @@ class MechanismEnv(gymnasium.Env):
         return self._last, {}
 
     def step(self, action) -> tuple[np.ndarray, float, bool, bool, dict]:
-        """Hold an action: (observation, reward, terminated, truncated, info)."""
-        simulator = self.simulator
+        """Hold an action: (observation, reward, terminated, truncated, info).
+
+        Raises
+        ------
+        ArgumentError
+            If the action is not a finite number for each input.
+        """
+        simulator, given = self.simulator, np.asarray(action, dtype=float)
+        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+            raise ArgumentError(f"step: expected {len(simulator.inputs)} finite numbers, one an input, got {action!r}.")
         try:
-            simulator.step(action, n=self.task.hold)
+            simulator.step(given, n=self.task.hold)
         except SimulationError as error:
             return self._last, 0.0, True, False, {"failure": str(error)}
         self._actions += 1
         self._last = vector = self._observed()
         outputs = split(vector, self.task.scene) if simulator.output_names else {}
-        given = *simulator.coordinates, np.asarray(action, dtype=float), outputs
-        reward, ends = float(self.task.reward(*given)), bool(self.task.terminated(*given))
+        end = *simulator.coordinates, given, outputs
+        reward, ends = float(self.task.reward(*end)), bool(self.task.terminated(*end))
         return vector, reward, ends, self._actions >= self.task.actions, {}
 
     def _observed(self) -> np.ndarray:

@@ -17,7 +17,7 @@ def _never(q, v, u, y) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Task:
-    """What an environment simulates and rewards.
+    """Scene, reward and end of an environment.
 
     Functions take arrays of one motion or of many, so that one source serves both: q (…, n_q), v (…, n_v), u (…, n_u) and a
     dict y of the outputs of the scene, (…, m) each.
@@ -42,7 +42,8 @@ class Task:
     Raises
     ------
     ArgumentError
-        If the scene has no inputs, or one without limits, or the step does not divide the time of an action.
+        If the scene has no inputs, or one without limits, a time is not positive, or the step does not divide that of an
+        action.
     """
 
     scene: Scene
@@ -60,6 +61,9 @@ class Task:
         for given in self.scene.inputs.values():
             if given.limits is None:
                 raise ArgumentError(f"task: input {given.name!r} has no limits; actions need them.")
+        for name in ("rate", "duration", "step"):
+            if not 0.0 < getattr(self, name) < np.inf:
+                raise ArgumentError(f"task: {name}: expected a positive number, got {getattr(self, name)!r}.")
         if self.hold < 1 or abs(self.hold * self.step * self.rate - 1.0) > 1e-9:
             raise ArgumentError(f"task: the step of {self.step} s does not divide the time of an action, {1 / self.rate} s.")
 

@@ -1,4 +1,4 @@
-"""Where scenes come from by name: shipped models, families of models."""
+"""Scenes by name: shipped models, families of models."""
 
 import importlib.util
 import inspect

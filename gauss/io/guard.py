@@ -1,4 +1,4 @@
-"""XML files from anybody, looked at before the parser of their format: nothing hostile passes, every element has a line.
+"""Untrusted XML files, checked before the parser of their format: nothing hostile passes, every element has a line.
 
 No document type and no entities, no endless nesting, no numbers beyond reason, no files elsewhere.
 """
@@ -42,7 +42,7 @@ class Source:
 
 
 def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = (), loose_comments: bool = False) -> Source:
-    """Read a file that may come from anybody.
+    """Read an untrusted file.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from gauss.io.catalog import families, servo_files, shipped
 from gauss.scene import Scene
 from gauss.scene.toml import from_tables, tables, write_toml
 
-EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
+EXTRAS = ("limits", "resistance", "collisions", "motors")  # of a URDF file, where they are asked for
 OF_SDF = ("root", "limits", "root_folder", "missing")
 OF_MJCF = ("limits", "contacts", "root_folder", "keyframe")
 
@@ -31,10 +31,14 @@ def load(source, **options):
         * path of a .xacro file, which is a program: with ``xacro=True``, or a dict of its arguments.
     **options
         For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``inertia="as given"``, ``limits="start"|"stops"``,
-        ``resistance=True`` and ``collisions=True`` (see :func:`gauss.io.urdf.extras.with_extras`); for .sdf ``root``,
-        ``limits``, ``root_folder=FOLDER`` and ``missing`` (see :func:`gauss.io.sdf.read.read_sdf`); for .xml ``limits``,
-        ``contacts=True``, ``root_folder=FOLDER`` and ``keyframe=NAME`` (see :func:`gauss.io.mjcf.read.read_mjcf`); for
-        families their parameters.
+        ``resistance=True``, ``collisions=True`` and ``motors=True`` (see :func:`gauss.io.urdf.extras.with_extras`).
+
+        For .sdf ``root``, ``limits``, ``root_folder=FOLDER`` and ``missing`` (see :func:`gauss.io.sdf.read.read_sdf`).
+
+        For .xml ``limits``, ``contacts=True``, ``root_folder=FOLDER`` and ``keyframe=NAME`` (see
+        :func:`gauss.io.mjcf.read.read_mjcf`).
+
+        For families their parameters.
 
     Returns
     -------

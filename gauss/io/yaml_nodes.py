@@ -1,4 +1,4 @@
-"""YAML files from anybody, as texts and lists with their lines: nothing is constructed; aliases and tags are refused."""
+"""Untrusted YAML files as texts and lists with their lines: nothing is constructed; aliases and tags are refused."""
 
 import re
 from pathlib import Path

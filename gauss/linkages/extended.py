@@ -26,12 +26,12 @@ from gauss.linkages.reactions import inertial, react
 HALF_UNIT = 2.0**-53  # of a number in double precision, relative
 DECIMAL_DIGITS = 15  # that every double keeps: a number of no more means its decimals
 DOUBLED_EPSILON = 2.0**-104  # of numbers in twice the precision, relative
-DOUBLE_EPSILON = 2.0**-52  # of what is returned in double precision
+DOUBLE_EPSILON = 2.0**-52  # of results in double precision
 FIELDS = ("p", "e", "v", "omega", "a", "alpha")
 
 
 class Extended(NamedTuple):
-    """What twice the precision finds at crank angles (m,), rounded to doubles.
+    """Results in twice the precision at crank angles (m,), rounded to doubles.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ class _Data:
         return Doubled(value + 0.0 * lo, lo)
 
     def _off(self, column, value: float) -> np.ndarray:
-        """What is added to a number in each of the columns (count,)."""
+        """Change of a number in each of the columns (count,)."""
         size = float(Fraction(repr(float(value))) - Fraction(float(value))) if _is_typed(value) else HALF_UNIT * value
         return size * np.array([float(other == column) for other in self.columns])
 
@@ -219,7 +219,7 @@ def _force_changes(chain: Chain, reactions, torque, count: int, terms) -> list[n
 
 
 def _terms(motion: LinkageKinematics, slow: LinkageKinematics) -> list[np.ndarray]:
-    """What the torque is the sum of: power of what every link needs, on the motion with unit crank speed [N m]."""
+    """Terms of the torque: power of the inertia and the loads of every link on the motion with unit crank speed [N m]."""
     needs = [(inertial(motion, link), link.name) for link in motion.chain.links]
     needs += [(acting(load, motion), load.link) for load in motion.chain.loads]
     return [

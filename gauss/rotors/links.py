@@ -39,7 +39,7 @@ class LinkKinematics(NamedTuple):
 
 @dataclass(frozen=True)
 class ShaftLink:
-    """Link of two shafts; a link without losses and friction unless a subclass says otherwise.
+    """Link of two shafts; a link without losses and friction unless a subclass has them.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ class Network:
         return candidate
 
     def require_shaft(self, name) -> str:
-        """Return the name of a shaft that exists, or raise a SceneError that tells which do."""
+        """Return the name of a shaft that exists, or raise a SceneError that names the shafts."""
         name = name_of(name)
         if name not in self.shafts:
             raise SceneError(f"no shaft {name!r} in {self.name!r}. {did_you_mean(str(name), self.shafts)}")

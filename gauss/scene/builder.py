@@ -6,35 +6,18 @@ from typing import TypeVar
 from gauss import scene as elements
 from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.joint import Coupling, Joint
+from gauss.scene.joint import Coupling
+from gauss.scene.names import SceneNames
 from gauss.scene.relation import Constraint
 
 Element = TypeVar("Element")
 
 
-class SceneBuilder:
-    """The two operations of a scene on which builder methods stand."""
-
-    joints: dict[str, Joint]
-    bodies: "dict[str, elements.Body]"
-    frames: "dict[str, elements.Frame]"
-    shapes: "dict[str, elements.Collider]"
-    contacts: "dict[str, elements.Unilateral]"
+class SceneBuilder(SceneNames):
+    """Builder methods of a scene stand on its names and on one operation."""
 
     def add(self, element: Element) -> Element:
         """Add an element and return it."""
-        raise NotImplementedError
-
-    def _require_new(self, name: str, kind: str, taken):
-        """Refuse a name that is taken."""
-        raise NotImplementedError
-
-    def _taken(self) -> set[str]:
-        """Names of joints, constraints and loads, of which none may name another."""
-        raise NotImplementedError
-
-    def _fresh(self, name: str) -> str:
-        """Name, numbered if it is taken."""
         raise NotImplementedError
 
 

@@ -159,8 +159,6 @@ class Output:
 class InputBuilder(SceneBuilder):
     """Builder methods for inputs and outputs; each adds one element and returns it."""
 
-    loads: dict
-
     def input(self, name: str, joint, limits=None, effort=None, forces=()) -> Input:
         """Let a control law set the torque or force of a joint.
 
@@ -192,3 +190,24 @@ class InputBuilder(SceneBuilder):
     def output(self, name: str, kind: str, of, at=(0.0, 0.0, 0.0)) -> Output:
         """Measure a joint, body, frame or contact; see :class:`gauss.scene.Output` for the kinds."""
         return self.add(Output(name, kind, name_of(of), at))
+
+    def _place_input(self, given: Input):
+        self._require_new(given.name, "input", self.inputs | self.loads | self._constraints)
+        for joint in given.acts_on:
+            self._require_coordinate(joint, f"input {given.name!r}")
+        for force in given.forces:
+            self._require_body(force.body, f"input {given.name!r}: force {force.name!r}")
+        self.inputs[given.name] = given
+
+    def _place_output(self, output: Output):
+        what = f"output {output.name!r}"
+        self._require_new(output.name, "output", self.outputs)
+        measured = SENSORS[output.kind][0]
+        if measured == "joint":
+            self.require_joint(output.of, what)
+        elif measured == "contact":
+            if output.of not in self.contacts:
+                raise SceneError(f"{what}: no contact {output.of!r}. {did_you_mean(output.of, self.contacts)}")
+        else:
+            self._require_place(output.of, what)
+        self.outputs[output.name] = output

@@ -5,20 +5,21 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 
 from gauss.arguments import named_arguments, named_methods
-from gauss.errors import SceneError, did_you_mean
-from gauss.scene import builder, contact_builder, inputs, values
+from gauss.errors import SceneError
+from gauss.scene import builder, contact_builder, inputs, load_builder, state_builder, values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, Element, name_of
 from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
-from gauss.scene.degrees import warn_of_start
 from gauss.scene.elastic import ElasticLink
-from gauss.scene.inputs import SENSORS, Input, InputBuilder, Output
+from gauss.scene.inputs import Input, InputBuilder, Output
 from gauss.scene.joint import Coupling, Joint
+from gauss.scene.load_builder import LoadBuilder
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
-from gauss.scene.motions import Prescribed
+from gauss.scene.names import GROUND, SceneNames
 from gauss.scene.relation import Relation
-from gauss.scene.set_valued import LimitedDrive, SetValued
+from gauss.scene.set_valued import SetValued
+from gauss.scene.state_builder import StateBuilder
 from gauss.scene.unilateral import Unilateral
 from gauss.versions import FormerAttribute
 
@@ -26,12 +27,11 @@ if TYPE_CHECKING:
     from gauss.scene.clutches import JointLink
     from gauss.scene.losses import LossyGear
 
-GROUND = "ground"
 LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
 
 
 @dataclass(frozen=True)
-class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
+class Scene(ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputBuilder):
     """Mechanism and its surroundings.
 
     Parameters
@@ -165,88 +165,6 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
         """Couple two joint coordinates: q_driven = ratio · q_driver + offset."""
         return self.add(Coupling(name, name_of(driven), name_of(driver), ratio, offset))
 
-    def drive(
-        self,
-        joint,
-        *,
-        torque=None,
-        force=None,
-        angle=None,
-        displacement=None,
-        speed=None,
-        limit: float | None = None,
-        breaks=(),
-        name: str | None = None,
-    ):
-        """Drive a joint by an effort, or along a motion whatever effort that takes.
-
-        Parameters
-        ----------
-        joint : str or Joint
-            Joint; for a motion one of one freedom, or one rate of a joint such as "U.angle1".
-        torque, force : float, sequence or callable
-            Torque [N m] or force [N]: a constant, law(t) or law(t, motion).
-        angle, displacement : float, callable or spline
-            Angle [rad] or displacement [m] as a function of time; a number holds the joint there.
-        speed : float, callable or spline
-            Rate [rad/s, m/s] as a function of time.
-        limit : float, optional
-            Largest torque or force that the drive has [N m, N]: an effort is cut off there, and a speed is kept as long as
-            it takes no more. A prescribed angle or displacement has none: once lost, it could not be caught up.
-        breaks : sequence of float
-            Times at which a torque or force switches [s], for a law that cannot be traced: no step crosses them.
-        name : str, optional
-            Name of the drive.
-
-        Returns
-        -------
-        Drive, Prescribed or LimitedDrive
-            What was added. The effort of a prescribed motion comes from :func:`gauss.drive_forces`.
-        """
-        given = {"torque": torque, "force": force, "angle": angle, "displacement": displacement, "speed": speed}
-        given = {key: value for key, value in given.items() if value is not None}
-        if len(given) != 1:
-            raise SceneError(
-                f"drive of joint {name_of(joint)!r}: give either torque= [N m] or force= [N], "
-                f"or angle= [rad], displacement= [m] or speed= [rad/s, m/s]; got {', '.join(given) or 'none of them'}."
-            )
-        (key, law), joint = next(iter(given.items())), name_of(joint)
-        name = name or self._fresh(f"drive of {joint}")
-        if key in ("torque", "force"):
-            return self.add(Drive(name, joint, law, limit, breaks))
-        if len(breaks):
-            raise SceneError(
-                f"drive of joint {joint!r}: breaks= goes with torque= or force=; gauss finds where {key}= switches."
-            )
-        if limit is not None and key == "speed":
-            return self.add(LimitedDrive(name, joint, limit, law))
-        if limit is not None:
-            raise SceneError(f"drive of joint {joint!r}: limit= goes with torque=, force= or speed=, not with {key}=.")
-        return self.add(Prescribed(name, joint, speed=law) if key == "speed" else Prescribed(name, joint, position=law))
-
-    def force(self, name: str, body, force=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), **options) -> Force:
-        """Load a body by a force [N] and a moment [N m]; see :class:`gauss.Force`."""
-        return self.add(Force(name, name_of(body), force, moment, **options))
-
-    def spring(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), **options) -> Spring:
-        """Stretch a spring and damper between points of two bodies; see :class:`gauss.Spring`."""
-        return self.add(Spring(name, name_of(body), name_of(other), at, other_at, **options))
-
-    def joint_spring(self, name: str, joint, **options) -> JointSpring:
-        """Put a spring and damper on the coordinate of a joint; see :class:`gauss.JointSpring`."""
-        return self.add(JointSpring(name, name_of(joint), **options))
-
-    def elastic_link(self, name: str, driven, driver, ratio: float = 1.0, **options) -> ElasticLink:
-        """Put a spring and damper, with or without backlash, between two joints; see :class:`gauss.scene.ElasticLink`."""
-        return self.add(ElasticLink(name, name_of(driven), name_of(driver), ratio, **options))
-
-    def start(self, joint, position=None, rate=0.0) -> Start:
-        """Say where a joint starts and how fast; saying it again replaces it.
-
-        Rates of ball and free joints are in the axes of the joint frame on the child, see :meth:`ball`.
-        """
-        return self.add(Start(name_of(joint), position, rate))
-
     # References that each kind of element makes to the scene.
 
     def _place_body(self, body: Body):
@@ -322,122 +240,11 @@ class Scene(ConstraintBuilder, ContactBuilder, InputBuilder):
     plays = FormerAttribute("backlashes")
     changing = FormerAttribute("nonsmooth")
 
-    @property
-    def _constraints(self) -> dict[str, Relation]:
-        return self.relations | self.contacts | self.set_valued
 
-    def _place_load(self, load):
-        what = f"{values.kind(load)} {load.name!r}"
-        self._require_new(load.name, "load", self.loads | self._constraints | self.inputs)
-        if isinstance(load, Drive):
-            count = self.require_joint(load.joint, what).pair.n_v
-            if count == 0:
-                raise SceneError(f"{what}: joint {load.joint!r} cannot move; choose another type, or drive another joint.")
-            given = len(load.effort) if isinstance(load.effort, tuple) else 1
-            if not callable(load.effort) and count != given:
-                raise SceneError(f"{what}: joint {load.joint!r} has {count} freedoms; got {given} values of effort.")
-        elif isinstance(load, JointSpring):
-            self._require_freedoms(load.joint, 1, what)
-        elif isinstance(load, ElasticLink):
-            for joint in (load.driven, load.driver):
-                self._require_coordinate(joint, load.what)
-        else:
-            for body in (load.body, getattr(load, "other", GROUND)):
-                self._require_body(body, what)
-        self.loads[load.name] = load
-
-    def _place_start(self, start: Start):
-        pair = self.require_joint(start.joint, "start").pair
-        for key, count in (("position", pair.n_q), ("rate", pair.n_v)):
-            value = getattr(start, key)
-            given = len(value) if isinstance(value, tuple) else 1
-            if value is not None and given != count and value != 0.0:
-                raise SceneError(f"start of joint {start.joint!r}: {key} needs {count} numbers, got {value!r}.")
-        warn_of_start(start, self.joints[start.joint])
-        self.starts[start.joint] = start
-
-    def _place_input(self, given: Input):
-        self._require_new(given.name, "input", self.inputs | self.loads | self._constraints)
-        for joint in given.acts_on:
-            self._require_coordinate(joint, f"input {given.name!r}")
-        for force in given.forces:
-            self._require_body(force.body, f"input {given.name!r}: force {force.name!r}")
-        self.inputs[given.name] = given
-
-    def _place_output(self, output: Output):
-        what = f"output {output.name!r}"
-        self._require_new(output.name, "output", self.outputs)
-        measured = SENSORS[output.kind][0]
-        if measured == "joint":
-            self.require_joint(output.of, what)
-        elif measured == "contact":
-            if output.of not in self.contacts:
-                raise SceneError(f"{what}: no contact {output.of!r}. {did_you_mean(output.of, self.contacts)}")
-        else:
-            self._require_place(output.of, what)
-        self.outputs[output.name] = output
-
-    def require_joint(self, name: str, what: str) -> Joint:
-        """Return the joint of this name, or raise a SceneError that tells which joints exist."""
-        if name not in self.joints:
-            raise SceneError(f"{what}: no joint {name!r}. {did_you_mean(name, self.joints)}")
-        return self.joints[name]
-
-    def _require_freedoms(self, joint: str, count: int, what: str):
-        freedoms = self.require_joint(joint, what).pair.n_v
-        if freedoms != count:
-            raise SceneError(f"{what}: joint {joint!r} has {freedoms} freedoms; a joint of {count} is needed.")
-
-    def _require_coordinate(self, name: str, what: str):
-        """Refuse a name of neither a joint of one freedom nor one rate of a joint."""
-        owner, _, rate = name.rpartition(".")
-        if name not in self.joints and owner in self.joints and rate in self.joints[owner].pair.rates:
-            return
-        freedoms = self.require_joint(name, what).pair.n_v
-        if freedoms == 0:
-            raise SceneError(f"{what}: joint {name!r} cannot move; choose another type, or another joint.")
-        if freedoms != 1:
-            rates = ", ".join(f"{name}.{rate}" for rate in self.joints[name].pair.rates) or "none"
-            raise SceneError(f"{what}: joint {name!r} has {freedoms} freedoms; name one of them: {rates}.")
-
-    def _require_place(self, name: str, what: str):
-        if name != GROUND and name not in self.bodies and name not in self.frames:
-            raise SceneError(
-                f"{what}: no body or frame {name!r}. {did_you_mean(name, [*self.bodies, *self.frames, GROUND])}"
-            )
-
-    def _require_shape(self, name: str, what: str):
-        if name not in self.shapes:
-            raise SceneError(f"{what}: no shape {name!r}. {did_you_mean(name, self.shapes)}")
-
-    def _require_carried(self, name: str, body: str, what: str):
-        """Refuse a frame that another body carries."""
-        self._require_place(name, what)
-        carrier = self.frames[name].body if name in self.frames else name
-        if carrier != body:
-            raise SceneError(f"{what}: {name!r} is on {carrier!r}, not on {body!r}.")
-
-    def _require_body(self, name: str, what: str):
-        if name != GROUND and name not in self.bodies:
-            raise SceneError(f"{what}: no body {name!r}. {did_you_mean(name, [*self.bodies, GROUND])}")
-
-    def _require_new(self, name: str, kind: str, taken):
-        if name in taken:
-            raise SceneError(f"{kind} {name!r}: the name is taken; choose another.")
-
-    def _taken(self) -> set[str]:
-        return {*self.joints, *self.couplings, *self._constraints, *self.loads}
-
-    def _fresh(self, name: str) -> str:
-        taken = [*self.loads, *self._constraints]
-        count = sum(1 for load in taken if load == name or load.startswith(f"{name} "))
-        return name if not count else f"{name} {count + 1}"
-
-
-_MODULES = builder, contact_builder, inputs
+_MODULES = builder, contact_builder, load_builder, state_builder, inputs
 _HERE = (*(value for module in _MODULES for value in vars(module).values()), *list(globals().values()))
 _KINDS = {kind for kind in _HERE if isinstance(kind, type) and kind.__module__.startswith("gauss.scene.")}
 for _kind in _KINDS:
     named_arguments(_kind)
-for _builder in (Scene, ConstraintBuilder, ContactBuilder, InputBuilder):
+for _builder in (Scene, SceneNames, ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputBuilder):
     named_methods(_builder)

@@ -53,7 +53,7 @@ class PreservedState:
 
 @contextmanager
 def preserved(law) -> Iterator[PreservedState]:
-    """Context that restores the state of a law; its value says whether there was a change."""
+    """Context that restores the state of a law; its value is whether there was a change."""
     kept = PreservedState(law)
     try:
         yield kept

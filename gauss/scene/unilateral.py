@@ -128,6 +128,12 @@ class Stop(Unilateral):
         given = {"lowest": self.lowest, "highest": self.highest}
         return tuple(f"{self.name}.{key}" for key, value in given.items() if value is not None)
 
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        """Sign and coordinate [rad, m] of each stop: the gap is sign · (q − coordinate)."""
+        given = (1.0, self.lowest), (-1.0, self.highest)
+        return [(sign, place) for sign, place in given if place is not None]
+
     def gaps(self, at) -> list:
         """Distances of the coordinate from the stops."""
         q = at.coordinate(self.joint)

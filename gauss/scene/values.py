@@ -24,7 +24,7 @@ def keep(element, **checked):
 
 
 def number(value, what: str, unit: str, *, positive=False, non_negative=False) -> float:
-    """Finite float, or a SceneError that says what was expected."""
+    """Finite float, or a SceneError with what was expected."""
     sign = "a positive " if positive else "a non-negative " if non_negative else "a "
     if isinstance(value, bool) or not isinstance(value, Real):
         raise SceneError(f"{what}: expected {sign}number in [{unit}], got {value!r} ({type(value).__name__}).")

@@ -1,8 +1,9 @@
 """Servo: a system, servo-constraints, and the actuators that hold them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -55,6 +56,17 @@ class Servo:
     actuators: tuple
     weights: dict[str, float] = field(default_factory=dict)
     preload: dict[str, float] = field(default_factory=dict)
+
+    if TYPE_CHECKING:  # what may be given; fields are what is made of it
+
+        def __init__(
+            self,
+            system: System | Scene,
+            relations: Sequence[Any],
+            actuators: Sequence[Any],
+            weights: Mapping[str, float] = ...,
+            preload: Mapping[str, float] = ...,
+        ): ...
 
     def __post_init__(self):
         """Compile a scene, check every name, and trace the relations."""

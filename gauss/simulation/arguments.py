@@ -133,7 +133,7 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
 
 
 def _numbers(value, expected: str) -> np.ndarray:
-    """Array of numbers, or a SimulationError that says what was expected; text is no number."""
+    """Array of numbers, or a SimulationError with what was expected; text is no number."""
     try:
         found = np.asarray(value)
     except ValueError:  # ragged

@@ -13,6 +13,7 @@ from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import fixed
 from gauss.simulation.grid import grid_of, with_samples
 from gauss.simulation.step_limits import steps_per_check
+from gauss.system import State
 
 HELD_SAMPLES = 256  # samples of a control law between two looks at the progress
 PAIR_BYTES = 16  # of a time of the grid and its :class:`Due`
@@ -36,6 +37,26 @@ class CompiledFixedRun(CompiledRun):
     def prepared(self) -> Loop:
         """Machine code of the steps."""
         return self._loop_of(method_key(self.method), lambda: self._functions().compile())
+
+    def arrays(self, point: np.ndarray, confirmed: np.ndarray, grid: np.ndarray, out: np.ndarray) -> tuple:
+        """Arguments of the machine code of the steps, before their number: the record and arrays by their addresses."""
+        given = (ctypes.c_void_p(address(array)) for array in (point, confirmed, grid, out))
+        return ctypes.byref(self.control), *given
+
+    def separated(self, state: State) -> State:
+        """The state: overlaps of shapes are removed by the first steps."""
+        return state
+
+    def begun(self, start: State) -> np.ndarray:
+        """Point (layout.size,) at a start, with the rates there."""
+        point = Point(start, np.zeros(3), self.evaluated(start), self.method_state)
+        return self.layout.pack(point, self.inputs if len(self.inputs) else None)
+
+    def kept(self):
+        """Nothing: a point holds all that a motion continues from."""
+
+    def take(self, kept):
+        """Nothing to take beside a point."""
 
     def run(self):
         """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`."""
@@ -122,8 +143,7 @@ class CompiledFixedRun(CompiledRun):
                 break
             if until in self.holds:
                 self._hold(self.holds[until])
-        if control.sample < count:
-            control.status = LoopStatus.PAUSED
+        control.status = LoopStatus.PAUSED if control.sample < count else LoopStatus.DONE
 
     def _cross(self, pairs: np.ndarray, after: float):
         """Continue on the grid after a switching time at which prescribed velocities jump."""

@@ -44,7 +44,7 @@ class PreparedMotion:
             )
             self.system, self.duration, plan = problem.system, float(duration), plan_of(problem.question)
             name = self.system.scene.name
-            if plan.driver != "compiled loop" or isinstance(problem.method, FixedStep):
+            if plan.driver != "compiled loop" or problem.laws.called or isinstance(problem.method, FixedStep):
                 fixed = "the integrator has fixed steps, which gauss.Simulator makes"
                 why = fixed if isinstance(problem.method, FixedStep) else f"its driver is {plan.driver!r}"
                 why = "; ".join(map(str, plan.rejected)) or why
@@ -75,6 +75,9 @@ class PreparedMotion:
         self._arguments = ctypes.byref(self._control), *(ctypes.c_void_p(address(array)) for array in arrays)
         self._loop = loop.entry
 
+    def __reduce__(self):
+        return PreparedMotion, (self.system, self.duration, self.times, self.options)
+
     def __call__(self, q=None, v=None) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates (k, n_q) and rates (k, n_v) at the samples.
 
@@ -97,10 +100,11 @@ class PreparedMotion:
         """
         try:
             self._q[:], self._v[:] = self._origin.q if q is None else q, self._origin.v if v is None else v
-        except (TypeError, ValueError) as error:
-            raise StateError(
-                f"expected {self._q.size} coordinates and {self._v.size} rates, got {q!r} and {v!r}."
-            ) from error
+            fits = (q is None or len(q) == self._q.size) and (v is None or len(v) == self._v.size)  # numpy repeats a number
+        except (TypeError, ValueError):
+            fits = False
+        if not fits:
+            raise StateError(f"expected {self._q.size} coordinates and {self._v.size} rates, got {q!r} and {v!r}.")
         if not self._is_done():
             found = self.trajectory(self._q.copy(), self._v.copy())
             return found.q, found.v

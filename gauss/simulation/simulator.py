@@ -8,30 +8,31 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
 from numbers import Integral
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, one_tier
-from gauss.codegen.kernels import Due, LoopStatus, address
+from gauss.codegen.kernels import Due, LoopStatus
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.outputs import output_function, shape_of, split
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError, require
-from gauss.integrators import FixedStep, Point
+from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.held_inputs import HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
+from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.tolerances import check_tolerances
-from gauss.simulation.undetected_switching import warn_of_short_features
+from gauss.simulation.undetected_switching import refuse_jumps, warn_of_short_features, warn_of_undetected
 from gauss.system import State, System, retract
 
 FAILURES = {
@@ -39,6 +40,9 @@ FAILURES = {
     LoopStatus.OFF_CONSTRAINTS: "the projection onto the constraints failed",
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
 }
+
+
+STEPS = ("compiled loop", "compiled"), ("time stepping", "compiled"), ("time stepping", "pair kernels")
 
 
 class SimulatorState(NamedTuple):
@@ -52,18 +56,21 @@ class SimulatorState(NamedTuple):
         Time of the state that the motion began from [s].
     steps : int
         Steps since then.
+    contacts : object
+        Contacts that the next step starts from, where the point does not hold them.
     """
 
     point: bytes
     control: bytes
     begun: float
     steps: int
+    contacts: Any = None
 
 
 class Simulator:
     """Motion of a scene in fixed steps, one call after the other.
 
-    Steps do not end where laws of time switch; prescribed velocities must not jump.
+    Steps do not end where laws switch, and say so where they may have passed over it; prescribed velocities must not jump.
 
     Parameters
     ----------
@@ -89,7 +96,8 @@ class Simulator:
     Raises
     ------
     SimulationError
-        If the method has no fixed step, or the steps are not compiled, with the reasons.
+        If the method has no fixed step, if the steps are not compiled, with the reasons, or if a prescribed motion jumps
+        within the first ten thousand steps.
 
     Examples
     --------
@@ -120,30 +128,32 @@ class Simulator:
             if self.inputs:
                 problem = problem._replace(held=HeldInputs(self.system, _zero(len(self.inputs)), 1.0, 0.0, 1.0))
             plan = plan_of(problem.question)
-            if plan.dynamics != "compiled" or plan.driver not in ("compiled loop", "time stepping"):
+            if (plan.driver, plan.dynamics) not in STEPS:
                 why = "; ".join(map(str, plan.rejected)) or "nothing in it can move"
                 raise SimulationError(f"steps of {whole.name!r} are not compiled: {why}.")
-            if problem.switching.jumps:
-                raise SimulationError(f"prescribed velocities of {whole.name!r} jump; use gauss.simulate.")
+            refuse_jumps(self.system, problem.start, self.step_size)
             warn_of_short_features(whole.name, problem.laws, self.step_size)
             problem = problem._replace(switching=Switching())
-            self._run = run = _run_of(problem)
-            self._loop = run.prepared().entry
+            self._run = run = _run_of(problem, plan.dynamics)
+            self._loop: Any = run.prepared().entry  # machine code, or steps that are called as it is
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
         n_u = len(self.inputs)
         self._u = self._point[run.layout.size - n_u :]
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
-        self._begun, self._steps = 0.0, 0
+        self._begun, self._steps, self._methods = 0.0, 0, (integrator, stabilisation)
+        self._switches, self._warned = bool(run.program.watch), False
         self._measure: Kernel | None = None
         self._bind()
         self.reset()
 
+    def __reduce__(self):
+        return _again, ((self.system, self.step_size, *self._methods), self.snapshot())
+
     def _bind(self):
         """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
-        arrays = [ctypes.c_void_p(address(array)) for array in (self._point, self._confirmed, self._grid, self._out)]
-        self._given = ctypes.byref(self._run.control), *arrays
+        self._given: tuple = self._run.arrays(self._point, self._confirmed, self._grid, self._out)
         self._times = self._grid[:, 0]
 
     def reset(self, state: State | None = None, *, seed: int | None = None, spread: float = 0.05) -> State:
@@ -176,16 +186,15 @@ class Simulator:
             start = self.system.projected(state)
         if seed is not None:
             change = np.random.default_rng(seed).uniform(-spread, spread, (2, self.system.n_v))
-            start = self.system.projected(State(start.t, retract(self.system, start.q, change[0]), start.v + change[1]))
+            start = State(start.t, retract(self.system, start.q, change[0]), start.v + change[1])
+            start = run.separated(self.system.projected(start))
         self._u[:] = 0.0
         run.inputs = self._u
-        rates = run.evaluated(start)
-        self._point[:] = run.layout.pack(
-            Point(start, np.zeros(3), rates, run.method_state), self._u if self.inputs else None
-        )
+        self._point[:] = run.begun(start)
         self._confirmed[:] = self._point
         self._begun, self._steps = float(self._point[0]), 0
-        run.control.steps = run.control.status = 0.0
+        run.control.steps = run.control.status = run.control.unseen = 0.0
+        self._warned = False
         return self.state
 
     def step(self, u=None, n: int = 1):
@@ -198,6 +207,11 @@ class Simulator:
             given.
         n : int
             Number of steps.
+
+        Warns
+        -----
+        SwitchingWarning
+            Once for each motion, if a law of the state may have switched undetected within a step.
 
         Raises
         ------
@@ -215,13 +229,23 @@ class Simulator:
         self._loop.call(*self._given, n)
         if self._run.control.status:
             self._recover(n)
+        if self._switches and self._run.control.unseen:
+            self._warn_of_switching()
+
+    def _warn_of_switching(self):
+        """Warn of a law of the state that may have switched undetected within a step, once for each motion."""
+        self._run.control.unseen = 0.0
+        if not self._warned:
+            self._warned = True
+            warn_of_undetected(self.system.scene.name, f"before t = {self.t:.6g} s, within a step of {self.step_size:g} s,")
 
     def _set(self, u):
         given = u if isinstance(u, np.ndarray) and u.dtype == float else _floats(u)
         if given is None or given.shape != self._u.shape or not isfinite(given @ given):
             given = checked_inputs(u, self.inputs, self.t)
         self._u[:] = given
-        if self._run.method.starts_from_accelerations:  # its method state holds those under the inputs before
+        if isinstance(self._run, CompiledFixedRun) and self._run.method.starts_from_accelerations:
+            # its method state holds the accelerations under the inputs before
             point = self._layout.point(self._point)
             rates = self._run.evaluated(point.state)
             self._point[:] = self._layout.pack(replace(point, rates=rates, method_state=rates.acceleration), self._u.copy())
@@ -242,7 +266,7 @@ class Simulator:
             status, control.status = LoopStatus(int(control.status)), 0.0
             reached = int(np.searchsorted(ends, self._point[0], side="right"))
             self._steps = before + reached
-            if status != LoopStatus.UNSOLVED or not isinstance(self._run, CompiledMoreauRun):
+            if status != LoopStatus.UNSOLVED or not isinstance(self._run, CompiledMoreauRun | PairKernelSteps):
                 raise SimulationError(f"t = {self.t:.6g} s: {FAILURES.get(status, status.name)}; shorten the step.")
             self._point[:] = self._run.repeated(self._point, float(ends[reached]))
             rest = ends[reached + 1 :]
@@ -285,7 +309,8 @@ class Simulator:
 
     def snapshot(self) -> SimulatorState:
         """Present state of the simulator, to the last bit; of the same scene and step, any simulator can restore it."""
-        return SimulatorState(self._point.tobytes(), bytes(self._run.control), self._begun, self._steps)
+        run = self._run
+        return SimulatorState(self._point.tobytes(), bytes(run.control), self._begun, self._steps, run.kept())
 
     def restore(self, snapshot: SimulatorState):
         """Continue from a snapshot.
@@ -301,11 +326,21 @@ class Simulator:
         self._point[:] = point
         ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
         self._begun, self._steps = snapshot.begun, snapshot.steps
+        self._run.take(snapshot.contacts)
 
 
-def _run_of(problem: Problem) -> CompiledFixedRun:
+def _again(given: tuple, snapshot: SimulatorState) -> Simulator:
+    """Simulator of the same arguments in the same state, in another process."""
+    simulator = Simulator(*given)
+    simulator.restore(snapshot)
+    return simulator
+
+
+def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSteps:
     """Machine code of the steps of a problem, and the functions beside it."""
     assert isinstance(problem.method, FixedStep)
+    if dynamics == "pair kernels":
+        return PairKernelSteps(problem)
     if problem.method.nonsmooth:
         return CompiledMoreauRun(problem, smooth_question(problem.question).laws)
     return CompiledFixedRun(problem)
@@ -341,7 +376,7 @@ def _zero(count: int) -> Callable:
     return lambda t, q, v: np.zeros(count)
 
 
-def _output_kernel(run: CompiledFixedRun, system: System) -> Kernel:
+def _output_kernel(run: CompiledFixedRun | PairKernelSteps, system: System) -> Kernel:
     """Machine code of a point → values of all outputs."""
     program, of_step = run.program, run.method.nonsmooth  # mean accelerations over the step, those of impacts included
     make = lambda: Kernel(output_function(program, system.scene, of_step), batch=False)  # noqa: E731

@@ -67,4 +67,4 @@ class Dynamics(Protocol):
         """State projected onto the constraints; one that meets them to round-off stays as it is."""
 
     def mobility(self, system: "System"):
-        """Freedoms and redundant constraints at the start of the scene; its ``str`` says them in words."""
+        """Freedoms and redundant constraints at the start of the scene; its ``str`` lists them."""

@@ -63,7 +63,7 @@ def _freedoms(system, counted: str) -> list[str]:
 
 
 def _reductions(system) -> list[str]:
-    """What each pass found, why, and what it saves."""
+    """Reductions by each pass, with reasons and savings."""
     written, *stages = system.reduction
     counts = _counts(system, written.subsystems)
     lines = ["", f"  subsystems in joint coordinates: {_listed(counts)} as written"]

@@ -34,7 +34,7 @@ def turned(Q: np.ndarray, theta: np.ndarray) -> np.ndarray:
 
 
 def displacement(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
-    """What plain coordinates moved by from q to ``moved``, as the numbers have it; θ itself for quaternions."""
+    """Differences of plain coordinates between q and ``moved``, as rounded; θ itself for quaternions."""
     if system.is_flat:
         return moved - q
     found = theta.copy()
@@ -46,7 +46,7 @@ def displacement(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
 
 
 def rounded(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
-    """What rounding took from coordinates: a small displacement (n_v,) of ``moved`` that leads to q ⊕ θ.
+    """Rounding error of coordinates: a small displacement (n_v,) of ``moved`` that leads to q ⊕ θ.
 
     About a quaternion Q it is what Q ∘ (exp(θ) − 1), a small sum with few roundings, has more than the numbers moved by.
     """

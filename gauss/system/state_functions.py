@@ -32,7 +32,7 @@ columns of joints outside the tree are zero. ``independent=`` names as many join
 degrees of freedom: v = N ẏ for their rates ẏ, and terms are projected on the constraints: Nᵀ M N, J N.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 from gauss.errors import ArgumentError
@@ -185,14 +185,16 @@ class StateFunctions:
         ----------
         *parameters : str
             "mass:body" (1), "com:body" (3) in the body frame, "inertia:body" (6: xx, yy, zz, xy, xz, yz) about the centre of
-            mass in the axes of the body frame, "gravity" (3); any number of a load, as "stiffness:spring" (1); of trees,
-            lengths: "parent_at:joint" and "child_at:joint" (3), the joint point in the frame of either body.
+            mass in the axes of the body frame, "gravity" (3); any number of a load, as "stiffness:spring" (1); lengths:
+            "parent_at:joint" and "child_at:joint" (3), the joint point in the frame of either body.
 
         Returns
         -------
         callable
             An array (…, n_v, k) for each parameter of k values, at fixed coordinates and rates; with loops along the
-            constraints. Those of inverse dynamics, the regressor, are ``function("inverse_dynamics_by:mass:body", …)``.
+            constraints. A length that changes opens its loops: where coordinates and rates follow, ∂q̈/∂q dq + ∂q̈/∂v dv of
+            :attr:`acceleration_derivatives` is to be added. Those of inverse dynamics, the regressor, are
+            ``function("inverse_dynamics_by:mass:body", …)``.
 
         Raises
         ------
@@ -202,7 +204,7 @@ class StateFunctions:
         return self.function(*(f"accelerations_by:{parameter}" for parameter in parameters))
 
     def function(
-        self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None, device: str | None = None
+        self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None, device: str | Sequence[str] | None = None
     ) -> Callable:
         """Compiled function of a state; several names give one function of all, which computes common operations once.
 
@@ -215,10 +217,12 @@ class StateFunctions:
             Axes and point of Jacobians: "local_world_aligned", "world" or "local".
         independent : sequence of str, optional
             Joints, or rates such as "U.angle1", as many as degrees of freedom: terms projected on the constraints.
-        device : str, optional
-            "cuda" or "cuda:1": a GPU, a state in a thread; "lanes": the same code on this CPU. The function takes batches
-            of this process, and returns such; of arrays on the GPU (torch, CuPy, JAX) it reads and returns others, without
-            a copy.
+        device : str or sequence of str, optional
+            "cuda" or "cuda:1": a GPU, a state in a thread; several share a batch, ["cuda:0", "cuda:1"]; "lanes": the same
+            code on this CPU. The function ``f(*vectors, t=0.0, stream=None)`` takes batches of this process, and returns
+            such; of arrays on the GPU (torch, CuPy, JAX) it reads and returns others, without a copy. "cuda float32"
+            computes in single precision: ``f.error`` is the largest difference from double precision, relative to the
+            largest result, over some rows of the last call; rows with a larger error than 1 % are repeated on this CPU.
 
         Returns
         -------

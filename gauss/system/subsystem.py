@@ -5,7 +5,7 @@ coordinates works on its subsystems. Each pass of ``gauss.system.passes`` turns 
 keep the names of joints, by which coordinates and forces are mapped.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from heapq import heappop, heappush
 from typing import NamedTuple
@@ -172,6 +172,26 @@ def whole(system) -> Subsystem:
             BoundRelation(index, placed.bodies, tuple(system.joints[j].name for j in placed.joints), placed.size)
             for index, placed in enumerate(system.relations.placed)
         ),
+    )
+
+
+def kept_joints(subsystem: Subsystem, joints) -> Subsystem:
+    """Subsystem with some of its joints, perhaps with other frames; its tree is left empty."""
+    kept, q, v, q_places, v_places = [], 0, 0, [], []
+    for joint in joints:
+        q_places.append(subsystem.q[joint.q])
+        v_places.append(subsystem.v[joint.v])
+        kept.append(replace(joint, q=slice(q, q + joint.pair.n_q), v=slice(v, v + joint.pair.n_v)))
+        q, v = q + joint.pair.n_q, v + joint.pair.n_v
+    names = {joint.name for joint in kept}
+    nothing = np.zeros(0, dtype=int)
+    return replace(
+        subsystem,
+        joints=tuple(kept),
+        couplings=tuple(c for c in subsystem.couplings if {c.driver, c.driven} <= names),
+        q=np.concatenate([nothing, *q_places]),
+        v=np.concatenate([nothing, *v_places]),
+        tree=(),
     )
 
 

@@ -74,5 +74,5 @@ def _panel(axes, points: Mapping[str, Sequence[float]], best: list[str], styles:
 
 
 def height(error: float) -> float:
-    """Where an error is drawn: one of zero below all others, what is off at the edge."""
+    """Ordinate of an error: zero below all others, errors off the scale at the edge."""
     return ZERO if error == 0.0 else float(np.clip(error, SMALLEST_SHOWN, LARGEST_SHOWN))

@@ -1,4 +1,4 @@
-"""What all figures share: formats, colours, curves with units on the axes, saving."""
+"""Style of all figures: formats, colours, curves with units on the axes, saving."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ FORMATS = (".png", ".svg", ".pdf")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#7F7F7F")  # Okabe and Ito
 LINES = ("-", "--", "-.", ":")
 INK = "#333333"
-NAMED = 12  # more curves than this need no legend: nobody can tell them apart
+NAMED = 12  # more curves than this need no legend: their colours repeat
 DPI = 150
 PAGE_DPI = 140  # of figures beside pages of results
 

@@ -231,7 +231,7 @@ def test_methods_for_equalities_refuse_inequalities(backend):
 
 
 class _Liar:
-    """Backend that claims what it is told to claim."""
+    """Backend that claims a given status."""
 
     name = "liar"
 

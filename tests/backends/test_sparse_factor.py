@@ -28,7 +28,7 @@ def test_answers_are_exact_or_refused(name):
     if name in PLAIN:
         assert reference(compulsion).error(compulsion, answer) <= certificate.error + ROUNDING
         assert certificate.error <= TOLERANCE
-    else:  # rows that fade are told apart from redundant ones by the singular values of a dense matrix only
+    else:  # only the singular values of a dense matrix distinguish near-dependent rows from redundant ones
         assert certificate.error > TOLERANCE
 
 

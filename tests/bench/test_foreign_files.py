@@ -1,4 +1,4 @@
-"""Files of problems from anybody: nothing is executed, nothing fills the memory, whatever is wrong is told with the file."""
+"""Files of problems from anybody: nothing is executed, nothing fills the memory, errors name the file."""
 
 import io
 import os
@@ -19,7 +19,7 @@ NONE = np.array(None)  # how qpsolvers writes what is not there
 PLAIN = {"P": np.eye(2), "q": np.ones(2), "A": np.ones((1, 2)), "b": np.ones(1)} | dict.fromkeys(
     ("G", "h", "lb", "ub"), NONE
 )
-MPS = "NAME it\nROWS\n N cost\n E row\nCOLUMNS\n x cost 1 row 1\nRHS\n right row 1\nENDATA\n"
+MPS = "NAME it\nROWS\n N cost\n E row\nCOLUMNS\n x cost 1 row 1\n y row 1\nRHS\n right row 1\nENDATA\n"
 FCLIB = {"p": [0, 1, 2, 3], "i": [0, 1, 2], "x": [1.0, 1.0, 1.0], "q": [1.0, 0.0, 0.0], "mu": [0.3]}
 
 
@@ -71,6 +71,7 @@ def test_shapes_that_a_file_does_not_hold_are_refused(tmp_path, shape):
         ({"q": np.full(2, np.inf)}, "not finite"),
         ({"P": 1j * np.eye(2)}, "real numbers"),
         ({"P": NONE}, "no P"),
+        ({"P": np.triu(np.ones((2, 2)))}, "not symmetric"),
         ({"P": np.zeros((0, 0)), "q": np.zeros(0), "A": NONE, "b": NONE}, "no unknowns"),
     ],
 )
@@ -88,6 +89,10 @@ def test_files_of_qpsolvers_that_are_no_programmes(tmp_path, change, says):
         ("row 1\nR", "other 1\nR"),
         ("cost 1", "cost nan"),
         ("cost 1", "cost one"),
+        (" E row", " E row\n E row"),
+        ("right row", "right rwo"),
+        ("ENDATA", "QUADOBJ\n x y 1\n y x 1\nENDATA"),
+        ("ENDATA", "QMATRIX\n x y 1\nENDATA"),
         (MPS, ""),
     ],
 )
@@ -98,6 +103,14 @@ def test_files_in_mps_that_are_no_programmes(tmp_path, change):
     path.write_text(MPS.replace(*change))
     with pytest.raises(FileError, match=r"it\.mps"):
         list(of_folder(tmp_path))
+
+
+@pytest.mark.parametrize("section", ["QUADOBJ\n x x 2\n x y 1\n z y 3", "QMATRIX\n x x 2\n x y 1\n y x 1\n y z 3\n z y 3"])
+def test_pairs_of_a_quadratic_cost_count_in_either_order(tmp_path, section):
+    (tmp_path / "IT.QPS").write_text(MPS.replace("RHS", " z row 1\nRHS").replace("ENDATA", f"{section}\nENDATA"))
+    (instance,) = of_folder(tmp_path)
+    assert instance.group == tmp_path.name
+    np.testing.assert_array_equal(instance.matrices.P.toarray(), [[2, 1, 0], [1, 0, 3], [0, 3, 0]])
 
 
 def test_matrices_of_matlab_with_indices_beyond_their_shape(tmp_path):

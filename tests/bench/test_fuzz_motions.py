@@ -110,7 +110,7 @@ def test_a_wrong_route_is_found(wrong, monkeypatch):
 
 def test_routes_that_all_differ_are_sensitive(monkeypatch):
     given = moved_scene(0, QUICK)
-    numbers = iter([1.0, 2.0, 4.0])
+    numbers = iter([1.0, 2.0, 2.0, 4.0])  # the second route is repeated by a tighter tolerance
 
     def route(*_, **__):
         x = np.full((len(given.times), gauss.compile_scene(given.scene).n_v), next(numbers))
@@ -118,6 +118,27 @@ def test_routes_that_all_differ_are_sensitive(monkeypatch):
 
     monkeypatch.setattr(routes, "_route", route)
     assert examine_motion(0, QUICK)["verdict"] == "sensitive"
+
+
+@pytest.mark.slow
+@needs_clock
+def test_a_long_second_route_is_compared_as_far_as_it_came(monkeypatch):
+    simulate = gauss.simulate
+
+    def late(*given, **options):
+        found = simulate(*given, **options)
+        if options["verify"] is False:
+            try:
+                _late(found)
+            except KeyboardInterrupt as error:
+                error.trajectory = replace(found, q=found.q[:2], v=found.v[:2], t=found.t[:2])
+                raise
+        return found
+
+    monkeypatch.setattr(gauss, "simulate", late)
+    monkeypatch.setattr(routes, "CUT_TIME", 1.0)
+    row, given = examine_motion(0, QUICK), moved_scene(0, QUICK)
+    assert (row["verdict"], row["compared"]) == ("agree", given.times[1] / given.duration)
 
 
 @pytest.mark.slow

@@ -1,29 +1,18 @@
 """How the comparison judges: promises by residuals, errors by references, all by the same rule on the same problems."""
 
 import re
-import time
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-import qpsolvers
-from scipy import io, sparse
+from scipy import sparse
 
-from gauss.backends.programme import FORMS, Outcome
-from gauss.bench.class_page import class_page, sentence
-from gauss.bench.classes import classes_named
-from gauss.bench.clocks import FEWEST, ROUNDS, WALL_PER_CPU, timed
+from gauss.backends.programme import Outcome
 from gauss.bench.contestants import refusal
-from gauss.bench.export import export
-from gauss.bench.folders import of_folder
-from gauss.bench.fronts import FrontPoint, front, fronts
-from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_problem, of_selection
+from gauss.bench.instances import FILE, INEQUALITY, Instance, of_problem, of_selection
 from gauss.bench.levels import LIMIT, Promise, promise
-from gauss.bench.measure import FIGURES, NOT_ASKED, _judged, measure
-from gauss.bench.problems import INCONSISTENT, SOLVABLE, UNKNOWN, make_problem
-from gauss.bench.publish import publish
-from gauss.bench.report import markdown
+from gauss.bench.measure import NOT_ASKED, _judged, measure
+from gauss.bench.problems import INCONSISTENT, UNKNOWN, make_problem
 from gauss.bench.suite.instance import INFEASIBLE, UNBOUNDED
 from gauss.bench.suite_instances import SUITE, of_suite
 from gauss.bench.summary import (
@@ -39,97 +28,10 @@ from gauss.bench.summary import (
     totals,
     verdict,
 )
-from gauss.bench.table import write_table
 from gauss.bench.verdicts import is_false, said
-from gauss.bench.worker import Worker
-from gauss.errors import BackendError, FileError
-from gauss.view.fronts import ZERO, height
-
-GOOD = {"outcome": "answered", "claimed": True, "error": 1e-10, "primal": 1e-12, "dual": 1e-12, "gap": 1e-12, "excess": 1e-3}
-GOOD |= {
-    "backend": "one",
-    "level": "high",
-    "form": "F2s",
-    "problem": "a",
-    "group": "equality",
-    "seconds": 1e-3,
-    "reason": "",
-}
-BEYOND = {"primal": 1e-6, "excess": 1e3}  # residuals above the tolerance
-ROUNDED = {"primal": 1e-6, "excess": 0.5}  # above the tolerance, but not above rounding
-NO_FIGURES = {"error": np.nan, "primal": np.nan, "dual": np.nan, "gap": np.nan, "excess": np.nan}
-
-
-class Perfect:
-    """A solver of one's own that is right."""
-
-    def __call__(self, programme):
-        H, C = programme.H.toarray(), programme.C.toarray()
-        x = qpsolvers.solve_qp(H, programme.c, A=C, b=programme.d, solver="daqp")
-        y = np.linalg.lstsq(C.T, -H @ x - programme.c, rcond=None)[0]
-        return Outcome(x, y, np.zeros(0), True, "solved")
-
-
-class LiarInX(Perfect):
-    """It is off by a percent."""
-
-    def __call__(self, programme):
-        found = super().__call__(programme)
-        return Outcome(1.01 * found.x, found.y, found.z, True, "solved")
-
-
-class LiarInY(Perfect):
-    """Its multipliers are none."""
-
-    def __call__(self, programme):
-        return Outcome(super().__call__(programme).x, None, None, True, "solved")
-
-
-class WrongShape:
-    """It returns too much."""
-
-    def __call__(self, programme):
-        return Outcome(np.zeros(programme.c.size + 1), None, None, True, "solved")
-
-
-class NotANumber:
-    """It returns nan."""
-
-    def __call__(self, programme):
-        return Outcome(np.full(programme.c.size, np.nan), None, None, True, "solved")
-
-
-class LiarWithoutMultipliers(Perfect):
-    """Its multipliers are not finite."""
-
-    def __call__(self, programme):
-        found = super().__call__(programme)
-        return Outcome(found.x, np.nan * found.y, found.z, True, "solved")
-
-
-class Changes:
-    """It makes zero right by changing what is asked."""
-
-    def __call__(self, programme):
-        for part in (programme.H.data, programme.C.data, programme.K.data, programme.c, programme.d, programme.k):
-            part[:] = 0.0
-        return SaysSolved()(programme)
-
-
-class ClaimsInWords(Perfect):
-    """What it claims is neither True nor False."""
-
-    def __call__(self, programme):
-        found = super().__call__(programme)
-        object.__setattr__(found, "found", "no")  # past the types that are checked here
-        return found
-
-
-class Raises:
-    """It fails."""
-
-    def __call__(self, programme):
-        raise RuntimeError("broken")
+from gauss.errors import BackendError
+from tests.support import qp_solvers
+from tests.support.qp_solvers import BEYOND, GOOD, NO_FIGURES, ROUNDED
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +52,7 @@ def four_bar() -> Instance:
     ],
 )
 def test_solvers_of_ones_own_are_caught_in_what_they_claim(four_bar, solver, outcome, right, broken):
-    row = measure(four_bar, f"{__name__}:{solver}", "F2s", "high") | {"level": "high", "group": "equality"}
+    row = measure(four_bar, f"{qp_solvers.__name__}:{solver}", "F2s", "high") | {"level": "high", "group": "equality"}
     assert (row["outcome"], is_right(row), is_broken(row)) == (outcome, right, broken)
 
 
@@ -159,7 +61,7 @@ def test_solvers_of_ones_own_are_caught_in_what_they_claim(four_bar, solver, out
 )
 def test_outcomes_of_solvers_of_ones_own_that_are_none_are_named(four_bar, solver, says):
     with pytest.raises(BackendError, match=says):
-        measure(four_bar, f"{__name__}:{solver}", "F2s", "high")
+        measure(four_bar, f"{qp_solvers.__name__}:{solver}", "F2s", "high")
 
 
 @pytest.mark.slow
@@ -256,67 +158,6 @@ def test_classes_choose_problems():
     assert found[0].expected is None  # what has no solution has no reference
 
 
-@pytest.mark.peer
-def test_files_of_qpsolvers_are_instances(tmp_path):
-    """Bounds become rows; there is no reference, and residuals judge."""
-    P, q, lb, ub = (
-        sparse.eye_array(2, format="csc"),
-        np.array([-3.0, 1.0]),
-        np.array([-np.inf, 0.0]),
-        np.array([2.0, np.inf]),
-    )
-    qpsolvers.Problem(sparse.csc_matrix(P), q, lb=lb, ub=ub).save(str(tmp_path / "bounds.npz"))
-    (instance,) = of_folder(tmp_path)
-    assert (instance.name, instance.verdict, instance.forms(("F2",))) == ("bounds", UNKNOWN, (FILE,))
-    row = measure(instance, "piqp", FILE, "high") | {"level": "high"}
-    assert row["outcome"] == "answered" and np.isnan(row["error"]) and is_right(row)
-    with pytest.raises(BackendError, match="take a compulsion"):
-        measure(instance, "recursion", FILE, "own")
-    with pytest.raises(FileError, match="no .npz or .mat"):
-        list(of_folder(tmp_path / "empty"))
-    known = of_arrays("known", "mine", P, q, None, None, np.eye(2), np.array([2.0, 5.0]), x=np.array([2.0, -1.0]))
-    assert is_right(measure(known, "daqp", FILE, "high"))
-
-
-@pytest.mark.parametrize("kind", ["npz", "mat"])
-@pytest.mark.parametrize("name", ["box on 4 points", "four-bar"])
-def test_problems_that_are_written_are_read_again(tmp_path, kind, name):
-    """In both forms of files, every number of a programme with inequality rows, and of one without."""
-    problem = make_problem(name)
-    export([problem], tmp_path, kind)
-    (instance,) = of_folder(tmp_path)
-    expected, found = FORMS["F2"](problem.compulsion), instance.programme(FILE)
-    for part in ("H", "c", "C", "d", "K", "k"):
-        a, b = (x.toarray() if sparse.issparse(x) else x for x in (getattr(expected, part), getattr(found, part)))
-        assert np.array_equal(a, b), part
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [({"l": None}, "no l"), ({"u": np.ones(3)}, "shapes"), ({"cones": np.array([3])}, "cones")],
-)
-def test_files_of_matlab_that_are_no_programmes(tmp_path, change, said):
-    whole = {"P": np.eye(2), "q": np.ones(2), "A": np.eye(2), "l": np.zeros(2), "u": np.full(2, 1e20)}
-    io.savemat(tmp_path / "it.mat", {name: value for name, value in (whole | change).items() if value is not None})
-    with pytest.raises(FileError, match=rf"it\.mat: .*{said}"):
-        list(of_folder(tmp_path))
-
-
-def test_bounds_of_matlab_that_are_infinite_are_none(tmp_path):
-    """1e20 is no bound; rows with l = u are equalities, those with both bounds two inequality rows; integers are numbers."""
-    bounds = {"l": np.array([0, 0, 1, 3], dtype=np.uint8), "u": [1e20, 1e20, 1.0, 4.0]}
-    io.savemat(tmp_path / "it.mat", {"P": np.eye(4, dtype=int), "q": np.ones(4), "A": np.eye(4, dtype=np.uint8)} | bounds)
-    (instance,) = of_folder(tmp_path)
-    m = instance.matrices
-    assert m.A.toarray().tolist() == [[0, 0, 1, 0]] and m.b.tolist() == [1.0]
-    assert sorted(zip(m.G.toarray().tolist(), m.h.tolist(), strict=True)) == [
-        ([-1, 0, 0, 0], 0.0),
-        ([0, -1, 0, 0], 0.0),
-        ([0, 0, 0, -1], -3.0),
-        ([0, 0, 0, 1], 4.0),
-    ]
-
-
 SMALLEST_OF = {  # a small problem of each class, few of whose multipliers are unique
     "contacts": "contacts balls 8 spread 0",
     "degenerate": "degenerate stack 4",
@@ -374,16 +215,8 @@ def test_verdicts_of_solvers_are_compared_with_proven_ones(kind, name, verdict):
         row = measure(instance, solver, FILE, "high") | key
         assert said(row["reason"]) == verdict and is_right(row) and not is_false(row)
         assert is_false(row | {"verdict": "solvable"}) and not is_right(row | {"verdict": "solvable"})
-    liar = measure(instance, f"{__name__}:SaysSolved", FILE, "high") | key
+    liar = measure(instance, f"{qp_solvers.__name__}:SaysSolved", FILE, "high") | key
     assert is_broken(liar) and not is_right(liar)
-
-
-class SaysSolved:
-    """It calls anything solved, at zero."""
-
-    def __call__(self, programme):
-        sizes = programme.c.size, programme.d.size, programme.k.size
-        return Outcome(*map(np.zeros, sizes), True, "solved")
 
 
 @pytest.mark.parametrize(
@@ -414,51 +247,6 @@ def test_every_class_is_asked_and_sequences_start_at_the_step_before():
     assert row["warm"] > 0.0 and np.isnan(measure(second, "clarabel", FILE, "high")["warm"])
 
 
-def test_fronts_hold_what_no_other_beats():
-    rows = [
-        GOOD | {"backend": name, "problem": problem, "seconds": seconds, "error": error}
-        for name, seconds, error in (("one", 1e-3, 1e-8), ("two", 2e-3, 0.0), ("three", 3e-3, 1e-9), ("none", 1e-4, np.nan))
-        for problem in "ab"
-    ]
-    names, overall, panels = fronts(rows)
-    assert names == ["one", "two", "three", "none"] and set(panels) == {"a", "b"}
-    assert front(overall) == front(panels["a"]) == ["one", "two"]
-    assert panels["a"]["three"] == FrontPoint(pytest.approx(3.0), 1e-9) and "none" not in overall
-    mine = {name: [row for row in rows if row["backend"] == name] for name in names}
-    assert "two is 1.5 × as fast" in sentence("three", mine, overall, panels)
-    assert height(0.0) == ZERO < height(1e-300) < height(1e-12)
-
-
-def computed(seconds: float):
-    """Nothing, after so much CPU time [s]."""
-    end = time.process_time() + seconds
-    while time.process_time() < end:
-        pass
-
-
-def test_clocks_run_a_cold_call_and_some_warm_ones():
-    calls = []
-    found, seconds = timed(lambda: calls.append(None), LIMIT)
-    assert len(calls) == len(found) == len(seconds) == 1 + ROUNDS
-    found, seconds = timed(lambda: computed(0.02), 0.01)
-    assert len(seconds) == 1  # late already
-    found, seconds = timed(lambda: computed(0.02), 0.01, compiles=True)
-    assert len(seconds) == 2
-    assert len(timed(lambda: computed(0.06), LIMIT)[1]) > FEWEST
-    waits = timed(lambda: time.sleep(0.02), LIMIT)[1][0]
-    assert 0.02 / WALL_PER_CPU <= waits < 0.02  # less than work, but not free
-
-
-def test_a_call_that_takes_too_much_time_ends_with_its_process():
-    """No setting of a library is needed, and the next call is answered by a new process."""
-    with Worker() as worker:
-        late = worker.call(timed, partial(computed, 10.0), 0.1, timeout=60.0)
-        assert (late.outcome, late.value) == ("timed out", None) and "CPU time" in late.reason
-        late = worker.call(timed, partial(time.sleep, 60.0), 0.02, timeout=60.0)
-        assert (late.outcome, late.value) == ("timed out", None) and "wall time" in late.reason
-        assert worker.call(timed, partial(computed, 0.01), 0.1, timeout=60.0).outcome == "answered"
-
-
 def test_the_documented_solver_works(tmp_path, monkeypatch, four_bar):
     """The example of benchmarks/README.md, as it stands there."""
     text = (Path(__file__).parents[2] / "benchmarks" / "README.md").read_text(encoding="utf-8")
@@ -468,40 +256,3 @@ def test_the_documented_solver_works(tmp_path, monkeypatch, four_bar):
     monkeypatch.syspath_prepend(tmp_path)
     row = measure(four_bar, "mysolver:RangeSpace", "F2s", "high") | {"level": "high"}
     assert is_right(row) and is_kept(row) and row["certified"]
-
-
-def test_answers_without_a_reference_are_named_by_their_residuals():
-    """No error is known of them, which is no fault of the answer."""
-    instance = of_arrays("plain", "mine", np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], None, None)
-    found = {solver: measure(instance, solver, FILE, "high") for solver in ("daqp", f"{__name__}:LiarInY")}
-    key = {"problem": "plain", "form": FILE, "level": "high", "group": "mine", "verdict": SOLVABLE}
-    text = markdown([row | key | {"backend": name} for name, row in found.items()], [], ["date: today"])
-    errors = text[text.index("## Errors") : text.index("## Class")]
-    assert "| daqp | kept |" in errors and "LiarInY | **claimed** |" in errors
-    assert "class mine, file" in text and "Level low" not in text
-
-
-@pytest.mark.parametrize(
-    ("change", "has_errors"),
-    [({"form": FILE}, True), ({"form": "F2s", "level": "low"}, False), ({"form": "F2s", "group": INCONSISTENT}, False)],
-)
-def test_pages_are_written_whatever_was_asked(tmp_path, change, has_errors):
-    """Of programmes from files; of another level, or of an inconsistent problem, without a chart of errors."""
-    row = GOOD | dict.fromkeys(FIGURES, np.nan) | {"certified": False} | change
-    write_table(tmp_path / "qp.csv", ["date: today", "machine: this one"], [row])
-    written = publish(tmp_path, tmp_path / "qp.csv", None)
-    assert set(written) == set(tmp_path.iterdir()) - {tmp_path / "qp.csv"}
-    assert (tmp_path / "qp_errors.png" in written) == has_errors == ("qp_errors.png" in (tmp_path / "qp.md").read_text())
-
-
-def test_names_stand_for_several_classes():
-    assert classes_named(["friction", "mpc", "cones"]) == ["cones", "coulomb", "mpc"]
-
-
-def test_levels_stand_side_by_side_where_several_were_asked():
-    """Of the problems that were asked at all levels; the rest of a page is about level high."""
-    row = GOOD | {"group": "mpc", "library": 1e-4}
-    asked = [("a", "high"), ("b", "high"), ("a", "low")]
-    text = class_page("mpc", [row | {"problem": problem, "level": level} for problem, level in asked], [], "")
-    assert "Asked at each: 1 problem." in text and "| 1 | one | 2/2 |" in text
-    assert "## By level" not in class_page("mpc", [row | {"problem": "a", "level": "high"}], [], "")

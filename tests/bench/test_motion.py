@@ -1,4 +1,4 @@
-"""What a backend's tolerance does to a motion: exact solvers change nothing, loose ones are told."""
+"""What a backend's tolerance does to a motion: exact solvers change nothing, loose ones are reported."""
 
 import numpy as np
 import pytest

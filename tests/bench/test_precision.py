@@ -97,7 +97,7 @@ def test_steps_divide_the_duration():
     ],
 )
 def test_chart_of_a_scene(tmp_path, monkeypatch, scene, options, said):
-    """Integrators and backends are curves, contacts with friction have a reference, a refusal is told once."""
+    """Integrators and backends are curves, contacts with friction have a reference, a refusal is reported once."""
     monkeypatch.setattr(precision, "STEPS", FEW)
     path = tmp_path / "chart.svg"
     run = ["--duration", "0.2", "--patience", "0.001", "--output", str(path)]

@@ -51,7 +51,7 @@ def test_forces_that_are_out_of_balance_are_what_the_accelerations_take(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TREES | TIED)
 def test_the_check_measures_the_error_of_accelerations(name):
-    """Right ones pass; ones that are wrong by what a small force causes are told from them by just that."""
+    """Right ones pass; ones that are wrong by the effect of a small force have that force as residual."""
     system = gauss.compile_scene((TREES | TIED)[name]())
     if not system.subsystems:
         return

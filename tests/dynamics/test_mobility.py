@@ -87,7 +87,7 @@ def test_a_flat_parallelogram_is_singular():
     assert not gauss.mobility(folded).is_singular
 
 
-def _door(compliances=None):
+def _door():
     scene = gauss.Scene("door", gravity=(0, 0, -9.81))
     scene.body("door", 20.0, (2.0, 2.0, 0.5), com=(0.5, 0, 0))
     scene.revolute("upper", "ground", "door", at=(0, 0, 1))

@@ -11,6 +11,7 @@ from gauss.system import random_state
 
 EXACT = 1e-9  # relative, of central differences of polynomials of degree two, with large steps
 OF_STEPS = 1e-6  # of central differences, relative
+STEP = 1e-6  # m, of differences of places of joints, which leave a loop open by as much
 AGREEMENT = 1e-12  # of sums in another order
 
 
@@ -82,24 +83,61 @@ def test_constants_of_loads(parameter):
     assert relative(found, by_difference(scene, parameter, 1, value, 0.1)) <= EXACT
 
 
+def with_moved_joint(system, where: str, name: str, shift: np.ndarray):
+    """System whose joint has another place in the frame of its parent or child."""
+    joint = next(one for one in system.joints if one.name == name)
+    field, body = ("p_parent", joint.parent) if where == "parent_at" else ("p_child", joint.child)
+    axes = np.eye(3) if body < 0 else system.frames[system.structure.bodies[body]].R
+    other = replace(joint, **{field: getattr(joint, field) + axes @ shift})
+    joints = tuple(other if one is joint else one for one in system.joints)
+    return replace(system, joints=joints, dynamics=system.mechanics.anew())
+
+
 @pytest.mark.parametrize("where", ["parent_at", "child_at"])
 def test_lengths_of_a_tree(where):
     system = gauss.compile_scene(gauss.load("random_tree", n=4, seed=1))
     state, a = random_state(system, np.random.default_rng(4)), np.linspace(-1.0, 1.0, system.n_v)
-    joint, step = system.joints[2], 0.05
-    body = joint.parent if where == "parent_at" else joint.child
-    axes = np.eye(3) if body < 0 else system.frames[system.structure.bodies[body]].R
-    field = {"parent_at": "p_parent", "child_at": "p_child"}[where]
+    name, step = system.joints[2].name, 0.05
 
-    def efforts(change: np.ndarray) -> np.ndarray:
-        other = replace(joint, **{field: getattr(joint, field) + axes @ change})
-        joints = tuple(other if one is joint else one for one in system.joints)
-        changed = replace(system, joints=joints, dynamics=system.mechanics.anew())
-        return changed.function("inverse_dynamics")(state.q, state.v, a)
+    def efforts(shift: np.ndarray) -> np.ndarray:
+        return with_moved_joint(system, where, name, shift).function("inverse_dynamics")(state.q, state.v, a)
 
-    found = system.function(f"inverse_dynamics_by:{where}:{joint.name}")(state.q, state.v, a)
+    found = system.function(f"inverse_dynamics_by:{where}:{name}")(state.q, state.v, a)
     expected = [(efforts(step * axis) - efforts(-step * axis)) / (2.0 * step) for axis in np.eye(3)]
     assert relative(found, np.array(expected).T) <= EXACT
+
+
+@pytest.mark.parametrize("parameter", ["child_at:A", "parent_at:B", "parent_at:C", "child_at:D"])
+def test_lengths_of_a_loop_at_fixed_coordinates(parameter):
+    scene = gauss.load("four_bar")
+    scene.spring("S", "crank", "rocker", (0.1, 0.0, 0.0), (0.0, 0.2, 0.0), stiffness=20.0, length=0.3)
+    system = gauss.compile_scene(scene)
+    start, load = system.initial_state(), np.linspace(-1.0, 1.0, system.n_v)
+    (where, _, name), step = parameter.partition(":"), STEP
+
+    def accelerations(shift: np.ndarray) -> np.ndarray:
+        compulsion = gauss.assemble(with_moved_joint(system, where, name, shift), start, load)
+        return gauss.solve(compulsion, tolerance=STEP).qdd
+
+    found = system.parameter_derivatives(parameter)(start.q, start.v, load)
+    expected = [(accelerations(step * axis) - accelerations(-step * axis)) / (2.0 * step) for axis in np.eye(3)[:2]]
+    assert relative(found[:, :2], np.array(expected).T) <= OF_STEPS
+    assert not found[:, 2].any()  # across the plane: the rows that it would contradict are redundant
+
+
+def test_lengths_of_a_loop_along_closed_linkages():
+    """With the coordinates and rates that keep the loop closed: ∂q̈/∂p + ∂q̈/∂q dq/dp + ∂q̈/∂v dv/dp, the crank held."""
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    start, load, step = system.initial_state(), np.zeros(system.n_v), 1e-5
+    ends = []
+    for sign in (1.0, -1.0):
+        other = with_moved_joint(system, "child_at", "D", np.array([sign * step, 0.0, 0.0]))
+        state = other.initial_state(start.q, start.v, keep=["A"])
+        ends.append((state.q, state.v, other.forward_dynamics(state.q, state.v, load)))
+    dq, dv, expected = ((plus - minus) / (2.0 * step) for plus, minus in zip(*ends, strict=True))
+    by_q, by_v, _ = system.acceleration_derivatives(start.q, start.v, load)
+    found = system.parameter_derivatives("child_at:D")(start.q, start.v, load)[:, 0] + by_q @ dq + by_v @ dv
+    assert relative(found, expected) <= OF_STEPS
 
 
 PARAMETERS_OF_LOOPS = {"mass:coupler": 1, "com:coupler": 3, "inertia:crank": 6, "stiffness:S": 1}
@@ -158,5 +196,7 @@ def test_parameters_that_do_not_exist_are_refused(parameter, error):
     system = gauss.compile_scene(sprung_tree())
     with pytest.raises(error):
         system.parameter_derivatives(parameter)
-    with pytest.raises(ArgumentError, match="trees alone"):
-        gauss.compile_scene(gauss.load("four_bar")).parameter_derivatives("child_at:B")
+    scene = gauss.load("four_bar")
+    scene.distance("rope", "crank", "rocker", (0.1, 0.0, 0.0), (0.0, 0.0, 0.0), length=0.7)
+    with pytest.raises(ArgumentError, match="beside relations"):
+        gauss.compile_scene(scene).parameter_derivatives("child_at:B")

@@ -56,8 +56,19 @@ def test_a_motion_that_diverges_is_marked_and_the_others_are_not_affected():
 def test_a_failed_motion_terminates_with_its_reason():
     environment = gym.MechanismEnv(gym.cart_pole_swing_up())
     environment.reset(seed=1)
-    *_, terminated, _, info = environment.step(np.array([np.nan]))
-    assert terminated and "nan" in info["failure"]
+    environment.simulator._point[4] = 1e200  # the rate of the pole
+    *_, terminated, _, info = environment.step(np.array([1.0]))
+    assert terminated and "shorten the step" in info["failure"]
+
+
+@pytest.mark.parametrize("action", [[np.nan], [np.inf], [1.0, 2.0], 1.0, []])
+def test_wrong_actions_are_errors_and_change_nothing(action):
+    environment = gym.MechanismEnv(gym.cart_pole_swing_up())
+    environment.reset(seed=1)
+    before = environment.simulator.snapshot()
+    with pytest.raises(ArgumentError, match="finite numbers"):
+        environment.step(np.array(action))
+    assert environment.simulator.snapshot() == before
 
 
 def test_tasks_without_limits_or_inputs_are_refused():

@@ -1,4 +1,4 @@
-"""Motions from disk: shown with the meshes of their robot, or without them by name; what is no motion is told in a line."""
+"""Motions from disk: shown with the meshes of their robot, or without them by name; other files are refused in a line."""
 
 import shutil
 import warnings

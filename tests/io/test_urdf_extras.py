@@ -114,3 +114,53 @@ def test_the_command_line_reads_them_too(arm):
     assert "stop of shoulder" in result.output
     result = CliRunner().invoke(app, ["explain", str(arm), "--read", "stop"])
     assert result.exit_code != 0
+
+
+def _motor(
+    kind="transmission_interface/SimpleTransmission",
+    joint="shoulder",
+    reduction="<mechanicalReduction>50</mechanicalReduction>",
+):
+    return ARM.replace(
+        "</robot>",
+        f"""<transmission name="t"><type>{kind}</type><joint name="{joint}"/><actuator name="motor">{reduction}</actuator>
+        </transmission></robot>""",
+    )
+
+
+@pytest.mark.parametrize(("reduction", "n"), [("", 1.0), ("<mechanicalReduction> -50 </mechanicalReduction>", -50.0)])
+def test_a_motor_acts_on_its_joint_times_the_reduction(tmp_path, reduction, n):
+    """τ = n u, within the effort of 10 N m of the joint."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(_motor(reduction=reduction))
+    scene = quietly(path, motors=True)
+    assert list(scene.inputs) == ["motor"]
+    for u in (0.01, 1e3):
+        torque = min(max(n * u, -10.0), 10.0)
+        driven = quietly(path)
+        driven.drive("shoulder", torque=torque)
+        simulated = gauss.simulate(scene, 0.01, control=lambda t, q, v, u=u: [u], rate=100, progress=False)
+        expected = gauss.simulate(driven, 0.01, progress=False)
+        assert simulated.q[-1] == pytest.approx(expected.q[-1], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "named"),
+    [
+        ({"joint": "elbow"}, "elbow"),
+        ({"reduction": "<mechanicalReduction>0</mechanicalReduction>"}, "mechanicalReduction"),
+        ({"reduction": "<mechanicalReduction>1:50</mechanicalReduction>"}, "1:50"),
+    ],
+)
+def test_a_motor_without_joint_or_reduction_is_refused_with_its_line(tmp_path, given, named):
+    path = tmp_path / "arm.urdf"
+    path.write_text(_motor(**given))
+    with pytest.raises(FileError, match=rf"arm\.urdf:\d+.*{named}"):
+        quietly(path, motors=True)
+
+
+def test_other_transmissions_are_named(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(_motor(kind="transmission_interface/DifferentialTransmission"))
+    with pytest.warns(NotImportedWarning, match="transmissions that are not modelled: t"):
+        assert not gauss.load(path, motors=True).inputs

@@ -262,7 +262,7 @@ def test_a_run_stops_with_the_reason_where_the_linkage_does_not_close():
 
 
 def test_laws_of_loads():
-    """A law is told where its link is; the torque follows by virtual work at rest: M1 = −F·dx/dθ."""
+    """A law takes the position of its link; the torque follows by virtual work at rest: M1 = −F·dx/dθ."""
     linkage = _four_bar(0.4, 1.0, 0.7, 1.2)
     light = gauss.Linkage("light", gravity=(0, 0))
     light.links.update(linkage.links)

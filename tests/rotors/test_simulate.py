@@ -200,7 +200,7 @@ def test_both_shafts_come_to_rest_under_dry_loads():
 
 
 def test_slip_beyond_the_range_of_a_curve_is_reported_and_followed():
-    """The law goes on where it was not fitted; what is told is the link, the time, and so the slip."""
+    """The law goes on where it was not fitted; the message names the link, the time, and so the slip."""
     motions = []
     for largest in (0.1, None):
         network = two_shafts(curve=CURVE, largest_slip=largest, speeds=(59.0, 90.0))

@@ -1,4 +1,4 @@
-"""Who asks for a motion is told in every call when its energy balance is off; good motions are left alone."""
+"""Every call warns of a motion whose energy balance is off; good motions have no warning."""
 
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -157,7 +157,7 @@ def test_energy_that_a_wall_gives_to_long_steps_is_told_of_by_every_entry_point(
 
 
 def test_rollouts_tell_of_motions_that_are_made_again(swinging, monkeypatch):
-    """Whatever engine makes a motion in the end, its author is told once, and by its number."""
+    """Whatever engine makes a motion, one warning comes, with its number."""
     monkeypatch.setattr("gauss.simulation.batch.rollout.ACCELERATION_TOLERANCE", -1.0)
     q0 = np.full((2, swinging.n_q), 1.0)
     run = {"integrator": "semi_implicit_euler", "steps": 100, "step": 1e-2}

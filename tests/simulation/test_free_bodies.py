@@ -8,7 +8,7 @@ import pytest
 import gauss
 from benchmarks.free_bodies import EDGE, RADIUS, bin_of_balls, dominoes, floor, free_body, stack
 from gauss import Plan
-from gauss.dynamics.contact.free_body_step import free_body_stepper, rates
+from gauss.dynamics.contact.free_body_step import FreeBodyStepper, rates
 from gauss.dynamics.gap_functions import gaps, slips
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SceneError, SimulationError, StateError
@@ -49,7 +49,7 @@ def facing(one: str, other: str):
 @pytest.mark.parametrize(("one", "other"), [*PAIRS, *SLOW_PAIRS])
 def test_kernels_of_pairs_are_the_gap_functions_of_the_scene(one, other):
     system, rng = gauss.compile_scene(facing(one, other)), np.random.default_rng(3)
-    stepper, seen = free_body_stepper(system), 0
+    stepper, seen = FreeBodyStepper(system), 0
     for _ in range(10):
         q, v = system.reference.q.copy(), rng.standard_normal(system.n_v)
         for k in range(0, system.n_q, 7):
@@ -117,10 +117,10 @@ def test_collisions_keep_momentum():
 @pytest.mark.parametrize(("make", "n"), [(bin_of_balls, 20), (dominoes, 6)])
 def test_contact_forces_obey_the_laws_of_signorini_and_coulomb(make, n):
     system = gauss.compile_scene(make(n))
-    stepper, state, pressed = free_body_stepper(system), system.initial_state(), 0
+    stepper, state, pressed = FreeBodyStepper(system), system.initial_state(), 0
     stepper.forget()
     for _ in range(200):
-        found = stepper.step(state, STEP)
+        found = stepper.python_step(state, STEP)
         near, (normal, *across) = found.contacts, found.force.T
         state = State(state.t + STEP, found.q, found.v)
         assert (near.gap > -1e-5).all()
@@ -152,7 +152,7 @@ def test_near_pairs_are_all_that_overlap():
             scene.box(f"shape {k}", f"body {k}", (0.1, 0.2, 0.3), rotation=tuple(rng.standard_normal(3)))
     scene.contacts_all()
     system = gauss.compile_scene(scene)
-    stepper = free_body_stepper(system)
+    stepper = FreeBodyStepper(system)
     poses = stepper.table.poses(stepper._begin(system.initial_state(), 0.0, 0.0).bodies)
     half = (np.abs(poses[:9].reshape(3, 3, -1)) * stepper.table.sizes[:3]).sum(axis=1) + stepper.table.sizes[3]
     apart = np.abs(poses[9:12, :, None] - poses[9:12, None]) - half[:, :, None] - half[:, None]

@@ -27,7 +27,7 @@ def _teleports():
 )
 @pytest.mark.parametrize("kind", ["displacement", "distance", "guide", "constraint", "sawtooth"])
 def test_positions_that_jump_are_refused_before_the_motion(kind, settings):
-    """Name, time and size of the jump are told, and no step is made."""
+    """The message has name, time and size of the jump, and no step is made."""
     scene, step = _teleports()
     at = "1"
     if kind == "displacement":

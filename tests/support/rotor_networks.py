@@ -78,11 +78,13 @@ def scaled_network(network: Network, time: float, energy: float) -> Network:
     for link in network.links.values():
         made_of = changed(link, {})
         if isinstance(link, FrictionDrive):
+            assert isinstance(link.curve, Hyperbola)
             made_of = replace(made_of, curve=Hyperbola(link.curve.A * energy, link.curve.C, link.curve.B * energy))
         made.add(made_of)
     for torque in network.torques.values():
-        times = {key: None if at is None else at * time for key, at in (("begin", torque.begin), ("until", torque.until))}
-        made.add(replace(torque, law=changed(torque.law, OWN.get(type(torque.law).__name__, {})), **times))
+        begin, until = (None if at is None else at * time for at in (torque.begin, torque.until))
+        law = changed(torque.law, OWN.get(type(torque.law).__name__, {}))
+        made.add(replace(torque, law=law, begin=begin, until=until))
     return made
 
 

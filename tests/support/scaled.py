@@ -86,7 +86,7 @@ def _unit_of(system: System, units: Units) -> Callable[[str], float]:
 
 def _in_units(element, units: Units, unit: Callable[[str], float]):
     """Element with every field that has a unit multiplied."""
-    name = getattr(element, "joint", None) or getattr(element, "driven", None)
+    name = getattr(element, "joint", "") or getattr(element, "driven", "")
     along = hasattr(element, "joint") or hasattr(element, "driven")
     if type(element).__name__ == "Joint":
         name, along = element.name, False

@@ -109,8 +109,8 @@ def test_the_scale_is_explained():
     assert str(system.scale) in system.explain()
 
 
-def _four_bar(L: float, open_by: float = 0.0):
-    """A four-bar that is drawn assembled, with a coupler that may be too long."""
+def _four_bar(L: float):
+    """A four-bar that is drawn assembled."""
     scene = gauss.Scene("four-bar", gravity=(0, -9.81 * L, 0))
     corners = np.array([(0, 0), (0, 0.5), (1.2, 0.9), (1.2, 0)]) * L
     for i in range(3):

@@ -1,4 +1,4 @@
-"""A case of the atlas, and what becomes of a method in it."""
+"""A case of the atlas, and the verdict on a method in it."""
 
 import warnings
 from collections.abc import Callable
@@ -16,7 +16,7 @@ VERDICTS = (PASSED, DEGRADED, HONEST, SLOW, SILENT)
 
 @dataclass(frozen=True)
 class FailureCase:
-    """Where a method may fail.
+    """Case in which a method may fail.
 
     Parameters
     ----------

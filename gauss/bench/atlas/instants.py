@@ -1,4 +1,4 @@
-"""Cases of one instant: accelerations beside references of 50 digits, or beside those of the same scene said otherwise."""
+"""Cases of one instant: accelerations beside references of 50 digits, or beside those of an equivalent scene."""
 
 from dataclasses import dataclass, replace
 

@@ -50,7 +50,7 @@ class Method:
 
     @property
     def name(self) -> str:
-        """What the atlas calls it."""
+        """Name in the atlas."""
         form = "" if self.ours else f" {self.form}"
         believed = "" if self.certified else ", believed"
         return f"{self.backend}{form}, {self.integrator}, {self.stabilisation}{believed}"
@@ -144,7 +144,7 @@ class Believing(CertifiedEngine):
 
 
 def _asked(backend: Backend, compulsion: Compulsion) -> Answer:
-    """Answer of a backend; methods for equality rows say that they take no others."""
+    """Answer of a backend; methods for equality rows refuse others."""
     if compulsion.h.size and backend.name in BACKENDS:
         raise BackendError(f"backend {backend.name!r} takes no inequality rows.")
     return backend(compulsion)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from gauss.bench.atlas import CASES
 from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, SLOW, VERDICTS
-from gauss.bench.atlas.cases import CASES
 from gauss.bench.atlas.methods import DEFAULT, METHODS, Method
 from gauss.bench.atlas.run import STABILITY
 from gauss.bench.levels import AUTO

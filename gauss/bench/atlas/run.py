@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from gauss.bench.atlas import CASES
 from gauss.bench.atlas.case import HONEST, SILENT, SLOW, judged
-from gauss.bench.atlas.cases import CASES
 from gauss.bench.atlas.methods import METHODS
 from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.table import ResultTable
@@ -76,6 +76,6 @@ def _cell(case: str, method: str, data) -> dict:
 def _row(reply: Reply) -> dict:
     if reply.outcome == "answered":
         return reply.value
-    # what raises anything but an error of gauss says that it fails, though not in words for users
+    # an exception that is no GaussError reports the failure, too, though not in words for users
     verdict = {"timed out": SLOW, "raised": HONEST, "crashed": SILENT}[reply.outcome]
     return {"verdict": verdict, "figure": np.nan, "seconds": np.nan, "words": reply.reason}

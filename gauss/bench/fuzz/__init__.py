@@ -1,1 +1,1 @@
-"""Random problems by the thousand: whether an answer is ever worse than its certificate says."""
+"""Random problems by the thousand: whether an answer is ever worse than its certificate claims."""

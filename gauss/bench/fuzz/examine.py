@@ -1,4 +1,4 @@
-"""What becomes of backends on random problems: how often they answer, whether it is right, and whether they say so.
+"""Backends on random problems: how often they answer, whether the answer is right, and whether they report failures.
 
 Called in a worker. Every answer is certified as users get it, and then compared with a reference of 50 digits.
 """

@@ -19,7 +19,7 @@ from gauss.errors import GaussError
 FUZZ_MOTIONS = Measurement(
     "fuzz_motions",
     ("seed", "number"),
-    ("base", "elements", "integrator", "verdict", "off", "claim", "warned", "seconds", "why"),
+    ("base", "elements", "integrator", "verdict", "off", "claim", "compared", "warned", "seconds", "why"),
     ("numpy", "scipy", "llvmlite"),
 )
 SCENE_TIME = 400.0  # [s] that a scene may take by the clock: four routes on a machine that others use
@@ -27,13 +27,15 @@ RENEWED = 200  # scenes after which a new process begins, for machine code stays
 
 ENVIRONMENT = {"GAUSS_TIER": "quick", "GAUSS_CACHE": ""}  # every scene is moved once: nothing is optimised or kept on disk
 
-HOW = """Every scene is moved by machine code (the integrator of the scene, rtol 1e-7, an estimate of the global error)
-and by the certified recursion in numpy with a tenth of the tolerance, some by `rollout`, too. Phases between events are
-compiled at once; of every fourth scene above the compile threshold only, as users get it. *Agree*: within a small multiple
-of the claimed error and the tolerance. *Told*: apart, and a warning or the estimate says so. *Refused*: a `GaussError` by
-both, *refused once*: by one. *Sensitive*: a third route (dopri5, kkt) differs from both, too. Bad are: *silent*: apart, and
-nothing says so; *raised*: an exception that is no `GaussError`; *stray*: a warning that is none of gauss's; *timed out*: a
-route took more than 20 s of processor time; *crashed*: the process died or hung. A scene is made again by
+HOW = """Every scene is moved by machine code (the integrator of the scene, rtol 1e-7, an estimate of the global error) and
+by the certified recursion in numpy, some by `rollout`, too. Phases between events are compiled at once; of every fourth
+scene above the compile threshold only, as users get it. *Agree*: within a small multiple of the claimed error and the
+tolerance, if need be with a tenth of the tolerance in the second route. *Told*: apart, and a warning or the estimate says
+so. *Refused*: a `GaussError` by both, *refused once*: by one. *Sensitive*: a third route (dopri5, kkt) differs from both,
+too. A second route that takes more than 2 s of processor time is compared up to the last sample that it reached; *compared*
+is the least share of the duration that all routes reached. Bad are: *silent*: apart, and nothing says so; *raised*: an
+exception that is no `GaussError`; *stray*: a warning that is none of gauss's; *timed out*: a route took more than 10 s of
+processor time, or the second reached no sample; *crashed*: the process died or hung. A scene is made again by
 `gauss.bench.fuzz.scenes.moved_scene(seed, number).scene`."""
 
 
@@ -77,7 +79,7 @@ def _examined(worker: Worker, seed: int, number: int) -> dict:
     lost = (
         {"seed": seed, "number": number}
         | dict.fromkeys(FUZZ_MOTIONS.values, "")
-        | dict.fromkeys(("off", "claim", "seconds"), np.nan)
+        | dict.fromkeys(("off", "claim", "compared", "seconds"), np.nan)
     )
     return lost | {"verdict": "raised" if reply.outcome == "raised" else "crashed", "why": reply.reason}
 

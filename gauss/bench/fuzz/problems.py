@@ -1,6 +1,6 @@
 """Random Gauss problems: trees, loops, loops that nearly fold, redundant rows with noise, stops and contacts.
 
-A problem is told by a seed and its number, so that each can be made again by itself. Loops are closed where they stand:
+A problem is given by a seed and its number, so that each can be made again by itself. Loops are closed where they stand:
 every joint is said at the reference configuration, and rates are drawn among those that the rows allow.
 """
 
@@ -146,7 +146,7 @@ def _nearly_folded(rng) -> Compulsion:
 
 
 def _said_twice(rng) -> Compulsion:
-    """Planar loop with a hinge said twice and noise of up to 10⁻³ on what the rows demand."""
+    """Planar loop with a repeated hinge and noise of up to 10⁻³ on the right-hand sides of the rows."""
     scene, size = polygon(rng, 1.0)
     scene.add(replace(scene.joints["last"], name="again"))
     compulsion = _where_it_stands(scene, rng, size)

@@ -112,7 +112,7 @@ def _blocks(count: int, size: int) -> list[list[int]]:
 def _tasks(
     table: ResultTable, seed: int, names, share: int, blocks: list[list[int]]
 ) -> Iterator[tuple[list[int], list[str]]]:
-    """Blocks with the backends that still lack them: gauss's own together, each QP solver alone."""
+    """Blocks with the backends that are still to be examined: gauss's own together, each QP solver alone."""
     ours = sorted((name for name in names if name in OURS), key=lambda name: name == AUTO)  # the last one takes every kind
     groups = [(ours, blocks)] if ours else []
     sampled = blocks[: -(-len(blocks) // share)] if share else []

@@ -1,17 +1,20 @@
 """Random scenes to be moved: a tree, a chain or loops, with a few elements of any kind put on them.
 
-A scene is told by a seed and its number, so that each can be made again by itself, also without some of its elements.
+A scene is given by a seed and its number, so that each can be made again by itself, also without some of its elements.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from gauss import compile_scene
 from gauss.bench.fuzz.laws import random_law
 from gauss.bench.fuzz.problems import CLOSING, decades, polygon, put_body, put_joint, random_tree
 from gauss.scene import Joint, Scene
 from gauss.scene.profiles import Move, Ramp, Sine
+from gauss.system import System
 
 ODD_UNITS = 0.03  # share of scenes whose sizes are 1e-6 to 1e6 m
 MASSLESS = 0.08  # share of scenes with a cross without mass
@@ -20,7 +23,7 @@ GROUND = "ground"
 
 @dataclass(frozen=True)
 class MovedScene:
-    """A random scene, and how it is to be moved.
+    """A random scene, and the settings of its motion.
 
     Parameters
     ----------
@@ -40,6 +43,11 @@ class MovedScene:
         By which it moves.
     step : float, optional
         Step of methods that have one [s].
+
+    Attributes
+    ----------
+    system : System
+        The compiled scene, made when it is first asked for; all routes move it.
     """
 
     scene: Scene
@@ -50,6 +58,10 @@ class MovedScene:
     times: np.ndarray
     integrator: str
     step: float | None
+
+    @cached_property
+    def system(self) -> System:  # noqa: D102 (an attribute)
+        return compile_scene(self.scene)
 
 
 def moved_scene(seed: int, number: int, without: tuple = ()) -> MovedScene:

@@ -9,7 +9,7 @@ from gauss.bench.suite.refine import refined
 from gauss.errors import BackendError
 
 EXACT = 1e-25  # largest residual of a reference, relative
-ROUNDED = 1e-12  # the same, where the rounding of rows that depend on each other leaves a contradiction, which is told
+ROUNDED = 1e-12  # the same, where the rounding of rows that depend on each other leaves a contradiction, which is reported
 STEEP = 1e-9  # relative: a certificate or ray that shows less might be rounding of the data
 
 

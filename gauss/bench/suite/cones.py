@@ -1,4 +1,4 @@
-"""References with second-order cones, and of Coulomb's law: a guess tells what each cone does, then equations are solved.
+"""References with second-order cones, and of Coulomb's law: a guess gives the state of each cone, then equations are solved.
 
 A cone is left alone (s inside, z = 0), at its apex (s = 0) or on its boundary (z = τ (s₀, −s₁), s₀² = |s₁|²); a contact
 sticks (u = 0), is open (r = 0), or slides (u_n = 0, u_t = −τ r_t, |r_t| = μ r_n). These equations are smooth: Newton
@@ -86,7 +86,7 @@ def _guess(instance: SuiteInstance):
 
 
 def _states(instance: SuiteInstance, x: np.ndarray, z: np.ndarray) -> tuple[list[str], np.ndarray]:
-    """What each cone does, the state that it is least off; and the factor τ of those on the boundary."""
+    """State of each cone, that of the smallest residual; and the factor τ of those on the boundary."""
     s, states, factors = (instance.h - instance.G @ x)[instance.orthant :], [], []
     most = largest_multiplier(instance, z, abs(instance.P) @ np.abs(x) + np.abs(instance.q))
     for block in instance.blocks:
@@ -130,7 +130,7 @@ class Convex:
         return (taken(unknown, part) for part in (slice(n), slice(n, n + k), slice(n + k, None)))
 
     def value(self, unknown: Doubled) -> Doubled:
-        """What the equations leave."""
+        """Residuals of the equations."""
         instance = self.instance
         x, held, factors = self._split(unknown)
         rest = product(instance.P, x) + instance.q + product(self.C.T, held)
@@ -187,7 +187,7 @@ class CoulombEquations:
         return np.concatenate([x, np.hypot(u[at + 1], u[at + 2]) / np.maximum(rub, TINY)])
 
     def value(self, unknown: Doubled) -> Doubled:
-        """What the equations leave."""
+        """Residuals of the equations."""
         n, at = self.instance.n, self.sliding
         r, factors = taken(unknown, slice(n)), taken(unknown, slice(n, None))
         u = product(self.instance.P, r) + self.instance.q

@@ -36,7 +36,7 @@ def product(M, x: Doubled) -> Doubled:
 
 
 def sums(terms: Doubled, counts: np.ndarray) -> Doubled:
-    """Sums of consecutive groups of terms, of which ``counts`` says how many each has; 0 of none."""
+    """Sums of consecutive groups of terms, ``counts`` terms each; 0 of none."""
     total, group = zeros(counts.size), np.repeat(np.arange(counts.size), counts)
     while counts.max(initial=0) > 1:
         place = np.arange(group.size) - (np.cumsum(counts) - counts)[group]

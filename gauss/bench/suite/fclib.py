@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from gauss.bench.checked_arrays import require_small, require_sparse
+from gauss.bench.checked_arrays import require_small, require_sparse, require_symmetric
 from gauss.bench.suite.doubled import product
 from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
@@ -72,6 +72,7 @@ def read_fclib(path: Path) -> SuiteInstance:
         kinds = {-1: sparse.csc_array, -2: sparse.csr_array}
         W = kinds[nz]((x, i, p), shape=(m, n)) if nz in kinds else sparse.coo_array((x, (i, p)), shape=(m, n))
         require_sparse("W", W)
+        require_symmetric("W", W)
         q, friction = _numbers(vectors, "q"), _numbers(vectors, "mu")
         title = bytes(file["fclib_local/info/title"][()]).decode() if "info/title" in file["fclib_local"] else path.stem
     if not (friction >= 0.0).all() or q.size != 3 * friction.size:

@@ -1,4 +1,4 @@
-"""First answers of programmes, from an interior-point method: where references start, never what they say."""
+"""First answers of programmes, from an interior-point method: start points of references."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from scipy import sparse
 from gauss.bench.suite.instance import SuiteInstance
 from gauss.errors import BackendError
 
-GUESS_TOLERANCE = 1e-11  # relative, of residuals and gap: tight enough to tell rows that hold from rows that do not
+GUESS_TOLERANCE = 1e-11  # relative, of residuals and gap: tight enough to separate active rows from inactive ones
 NEARLY = ("Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations", "NumericalError")  # confirmed afterwards anyway
 
 

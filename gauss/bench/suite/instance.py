@@ -24,7 +24,7 @@ SOLVED, INFEASIBLE, UNBOUNDED = "solved", "infeasible", "unbounded"
 
 @dataclass(frozen=True, eq=False)
 class SuiteReference:
-    """What is right, to far more digits than a double holds, and the proof of it.
+    """Solution to far more digits than a double holds, or the proof that there is none.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def programme(
 
 
 def with_reference(instance: SuiteInstance, reference: SuiteReference) -> SuiteInstance:
-    """The same instance with what is right."""
+    """The same instance with its reference."""
     return replace(instance, reference=reference)
 
 

@@ -1,4 +1,4 @@
-"""How far an answer is from optimal, and whether a verdict is proven: all in twice the precision.
+"""Optimality residuals of an answer, and proofs of verdicts, in twice the precision.
 
 Every residual is relative to the sum of the absolute values of its own terms, row by row, so that no choice of units
 matters. An unknown that is zero counts as large as it is without constraints, |q_j| / P_jj, or as a small share of the
@@ -91,7 +91,7 @@ def plain_multipliers(instance: SuiteInstance, z: np.ndarray, z_box: np.ndarray)
 
 
 def sizes(instance: SuiteInstance, x: np.ndarray) -> np.ndarray:
-    """How large each unknown (n,) is to be taken where the terms of a row are weighed."""
+    """Scale of each unknown (n,) by which the terms of a row are weighed."""
     weight = instance.P.diagonal()
     weight = np.where(weight > 0.0, weight, np.inf)
     found = np.maximum(np.abs(x), np.abs(instance.q) / weight)
@@ -125,7 +125,7 @@ def speeds(u: Doubled) -> Doubled:
 
 
 def _of_cones(instance: SuiteInstance, x: Doubled, z: Doubled, size: np.ndarray, terms: np.ndarray) -> Residuals:
-    """What the cones leave: s and z within them, and sᵀ z = 0."""
+    """Residuals of the cones: s and z within them, and sᵀ z = 0."""
     worst = Residuals(0.0, 0.0, 0.0, 0.0)
     if not instance.cones:
         return worst
@@ -150,7 +150,7 @@ def sums_of(terms: Doubled) -> float:
 
 
 def _outside(s: Doubled) -> float:
-    """How far a vector is outside of the second-order cone."""
+    """Distance of a vector from the second-order cone."""
     square = Doubled(0.0)
     for hi, lo in zip(s.hi[1:], s.lo[1:], strict=True):
         square = square + Doubled(hi, lo) * Doubled(hi, lo)

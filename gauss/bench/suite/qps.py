@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from gauss.bench.checked_arrays import require_symmetric
 from gauss.bench.export import file_name
 from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
@@ -96,7 +97,7 @@ class _QpsReader:
                 take(words)
 
     def _section(self, words: list[str]) -> Callable[[list[str]], None] | None:
-        """What takes the lines of a section; nothing takes those of others."""
+        """Reader of the lines of a section; lines of other sections are skipped."""
         section = words[0]
         if section not in SECTIONS:
             raise FileError(f"{self.path}: section {section!r} is not read; known are {', '.join(SECTIONS)}.")
@@ -108,6 +109,8 @@ class _QpsReader:
     def _row(self, words: list[str]):
         if words[0] not in KINDS:
             raise FileError(f"{self.path}: a row of kind {words[0]!r} is not read; known are {', '.join(KINDS)}.")
+        if words[1] in self.kinds:
+            raise FileError(f"{self.path}: row {words[1]!r} stands there twice.")
         self.kinds[words[1]] = words[0]
         if words[0] == "N" and self.objective is None:
             self.objective = words[1]
@@ -123,17 +126,28 @@ class _QpsReader:
                 self.entries.append((row, column, float(value)))
 
     def _of_rows(self, values: dict[str, float], words: list[str]):
-        values.update({row: float(value) for row, value in zip(words[-2::-2], words[-1::-2], strict=False)})
+        for row, value in zip(words[-2::-2], words[-1::-2], strict=False):
+            if row not in self.kinds:
+                raise FileError(f"{self.path}: a right-hand side or range is of row {row!r}, which is not there.")
+            values[row] = float(value)
 
     def _quadratic(self, words: list[str]):
         self.quadratic.append((self.columns[words[0]], self.columns[words[1]], float(words[2])))
 
     def hessian(self):
-        """P of both halves."""
-        P = sparse.coo_array(_triplets(self.quadratic), shape=(len(self.columns),) * 2)
+        """P of both triangles; QUADOBJ gives each pair of variables once, in either order."""
+        P = sparse.csc_array(sparse.coo_array(_triplets(self.quadratic), shape=(len(self.columns),) * 2))
         if self.both_halves:
+            require_symmetric("QMATRIX", P)
             return P
-        return P + sparse.triu(P.T, 1) if _is_lower(self.quadratic) else P + sparse.tril(P.T, -1)
+        pairs = {(first, second) for first, second, _ in self.quadratic if first != second}
+        if twice := next((pair for pair in pairs if pair[::-1] in pairs), None):
+            names = list(self.columns)
+            raise FileError(
+                f"{self.path}: QUADOBJ has {names[twice[0]]!r}, {names[twice[1]]!r} in both orders; both triangles are "
+                "QMATRIX."
+            )
+        return P + P.T - sparse.diags_array(P.diagonal())
 
     def two_sided_rows(self):
         """Rows with their lowest and highest values."""
@@ -153,7 +167,9 @@ def read_qps(path: Path) -> SuiteInstance:
     Raises
     ------
     FileError
-        If a section or a kind of bound is not known.
+        If a section or a kind of bound is not known, or names do not belong together.
+    ValueError
+        If a number is none, or QMATRIX is not symmetric.
     """
     found = _QpsReader(path)
     found.read(path.read_text(encoding="utf-8"))
@@ -203,11 +219,6 @@ def _require_clear_bounds(path: Path, columns: dict[str, int], lower: set[str], 
 def _triplets(entries):
     rows, columns, values = ([entry[k] for entry in entries] for k in range(3))
     return np.array(values, dtype=float), (np.array(rows, dtype=int), np.array(columns, dtype=int))
-
-
-def _is_lower(quadratic) -> bool:
-    """Whether second indices come first: (column, row) pairs of a lower triangle fill the upper one as read."""
-    return any(first > second for first, second, _ in quadratic)
 
 
 def _comments(instance: SuiteInstance, names: list[str]):

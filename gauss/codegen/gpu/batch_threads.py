@@ -44,32 +44,45 @@ def fixed_step_threads(method: Fixed, start: Function, written: slice, inputs: i
 
 
 def adaptive_threads(method: Adaptive, written: slice) -> ThreadCode:
-    """Loop of :class:`gauss.codegen.kernels.AdaptiveBatchLoop`: (*POINTERS, count, budget).
+    """Loop of :class:`gauss.codegen.kernels.AdaptiveBatchLoop`: (which, status, *POINTERS, count, budget).
 
-    Thread k has a control and a lane of its own, row k of their arrays, so that a motion is continued after a pause.
+    Thread k moves motion ``which[k]``, which has a row of its own in the arrays of controls and of lanes, so that it is
+    continued after a pause by whatever thread; ``status[k]`` is that of its control then.
     """
+    names = MotionQueue.names()
 
-    def arguments(code: ThreadCode, control, others):
+    def arguments(code: ThreadCode, which, others):
+        b, (_, controls, lanes, *rest) = code.b, others
+        motion = b.fptosi(b.load(b.gep(which, [code.thread])), INTEGER)
+        row = lambda pointer, length: b.gep(pointer, [b.mul(motion, INTEGER(length))])  # noqa: E731
+        return [row(controls, len(names)), row(lanes, method.size + len(MOTION_RECORD) + 1), *rest]
+
+    def after(code: ThreadCode, given, others):
         b = code.b
-        row = lambda pointer, length: b.gep(pointer, [b.mul(code.thread, INTEGER(length))])  # noqa: E731
-        lanes, *rest = others
-        return [row(control, len(MotionQueue.names())), row(lanes, method.size + len(MOTION_RECORD) + 1), *rest]
+        status = b.gep(given[0], [INTEGER(names.index("status"))])
+        b.store(b.load(status), b.gep(others[0], [code.thread]))
 
     return _threads(
         "adaptive_threads",
-        len(ADAPTIVE_POINTERS),
+        2 + len(ADAPTIVE_POINTERS),
         lambda writer: write_adaptive_batch(writer, method, written, 1),
         arguments,
+        after,
     )
 
 
-def _threads(name: str, pointers: int, write: Callable[[Writer], ir.Function], arguments: Callable) -> ThreadCode:
+def _threads(
+    name: str, pointers: int, write: Callable[[Writer], ir.Function], arguments: Callable, after: Callable | None = None
+) -> ThreadCode:
     """Thread code (*pointers, count, budget) that calls a loop with arguments of the thread."""
     code = ThreadCode(name, [POINTER] * pointers + [INTEGER, INTEGER])
     loop, b = write(code.writer), code.b
     loop.linkage = "internal"
     *given, count, budget = code.arguments
     with b.if_then(b.icmp_signed("<", code.thread, count)):
-        b.call(loop, [*arguments(code, given[0], given[1:]), budget])
+        own = arguments(code, given[0], given[1:])
+        b.call(loop, [*own, budget])
+        if after is not None:
+            after(code, own, given[1:])
     b.ret_void()
     return code

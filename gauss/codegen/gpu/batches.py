@@ -1,13 +1,14 @@
 """Batches of motions on a device, in the form of the compiled loops of this CPU."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from gauss.codegen.function import Function
 from gauss.codegen.gpu.batch_threads import adaptive_threads, fixed_step_threads
-from gauss.codegen.gpu.device import Device, DeviceArray, DeviceProgram, Lowered
-from gauss.codegen.gpu.devices import device
+from gauss.codegen.gpu.device import Device, DeviceProgram, Lowered
+from gauss.codegen.gpu.devices import device, devices
+from gauss.codegen.gpu.parts import in_parts
 from gauss.codegen.gpu.thread_code import states_code
 from gauss.codegen.kernels.adaptive import Adaptive
 from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, MotionQueue
@@ -17,36 +18,47 @@ from gauss.codegen.kernels.loop_control import LoopStatus, Numbers
 from gauss.codegen.native_function import NativeFunction
 
 WHOLE = 1 << 40  # budget of steps that is never used up
+FEWER = "take fewer samples: one motion does not fit into the memory of the device"
 
 
 class OnDevice:
-    """Base of code for a device: what is kept on disk is its text, which is loaded at the first use.
+    """Base of code for a device, or for several: what is kept on disk is its text, which is loaded at the first use.
 
     Parameters
     ----------
     name : str
-        Name of the device.
+        Name of the devices.
     lowered : Lowered
         The code.
     """
 
     def __init__(self, name: str, lowered: Lowered):
         self.device_name, self.lowered = name, lowered
-        self._program: DeviceProgram | None = None
+        self._programs: dict[str, DeviceProgram] = {}
 
     def __getstate__(self) -> dict:
-        return vars(self) | {"_program": None}
+        return vars(self) | {"_programs": {}}
 
     @property
-    def device(self) -> Device:
-        """The device."""
-        return device(self.device_name)
+    def devices(self) -> tuple[Device, ...]:
+        """The devices."""
+        return devices(self.device_name)
 
-    def run(self, threads: int, arguments: Sequence):
-        """Run the threads, and wait for them."""
-        if self._program is None:
-            self._program = self.device.program(self.lowered)
-        self._program(threads, arguments)
+    def program(self, device: Device) -> DeviceProgram:
+        """The code on a device."""
+        found = self._programs.get(device.name)
+        if found is None:
+            found = self._programs[device.name] = device.program(self.lowered)
+        return found
+
+    def run(self, device: Device, threads: int, arguments: Sequence):
+        """Run the threads on a device, and wait for them."""
+        self.program(device)(threads, arguments, device.stream)
+
+    def in_parts(self, count: int, bytes_of_one: int, work: Callable[[Device, slice], None], what: str):
+        """Work on parts of a batch, as :func:`gauss.codegen.gpu.parts.in_parts`, beside the frames of the threads."""
+        free_bytes = lambda device: device.free_bytes() - self.program(device).memory_bytes  # noqa: E731
+        in_parts(self.devices, free_bytes, count, bytes_of_one, work, what)
 
 
 class DeviceKernel(OnDevice):
@@ -55,7 +67,7 @@ class DeviceKernel(OnDevice):
     Parameters
     ----------
     name : str
-        Name of the device.
+        Name of the devices.
     function : Function or NativeFunction
         The function.
     """
@@ -66,10 +78,16 @@ class DeviceKernel(OnDevice):
 
     def __call__(self, columns: np.ndarray) -> np.ndarray:
         """Outputs (n_out, k) of k columns (n_in, k)."""
-        count = columns.shape[1]
-        found = self.device.empty((self.n_out, count))
-        self.run(count, [count, self.device.put(columns), count, found, count])
-        return found.numpy()
+        outputs = np.empty((self.n_out, columns.shape[1]))
+
+        def evaluate(on: Device, some: slice):
+            count = some.stop - some.start
+            found = on.empty((self.n_out, count))
+            self.run(on, count, [count, on.put(columns[:, some]), count, found, count])
+            outputs[:, some] = found.numpy()
+
+        self.in_parts(columns.shape[1], 8 * (self.n_in + self.n_out), evaluate, "one state does not fit into its memory")
+        return outputs
 
 
 class DeviceFixedStepLoop(OnDevice):
@@ -78,7 +96,7 @@ class DeviceFixedStepLoop(OnDevice):
     Parameters
     ----------
     name : str
-        Name of the device.
+        Name of the devices.
     method, start, written, inputs
         As of that class.
     """
@@ -90,7 +108,7 @@ class DeviceFixedStepLoop(OnDevice):
         self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
 
     def __call__(self, span: BatchSpan, points, worst, out, *inputs):
-        """Make steps of a range of motions; arrays of this process are copied to the device and back.
+        """Make steps of all motions; arrays of this process are copied to the device and back.
 
         Parameters
         ----------
@@ -99,26 +117,36 @@ class DeviceFixedStepLoop(OnDevice):
         points, worst, out, inputs : ndarray
             As of that class; the first three are changed.
         """
-        held = [self.device.put(array) for array in (points, worst, out, *inputs)]
-        self.steps(span, held)
-        for array, changed in zip((points, worst, out), held, strict=False):
-            array[...] = changed.numpy()
+        self.move([span], points, worst, out, *inputs)
 
-    def steps(self, span: BatchSpan, arrays: Sequence[DeviceArray]):
-        """Make steps of a range of motions, with arrays on the device."""
-        count = int(span.end - span.begin)
-        self.run(count, [self.device.put(_row(span)), *arrays, count, WHOLE])
+    def move(self, spans: Sequence[BatchSpan], points, worst, out, *inputs):
+        """Make the steps of several calls, one after the other; in between, all arrays stay on the device."""
+        changed = points, worst, out
+        rows = [array for array in (out, *inputs) if array.size]
+        of_one = 8 * (len(points) + len(worst) + sum(array[0].size for array in rows))
+
+        def steps(on: Device, some: slice):
+            count = some.stop - some.start
+            held = [on.put(array[_part(array, some)]) for array in (*changed, *inputs)]
+            for span in spans:
+                own = {"columns": count, "begin": 0, "end": count, "motions": min(span.motions, count)}
+                self.run(on, count, [on.put(_row(span, **own)), *held, count, WHOLE])
+            for array, moved in zip(changed, held, strict=False):
+                array[_part(array, some)] = moved.numpy()
+
+        self.in_parts(points.shape[1], of_one, steps, FEWER)
 
 
 class DeviceAdaptiveLoop(OnDevice):
     """Adaptive steps of a batch.
 
     Motions that are not at their end after some steps go on in threads side by side: a warp does not wait for one of them.
+    In between, only their numbers and states of progress travel.
 
     Parameters
     ----------
     name : str
-        Name of the device.
+        Name of the devices.
     method, written
         As of :class:`gauss.codegen.kernels.AdaptiveBatchLoop`.
     """
@@ -141,26 +169,33 @@ class DeviceAdaptiveLoop(OnDevice):
         budget : int
             Steps of a motion before the next round.
         """
-        count, own = motions.shape[1], self.device
-        controls = np.repeat(_row(queue)[None], count, axis=0)
-        for name, values in (("following", np.arange(count)), ("last", np.arange(1, count + 1)), ("more", 0.0)):
-            controls[:, _place(name)] = values
-        lanes = np.zeros((count, self.size + len(MOTION_RECORD) + 1))
-        lanes[:, -1] = -1.0
-        moved, times, written = own.put(motions), own.put(grid), own.put(out)
-        while len(controls):
-            held = own.put(controls), own.put(lanes)
-            self.run(len(controls), [*held, moved, times, written, len(controls), budget])
-            controls, lanes = (array.numpy() for array in held)
-            going = controls[:, _place("status")] == LoopStatus.PAUSED
-            controls, lanes = controls[going], lanes[going]
-        motions[...], out[...] = moved.numpy(), written.numpy()
+        lane, control = self.size + len(MOTION_RECORD) + 1, len(MotionQueue.names())
+        of_one = 8 * (len(motions) + out[0].size + lane + control + 2)
+
+        def rounds(on: Device, some: slice):
+            count = some.stop - some.start
+            controls = np.repeat(_row(queue, columns=count, more=0.0)[None], count, axis=0)
+            for name, values in (("following", np.arange(count)), ("last", np.arange(1, count + 1))):
+                controls[:, MotionQueue.names().index(name)] = values
+            lanes = np.zeros((count, lane))
+            lanes[:, -1] = -1.0
+            moved, written = on.put(motions[:, some]), on.put(out[some])
+            held = [on.put(controls), on.put(lanes), moved, on.put(grid), written]
+            which = np.arange(float(count))
+            while which.size:
+                status = on.empty(which.shape)
+                self.run(on, which.size, [on.put(which), status, *held, which.size, budget])
+                which = which[status.numpy() == LoopStatus.PAUSED]
+            motions[:, some], out[some] = moved.numpy(), written.numpy()
+
+        self.in_parts(motions.shape[1], of_one, rounds, FEWER)
 
 
-def _row(numbers: Numbers) -> np.ndarray:
-    """Record as an array."""
-    return np.array([getattr(numbers, name) for name in numbers.names()])
+def _row(record: Numbers, **changed: float) -> np.ndarray:
+    """Record as an array, some numbers changed."""
+    return np.array([changed.get(name, getattr(record, name)) for name in record.names()])
 
 
-def _place(name: str) -> int:
-    return MotionQueue.names().index(name)
+def _part(array: np.ndarray, some: slice):
+    """Part of an array of motions: its columns, or first entries of more dimensions."""
+    return (slice(None), some) if array.ndim == 2 else some

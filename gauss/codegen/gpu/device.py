@@ -56,10 +56,18 @@ class DeviceView(Protocol):
 
 
 class DeviceProgram(Protocol):
-    """Thread code that can be run."""
+    """Thread code that can be run.
 
-    def __call__(self, threads: int, arguments: Sequence):
-        """Run a number of threads, and wait for them."""
+    Attributes
+    ----------
+    memory_bytes : int
+        Memory of the device that the frames of all threads at once take [bytes].
+    """
+
+    memory_bytes: int
+
+    def __call__(self, threads: int, arguments: Sequence, stream: int = 0):
+        """Run a number of threads in a stream of the device, and wait for them."""
 
 
 class Device(Protocol):
@@ -69,9 +77,21 @@ class Device(Protocol):
     ----------
     name : str
         Its name, such as "cuda:0".
+    stream : int
+        Stream of copies and programs; 0 is the default stream.
     """
 
     name: str
+    stream: int
+
+    def on(self, stream) -> "Device":
+        """The device with another stream; None is the default stream.
+
+        Raises
+        ------
+        DeviceError
+            If it has no streams, or this is none.
+        """
 
     def lowered(self, code: ThreadCode) -> Lowered:
         """Thread code for this device.

@@ -4,60 +4,106 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.codegen.gpu.device import DeviceView
+from gauss.codegen.gpu.device import Device, DeviceView
 from gauss.codegen.gpu.rows import RowsOnDevice
-from gauss.codegen.python_wrapper import Interface
-from gauss.errors import GaussError, StateError
+from gauss.errors import DeviceError, GaussError, StateError
+
+MEASURED_ROWS = 64  # of which the error of single precision is measured
+SMALLEST_SIZE = 1e-300  # of a result, against a division by zero
 
 
 class DeviceFunction:
-    """Function ``f(*vectors, t=0.0)`` of batches (n, k).
+    """Function ``f(*vectors, t=0.0, stream=None)`` of batches (n, k).
 
-    Arrays of this process are copied to the device, and so are the results back. Where one of the arguments is an array of
-    another library on the device, results are arrays on the device, too: torch and CuPy read them by
-    ``__cuda_array_interface__``, JAX by DLPack, and ``numpy()`` copies them.
+    Arrays of this process are copied to the devices in parts that fit into their memory, and so are the results back. Where
+    one of the arguments is an array of another library on the device, results are arrays on the device, too: torch and CuPy
+    read them by ``__cuda_array_interface__``, JAX by DLPack, and ``numpy()`` copies them.
 
     Parameters
     ----------
     rows : RowsOnDevice
         The function.
-    interface : Interface
-        Arguments, results and limits.
     own : callable
         The same function on this CPU, for rows that exceed the limits; it says why it refuses one.
     name : str
         Its name.
+
+    Attributes
+    ----------
+    error : float
+        In single precision, the largest difference of the last results from double precision, relative to the largest of
+        them, over rows spread over the batch; NaN before the first call, and 0 in double precision.
     """
 
-    def __init__(self, rows: RowsOnDevice, interface: Interface, own: Callable, name: str):
-        self.rows, self.interface, self.own, self.__name__ = rows, interface, own, name
+    def __init__(self, rows: RowsOnDevice, own: Callable, name: str):
+        self.rows, self.interface, self.own, self.__name__ = rows, rows.interface, own, name
+        self.error = np.nan if rows.is_single else 0.0
 
-    def __call__(self, *vectors, t=0.0):
+    def __call__(self, *vectors, t=0.0, stream=None):
         """Results (n, …) of all rows.
+
+        Parameters
+        ----------
+        *vectors : array_like, shape (n, k)
+            Arrays of this process or of another library on the device.
+        t : float or array_like, shape (n,)
+            Time [s].
+        stream : int or object, optional
+            Stream of the device (its handle, or a stream of cuda.core, torch or CuPy): the function comes after what is in
+            it, and waits for it alone. By default it waits for what writes to the arguments, and runs in the default stream.
 
         Raises
         ------
         StateError
             If an argument does not fit, or a row is refused: it says which, and why.
         DeviceError
-            If the device has not enough memory.
+            If the device has not enough memory, or an array lies on another one.
         """
-        device = self.rows.device
-        views = [device.view(given) for given in vectors]
+        if stream is not None and len(self.rows.devices) > 1:
+            raise DeviceError("stream: a stream is of one device, and several share this function.")
+        devices = [device.on(stream) for device in self.rows.devices]
+        views = [devices[0].view(given) for given in vectors]
         arrays = self._arrays(vectors, views)
         count = arrays[0].shape[0]
-        held = [array if view else device.put(array) for array, view in zip(arrays, views, strict=True)]
-        strides = [array.strides for array in arrays]
-        table = [(array, *(step // 8 for step in apart)) for array, apart in zip(held, strides, strict=True)]
-        numbers = np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
-        found, marked = self.rows(count, table, device.put(numbers))
-        if marked:
-            self._repair(arrays, numbers, found)
-        found = found[: len(self.interface.shapes)]
-        for array, shape in zip(found, self.interface.shapes, strict=True):
-            array.shape = (count, *shape)
-        results = found if any(views) else [array.numpy() for array in found]
+        numbers = self._numbers(t, count)
+        if any(views):
+            if len(devices) > 1:
+                raise DeviceError("device: several devices share arrays of this process; arrays on a device are on one.")
+            found = self._evaluated(devices[0], arrays, numbers)[: len(self.interface.shapes)]
+            for array, shape in zip(found, self.interface.shapes, strict=True):
+                array.shape = (count, *shape)
+            results: list = found
+        else:
+            results = [np.empty((count, *shape)) for shape in self.interface.shapes]
+
+            def part(device: Device, some: slice):
+                found = self._evaluated(device.on(stream), [array[some] for array in arrays], numbers[some], some.start)
+                for result, array in zip(results, found, strict=False):
+                    result[some] = array.numpy().reshape(result[some].shape)
+
+            self.rows.in_parts(count, self.rows.bytes, part, "one row does not fit into its memory")
+        if self.rows.is_single and count:
+            self._measure(arrays, numbers, results)
         return results[0] if len(results) == 1 else tuple(results)
+
+    def _evaluated(self, device: Device, arrays, numbers: np.ndarray, first: int = 0) -> list:
+        """Results on a device, the limited quantities last; rows that exceed a limit are repaired."""
+        held = [device.put(array) if isinstance(array, np.ndarray) else array for array in arrays]
+        table = [(one, *(step // 8 for step in array.strides)) for one, array in zip(held, arrays, strict=True)]
+        found, marked = self.rows(device, len(numbers), table, device.put(numbers))
+        if marked:
+            self._repair(arrays, numbers, found, first)
+        return found
+
+    def _measure(self, arrays, numbers: np.ndarray, results):
+        """Measure the error of single precision on some rows."""
+        chosen = np.unique(np.linspace(0, len(numbers) - 1, MEASURED_ROWS).astype(int))
+        given = [(array if isinstance(array, np.ndarray) else array.numpy())[chosen] for array in arrays]
+        right = self.own(*given, None, numbers[chosen])
+        pairs = zip(results, right if len(results) > 1 else (right,), strict=True)
+        found = [((one if isinstance(one, np.ndarray) else one.numpy())[chosen], other) for one, other in pairs]
+        errors = [np.abs(one - other).max() / max(np.abs(other).max(), SMALLEST_SIZE) for one, other in found if other.size]
+        self.error = float(max(errors, default=0.0))
 
     def _arrays(self, vectors, views) -> list:
         """Arguments as arrays of doubles (n, k), those of the device as they are."""
@@ -71,7 +117,14 @@ class DeviceFunction:
             raise StateError(f"{self.__name__}: batches of different lengths: {shapes}.")
         return arrays
 
-    def _repair(self, arrays, numbers: np.ndarray, found):
+    def _numbers(self, t, count: int) -> np.ndarray:
+        """Time of each row."""
+        try:
+            return np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
+        except (TypeError, ValueError):
+            raise StateError(f"{self.__name__}: t: expected a number, or {count} of them, got {t!r}.") from None
+
+    def _repair(self, arrays, numbers: np.ndarray, found, first: int):
         """Replace the results of rows that exceed a limit by those of the function on this CPU."""
         *results, errors = (array.numpy() for array in found)
         given = [array if isinstance(array, np.ndarray) else array.numpy() for array in arrays]
@@ -79,7 +132,7 @@ class DeviceFunction:
             try:
                 own = self.own(*(array[row] for array in given), t=float(numbers[row]))
             except GaussError as error:
-                error.add_note(f"in row {row} of the batch")
+                error.add_note(f"in row {first + row} of the batch")
                 raise
             for result, replaced in zip(results, own if len(results) > 1 else (own,), strict=True):
                 result[row] = np.ravel(replaced)

@@ -42,6 +42,24 @@ def _delete(managed):
     _lent.pop(ctypes.addressof(managed.contents), None)
 
 
+def _python(name: str, *kinds):
+    """Function of Python's C interface, with a prototype of its own."""
+    return ctypes.PYFUNCTYPE(*kinds)((name, ctypes.pythonapi))
+
+
+_DESTRUCTOR = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)  # of a capsule
+_new = _python("PyCapsule_New", ctypes.py_object, ctypes.c_void_p, ctypes.c_char_p, _DESTRUCTOR)
+_is_valid = _python("PyCapsule_IsValid", ctypes.c_int, ctypes.c_void_p, ctypes.c_char_p)
+_pointer = _python("PyCapsule_GetPointer", ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p)
+
+
+@_DESTRUCTOR
+def _release(own):
+    """Called with a capsule that goes; one that no consumer took still has its name, and its array."""
+    if _is_valid(own, NAME):
+        _lent.pop(_pointer(own, NAME), None)
+
+
 def capsule(owner, pointer: int, shape: tuple[int, ...], kind: int, number: int):
     """Capsule of a contiguous array of doubles; the owner of its memory lives as long as the consumer needs it.
 
@@ -61,6 +79,4 @@ def capsule(owner, pointer: int, shape: tuple[int, ...], kind: int, number: int)
     managed = _Managed(tensor, None, _delete)
     address = ctypes.addressof(managed)
     _lent[address] = owner, shape_, managed
-    new = ctypes.pythonapi.PyCapsule_New
-    new.restype, new.argtypes = ctypes.py_object, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
-    return new(address, NAME, None)
+    return _new(address, NAME, _release)

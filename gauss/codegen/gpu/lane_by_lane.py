@@ -9,6 +9,7 @@ from gauss.codegen import machine
 from gauss.codegen.gpu.device import Lowered
 from gauss.codegen.gpu.ptx import refuse_libraries
 from gauss.codegen.gpu.thread_code import ThreadCode
+from gauss.errors import DeviceError
 
 FREE_BYTES = 1 << 31  # of the memory of this process that a batch may take at a time
 
@@ -37,7 +38,13 @@ class HostArray:
 class LaneByLane:
     """The device."""
 
-    name = "lanes"
+    name, stream = "lanes", 0
+
+    def on(self, stream) -> "LaneByLane":
+        """The same: it has no streams."""
+        if stream is not None:
+            raise DeviceError("device 'lanes': this CPU has no streams; leave out stream=.")
+        return self
 
     def lowered(self, code: ThreadCode) -> Lowered:
         """Thread code as LLVM IR, refused where a GPU would refuse it."""
@@ -66,7 +73,7 @@ class LaneByLane:
 
 
 class HostProgram:
-    """Thread code on this CPU.
+    """Thread code on this CPU; its frames are on the stack.
 
     Parameters
     ----------
@@ -74,11 +81,13 @@ class HostProgram:
         The code.
     """
 
+    memory_bytes = 0
+
     def __init__(self, lowered: Lowered):
         kinds = [ctypes.c_void_p if is_array else ctypes.c_int64 for is_array in lowered.is_array]
         self.code = machine.load(lowered.text, optimise=2)
         self._run = self.code.entry(lowered.name, ctypes.CFUNCTYPE(None, ctypes.c_int64, *kinds))
 
-    def __call__(self, threads: int, arguments: Sequence):
+    def __call__(self, threads: int, arguments: Sequence, stream: int = 0):
         """Run the threads one after the other."""
         self._run.call(threads, *(given.array.ctypes.data if isinstance(given, HostArray) else given for given in arguments))

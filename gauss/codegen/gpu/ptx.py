@@ -11,12 +11,13 @@ import llvmlite.binding as llvm
 
 from gauss.codegen import object_cache
 from gauss.codegen.object_code import about
-from gauss.errors import DeviceError
+from gauss.errors import DeviceError, MissingPackageError
 
 TRIPLE = "nvptx64-nvidia-cuda"
 PTX_VERSION = "+ptx80"  # of CUDA 12.0
 LEAST_CAPABILITY = 60  # compute capability 6.0: older devices are left out
 MISSING = {"malloc": "memory of unbounded size"}
+LEAST_LLVM = 16  # the first with code for Hopper
 LIBRARY = re.compile(r"^declare [^@]*@\"?([\w.]+)\"?\(", re.MULTILINE)
 
 
@@ -36,7 +37,14 @@ def ptx(ir_text: str, capability: int) -> str:
         The module, with an entry for a GPU.
     capability : int
         Compute capability of the device times ten.
+
+    Raises
+    ------
+    MissingPackageError
+        If llvmlite is too old.
     """
+    if llvm.llvm_version_info[0] < LEAST_LLVM:
+        raise MissingPackageError("device 'cuda' needs a newer llvmlite: pip install --upgrade llvmlite")
     key = object_cache.key("ptx", about(2), str(capability), ir_text)
     known = object_cache.read(key)
     if known is None:

@@ -5,28 +5,31 @@ where one is exceeded, it sets a mark, and only then the limited quantities trav
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from llvmlite import ir
 
 from gauss.codegen.function import Function
 from gauss.codegen.gpu.batches import OnDevice
-from gauss.codegen.gpu.device import DeviceArray
-from gauss.codegen.gpu.devices import device
+from gauss.codegen.gpu.device import Device, DeviceArray
+from gauss.codegen.gpu.devices import device, is_single
 from gauss.codegen.gpu.thread_code import ThreadCode
 from gauss.codegen.ir_blocks import POINTER, counted_loop
 from gauss.codegen.lanes import DOUBLE, INTEGER
 from gauss.codegen.python_wrapper import Interface
 
+SINGLE_LIMIT = 1e-2  # relative error of accelerations, and residual, above which single precision is not enough
 
-def rows_code(function: Function, interface: Interface) -> ThreadCode:
+
+def rows_code(function: Function, interface: Interface, single: bool = False) -> ThreadCode:
     """``rows(count, (vector, row stride, entry stride)…, numbers, results…, mark)`` of a function of vectors and a number.
 
-    The strides are whole numbers of doubles; results and numbers are contiguous.
+    The strides are whole numbers of doubles; results and numbers are contiguous. In single precision it computes only.
     """
     sizes, results = interface.sizes, interface.result_sizes(len(function.outputs))
     kinds = [INTEGER, *[POINTER, INTEGER, INTEGER] * len(sizes), POINTER, *[POINTER] * len(results), POINTER]
-    code = ThreadCode("rows", kinds)
+    code = ThreadCode("rows", kinds, single)
     b, (count, *given), row = code.b, code.arguments, code.thread
     source, found = (b.alloca(DOUBLE, max(n, 1)) for n in (sum(sizes) + 1, len(function.outputs)))
     with b.if_then(b.icmp_signed("<", row, count)):
@@ -60,7 +63,7 @@ class RowsOnDevice(OnDevice):
     Parameters
     ----------
     name : str
-        Name of the device.
+        Name of the devices.
     function : Function
         Its inputs are the vectors and the number, concatenated; its outputs the results and the limited quantities.
     interface : Interface
@@ -68,19 +71,32 @@ class RowsOnDevice(OnDevice):
 
     Attributes
     ----------
-    operations : int
-        Operations of one evaluation.
+    interface : Interface
+        Arguments, results and limits; in single precision limits are no smaller than 1 %.
+    is_single : bool
+        Whether it computes in single precision.
+    operations : dict of str to int
+        Operations of one evaluation by kind.
+    bytes : int
+        Bytes that a thread reads and writes.
     """
 
     def __init__(self, name: str, function: Function, interface: Interface):
-        super().__init__(name, device(name).lowered(rows_code(function, interface)))
-        self.sizes, self.operations = interface.result_sizes(len(function.outputs)), sum(function.operations().values())
+        self.is_single = is_single(name)
+        if self.is_single:
+            interface = replace(interface, limits=tuple(max(limit, SINGLE_LIMIT) for limit in interface.limits))
+        super().__init__(name, device(name).lowered(rows_code(function, interface, self.is_single)))
+        self.interface = interface
+        self.sizes, self.operations = interface.result_sizes(len(function.outputs)), function.operations()
+        self.bytes = 8 * (sum(interface.sizes) + 1 + sum(self.sizes))
 
-    def __call__(self, count: int, vectors: Sequence, numbers: DeviceArray) -> tuple[list[DeviceArray], bool]:
+    def __call__(self, on: Device, count: int, vectors: Sequence, numbers: DeviceArray) -> tuple[list[DeviceArray], bool]:
         """Results (count, size) of all rows, the limited quantities last, and whether a row exceeds a limit.
 
         Parameters
         ----------
+        on : Device
+            The device.
         count : int
             Number of rows.
         vectors : sequence of (DeviceArray, int, int)
@@ -88,7 +104,6 @@ class RowsOnDevice(OnDevice):
         numbers : DeviceArray, shape (count,)
             The number of each row.
         """
-        own = self.device
-        found, mark = [own.empty((count, size)) for size in self.sizes], own.put(np.zeros(1))
-        self.run(count, [count, *(part for vector in vectors for part in vector), numbers, *found, mark])
+        found, mark = [on.empty((count, size)) for size in self.sizes], on.put(np.zeros(1))
+        self.run(on, count, [count, *(part for vector in vectors for part in vector), numbers, *found, mark])
         return found, bool(mark.numpy()[0])

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from llvmlite import ir
 
-from gauss.codegen.device_module import DeviceModule
+from gauss.codegen.device_module import DeviceModule, SingleDeviceModule
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER, counted_loop
@@ -29,6 +29,8 @@ class ThreadCode:
         Name of the entry.
     kinds : sequence of llvmlite.ir.Type
         Types of the arguments.
+    single : bool
+        Whether traced functions compute in single precision.
 
     Attributes
     ----------
@@ -42,11 +44,12 @@ class ThreadCode:
         Builder at the beginning of the function.
     """
 
-    def __init__(self, name: str, kinds: Sequence[ir.Type]):
-        self.name, self.writer = name, Writer(DeviceModule(name="gauss"))
+    def __init__(self, name: str, kinds: Sequence[ir.Type], single: bool = False):
+        self.name, self.writer = name, Writer(SingleDeviceModule(name="gauss") if single else DeviceModule(name="gauss"))
         self.function = ir.Function(self.writer.module, ir.FunctionType(ir.VoidType(), [INTEGER, *kinds]), f"{name}_thread")
         self.function.linkage = "internal"
         self.thread, *self.arguments = self.function.args
+        _aligned(self.function)
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
 
     @property
@@ -76,6 +79,7 @@ class ThreadCode:
     def _gpu_entry(self, module: ir.Module, kinds):
         entry = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), self.name)
         entry.calling_convention = "ptx_kernel"
+        _aligned(entry)
         b = ir.IRBuilder(entry.append_basic_block("entry"))
         register = lambda name: b.zext(b.call(_register(module, name), []), INTEGER)  # noqa: E731
         thread = b.add(b.mul(register("ctaid.x"), register("ntid.x")), register("tid.x"))
@@ -88,6 +92,13 @@ class ThreadCode:
         with counted_loop(b, INTEGER(0), entry.args[0]) as thread:
             b.call(self.function, [thread, *entry.args[1:]])
         b.ret_void()
+
+
+def _aligned(function: ir.Function):
+    """Arrays begin at doubles: they are not copied byte by byte."""
+    for argument in function.args:
+        if argument.type == POINTER:
+            argument.attributes.align = 8
 
 
 def _register(module: ir.Module, name: str) -> ir.Function:

@@ -50,7 +50,7 @@ class Pattern(NamedTuple):
     numbers: tuple
 
     def filled(self, slots) -> np.ndarray:
-        """Object array with an entry for each slot, negated where the pattern says so."""
+        """Object array with an entry for each slot, negated by the pattern."""
         numbers = iter(self.numbers)
         entries = [slots[k - 1] if k > 0 else -slots[-k - 1] if k else next(numbers) for k in self.codes]
         return _array(entries).reshape(self.shape)

@@ -1,11 +1,16 @@
-"""Small dense linear systems in machine code: Gaussian elimination; the least-norm solution of singular ones (dgelsy)."""
+"""Small dense linear systems in machine code: Gaussian elimination; the least-norm solution of singular ones.
+
+That is LAPACK's dgelsy on this CPU, and :mod:`gauss.codegen.kernels.least_norm` on a GPU, which has no library.
+"""
 
 import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, POINTER
+from gauss.codegen.device_module import DeviceModule
 from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
 from gauss.codegen.kernels.lapack import lapack_routine
+from gauss.codegen.kernels.least_norm import least_norm
 
 SINGULAR_PIVOT_RELATIVE = 1e-11  # relative to the largest entry: a matrix with a smaller pivot counts as singular
 RANK_RELATIVE = float(np.finfo(float).eps)  # relative condition limit of the rank decision, times the order
@@ -35,7 +40,10 @@ def write_equations(module: ir.Module) -> ir.Function:
     with r.when(if_singular[0] > 0):
         _copy(r, A, kept, n * n)
         _copy(r, x, given, n)
-        _shortest(r, n, A, x, given.after(n))
+        if isinstance(module, DeviceModule):
+            least_norm(r, n, A, x, kept, given, RANK_RELATIVE)
+        else:
+            _shortest(r, n, A, x, given.after(n))
     return r.done()
 
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from gauss.codegen import from_disk
 from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, Round
+from gauss.dynamics.contact.compiled_mechanism_step import LoopOfSteps
+from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
 from gauss.dynamics.contact.contact_step import (
     LAW_TOLERANCE,
     ContactLaws,
@@ -30,9 +32,8 @@ from gauss.dynamics.contact.moreau_step import (
     least_rate,
 )
 from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts, confirmed
-from gauss.dynamics.contact.paradox import Paradox
+from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable
-from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
 
@@ -70,6 +71,8 @@ class FreeBodyStep(NamedTuple):
         Error of the laws, relative; None for the convex relaxation.
     paradoxes : list of Paradox
         None: contacts of many free bodies are not examined for Painlevé's paradox.
+    modes : ModesOfStep or None
+        Elements that bear a force; None where their modes are those of the last step.
     """
 
     q: np.ndarray
@@ -79,6 +82,7 @@ class FreeBodyStep(NamedTuple):
     power: np.ndarray
     error: float | None
     paradoxes: list[Paradox]
+    modes: ModesOfStep | None
 
 
 class _Begun(NamedTuple):
@@ -119,6 +123,8 @@ class FreeBodyStepper:
         self.reach = self._reaches()
         self.share = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
         self.coefficients = np.unique(self.table.restitution)
+        self.elements = [contact.name for contact in self.table.contacts]
+        self.first_set_valued, self.record = len(self.elements), ModeRecord(len(self.elements))
         self.graph: ContactGraph | None = None
         self.known: tuple[np.ndarray, np.ndarray]
         self.forget()
@@ -143,6 +149,7 @@ class FreeBodyStepper:
         np.maximum.at(found, self.table.body, self.table.length)
         return found[: self.n]
 
+    inputs = np.zeros(0)
     acceleration_error = 0.0  # accelerations of free bodies are Euler's equations themselves
 
     def check(self, state: State):
@@ -155,8 +162,17 @@ class FreeBodyStepper:
     def forget(self):
         """Forget the forces of the last step: a new motion begins."""
         self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        self.record.forget()
 
-    def step(self, state: State, h: float) -> FreeBodyStep:
+    def run(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
+        """No steps: machine code has single ones."""
+        return LoopOfSteps(0, 0.0, [], False)
+
+    def examined(self, state: State, h: float) -> list[Paradox]:
+        """None: contacts of many free bodies are not examined for Painlevé's paradox."""
+        return []
+
+    def python_step(self, state: State, h: float) -> FreeBodyStep:
         """Step of length h; the forces of the last step are the initial guess.
 
         Raises
@@ -189,8 +205,19 @@ class FreeBodyStepper:
         step = np.repeat([[h], [share]], self.n, axis=1)
         end = self.kernels.end(np.concatenate([begun.q, begun.v[self.v_places], self.given, change, step]))
         found[0][self.q_places], found[1][self.v_places] = end[:7], end[7:]
-        lost = -0.5 * (force * (known[..., 0] + rates(near, after[..., None])[..., 0])).sum()
-        return FreeBodyStep(*found, near, force, np.array([0.0, 0.0, lost]), error, [])
+        reached_rates = rates(near, after[..., None])[..., 0]
+        work = force * (known[..., 0] + reached_rates)
+        modes = self._changed_modes(near, begun, known, force, reached_rates, work, h, share)
+        return FreeBodyStep(*found, near, force, np.array([0.0, 0.0, -0.5 * work.sum()]), error, [], modes)
+
+    def _changed_modes(self, near, begun: _Begun, known, force, reached, work, h: float, share: float) -> ModesOfStep | None:
+        """Contacts that bear a force in a step; None if their modes are those of the last step."""
+        slow = sliding_above(self.system, begun.v)
+        modes = modes_of_contacts(self.table, near.law, force, np.hypot(reached[:, 1], reached[:, 2]), slow)
+        if self.record.is_same(near.key, modes):
+            return None
+        pushed, hits = np.flatnonzero(modes), self._impacts(near, begun, known, h, share)
+        return ModesOfStep(near.law[pushed], modes[pushed], hits[pushed] > 0.0, -0.5 * h * work[pushed].sum(axis=1))
 
     def _begin(self, state: State, h: float, share: float) -> _Begun:
         q, v = state.q[self.q_places], state.v[self.v_places]
@@ -283,7 +310,7 @@ class FreeBodyStepper:
 
     def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
         """Forces over a step from a state, as of :meth:`forces_of`."""
-        return self.forces_of(self.step(state, h))
+        return self.forces_of(self.python_step(state, h))
 
     def forces_of(self, step: FreeBodyStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""
@@ -308,6 +335,17 @@ class FreeBodyStepper:
         order = np.argsort(near.key)
         self.known = near.key[order], force[order]
 
+    @property
+    def gap_count(self) -> int:
+        """Number of gap functions of the scene."""
+        return int(self.table.gaps[-1])
+
+    def gap_forces(self) -> np.ndarray:
+        """Normal forces (g,) of all gaps in the last step [N]."""
+        normal, (key, force) = np.zeros(self.gap_count), self.known
+        normal[self.table.gap_places(key)] = force[:, 0]
+        return normal
+
     def refuse_penetration(self, state: State):
         """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
         near = self._near(state, self._begin(state, 0.0, 0.0), 0.0, 0.0, 0.0)
@@ -315,7 +353,8 @@ class FreeBodyStepper:
         if near.gap.size and near.gap[worst] < -START_OVERLAP * self.system.scale.length:
             name = self.table.contacts[near.law[worst]].name
             raise StateError(
-                f"t = {state.t:.6g} s: {-near.gap[worst]:.3g} [m, rad] inside of {name!r}; move it out with scene.start."
+                f"t = {state.t:.6g} s: {-near.gap[worst]:.3g} [m, rad] inside of {name!r}; move it out with scene.start, "
+                "or begin at gauss.resolve_overlaps(system)."
             )
 
 
@@ -335,8 +374,3 @@ def block_contact_solver() -> BlockContactSolver:
         return BlockContactSolver(BlockContactLaws(*functions, ROUNDS))
 
     return from_disk((BlockContactSolver, ROUNDS), make)
-
-
-def free_body_stepper(system: System) -> FreeBodyStepper:
-    """Stepper of a system, made once."""
-    return cached(system, (FreeBodyStepper,), lambda: FreeBodyStepper(system))

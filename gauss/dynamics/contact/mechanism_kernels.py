@@ -121,9 +121,11 @@ class MechanismKernels:
         self.system, self.smooth, self.carriers = system, smooth, carriers
         laws = Laws(smooth)
         self.loads = [*laws.traced, *(input_loads(smooth) if inputs else ())]
+        self.inputs = tuple(smooth.scene.inputs) if inputs else ()
         n_q, n_v = smooth.n_q, smooth.n_v
 
         def begin(t, q, v):
+            self._order_inputs(t)
             arrays = SparseArrays(self._terms(t[0], q, v))
             self.layout = arrays
             return (arrays.outputs,)
@@ -161,7 +163,13 @@ class MechanismKernels:
             *self._dependent(terms),
         )
 
+    def _order_inputs(self, t):
+        """Let the inputs of the scene be the last ones of a function that is traced, in the order of the scene."""
+        for name in self.inputs:
+            t[0].graph.parameter(name)
+
     def _forces(self, t, q, v):
+        self._order_inputs(t)
         terms = StateTerms(self.smooth, q, v, t[0])
         tau, power = self._load_forces(terms, t[0], q, v)
         return tau - terms.tree_bias_forces, power

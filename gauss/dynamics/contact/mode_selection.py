@@ -17,7 +17,7 @@ from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion, checked_load
 from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
 from gauss.dynamics.contact.impact import LEAVING, certified, resting
-from gauss.dynamics.engines.lossy import NonIdealRows, non_ideal_rows, piecewise_affine_root, with_losses
+from gauss.dynamics.engines.cut_rows import CutRows, cut_rows, piecewise_affine_root, with_losses
 from gauss.dynamics.gap_functions import Gaps, closed, gaps, set_valued_rows, with_gaps
 from gauss.dynamics.gear_trains import gear_trains
 from gauss.dynamics.kinematics import Kinematics, kinematics
@@ -124,14 +124,14 @@ class ModeSelector:
             for train in self.trains
             if isinstance(element, JointFriction) and element.joint in train.rates
         }
-        self.cases: dict[ContactMode, tuple[System, NonIdealRows]] = {}
+        self.cases: dict[ContactMode, tuple[System, CutRows]] = {}
 
-    def case(self, mode: ContactMode) -> tuple[System, NonIdealRows]:
+    def case(self, mode: ContactMode) -> tuple[System, CutRows]:
         """System of a mode without unilateral constraints, and its links with losses."""
         if mode not in self.cases:
             smooth = not (self.names or self.losses or self.backlashes)
             system = self.system if smooth else build(phase_scene(self.system.scene, (), mode), self.system.mechanics.anew())
-            self.cases[mode] = system, non_ideal_rows(system, self.system, mode)
+            self.cases[mode] = system, cut_rows(system, self.system, (), mode)
         return self.cases[mode]
 
     def rates(self, state: State) -> np.ndarray:

@@ -91,6 +91,15 @@ class CompiledEngine(Engine):
         result = self.kernels.forward(np.concatenate([[state.t], state.q, state.v, effort + load]))
         return Rates(result[: system.n_v], power + result[system.n_v :])
 
+    def accelerations(self, state: State, loads: np.ndarray) -> np.ndarray:
+        """Accelerations (k, n_v) under generalised forces (k, n_v) added to the loads, one by one."""
+        if self.handed_over is not None:
+            return np.array([self.certified.rates(self.system, state, load).acceleration for load in loads])
+        inputs = np.empty((1 + state.q.size + 2 * self.system.n_v, len(loads)))
+        inputs[: -self.system.n_v] = np.concatenate([[state.t], state.q, state.v])[:, None]
+        inputs[-self.system.n_v :] = (self.loads(state)[0] + loads).T
+        return self.kernels.forward(inputs)[: self.system.n_v].T
+
     def project(self, system: System, state: State) -> State:
         """State after a step, projected onto the constraints."""
         if self.handed_over is None and self.kernels.project is not None:

@@ -112,15 +112,11 @@ class SwitchingFunctions:
             Accelerations there.
         """
         nodes, parts = self._parts(begin, first, end, last)
-        asked = [*starmap(sub, self.pairs), *self.steps, *self.peaks]
-        slopes = self._slopes(asked)
-        sides, jumps = list(chain(*self.pairs)), list(chain(*self.jumps))
-        ends = [self._at(asked, node) for node in nodes]
+        ends = [list(self._values(node)) for node in nodes]
         crossings, distinct, crossed = 0.0, 0.0, 1.0
         hidden: Scalar = 1.0
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
-        counts = len(asked), len(slopes), len(sides), len(jumps)
-        enclosed = [_divided(enclose([*asked, *slopes, *sides, *jumps], part), *counts) for part in parts]
+        enclosed = [_divided(_intervals(self._enclosures(np.ravel(part))), *self._counts) for part in parts]
         tops = [
             _tops(values[conditions:], rates[conditions:], (ends[j][conditions:], ends[j + 1][conditions:]), tau)
             for j, (values, rates, _, _) in enumerate(enclosed)
@@ -134,7 +130,7 @@ class SwitchingFunctions:
             for k, value in enumerate(values[:conditions]):
                 noise = SIGN_ROUNDING * size[k] + self.noise[k] if k < len(self.pairs) else None
                 changes, straddles = _changes(value, ends[j][k], ends[j + 1][k], noise)
-                turns = _turns(rates[k] if slopes else None)
+                turns = _turns(rates[k] if rates else None)
                 for jump in islice(jumping, len(self.jumps[k])):
                     turns = math.maximum(turns, jump)
                 crossings = crossings + changes
@@ -204,6 +200,38 @@ class SwitchingFunctions:
 
         return Kernel(write(share, *sizes, *sizes, name="unseen"), batch=False)
 
+    @cached_property
+    def _groups(self) -> tuple[list, list, list, list]:
+        """Switching functions, their time derivatives, sides of comparisons and discontinuous nodes."""
+        asked = [*starmap(sub, self.pairs), *self.steps, *self.peaks]
+        return asked, self._slopes(asked), list(chain(*self.pairs)), list(chain(*self.jumps))
+
+    @property
+    def _counts(self) -> list[int]:
+        return list(map(len, self._groups))
+
+    @cached_property
+    def _values(self) -> Function:
+        """(t, q, v) → values of the switching functions: written once, called at every end of a subinterval."""
+        asked = self._groups[0]
+
+        def values(state):
+            given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, state, strict=True)}
+            return [value.low for value in enclose(asked, given)]
+
+        return write(values, len(self._symbols), name="switching")
+
+    @cached_property
+    def _enclosures(self) -> Function:
+        """Low and high of each of (t, q, v, q̈) → those of all groups: written once, called for every subinterval."""
+        symbols, asked = [*self._symbols, *self._acceleration], [x for group in self._groups for x in group]
+
+        def enclosures(ends):
+            given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
+            return [end for value in enclose(asked, given) for end in value]
+
+        return write(enclosures, 2 * len(symbols), name="enclosures")
+
     def _slopes(self, asked) -> list:
         """Time derivatives of switching functions, with accelerations as symbols; empty if one has none."""
         symbols = self._symbols
@@ -234,12 +262,7 @@ class SwitchingFunctions:
     def _acceleration(self) -> np.ndarray:
         return self._clock.graph.symbols("a", self.system.n_v)
 
-    def _at(self, asked, values) -> list:
-        """Values of expressions at given (t, q, v)."""
-        given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, values, strict=True)}
-        return [value.low for value in enclose(asked, given)]
-
-    def _parts(self, begin: State, first, end: State, last) -> tuple[list, list[dict]]:
+    def _parts(self, begin: State, first, end: State, last) -> tuple[list, list[list[Interval]]]:
         """Values of (t, q, v) at the ends of the subintervals of a step, and enclosures of (t, q, v, q̈) on each."""
         h = end.t - begin.t
         value = [np.concatenate([[s.t], s.q, s.v]) for s in (begin, end)]
@@ -258,12 +281,9 @@ class SwitchingFunctions:
         parts = []
         for j in range(PARTS):
             points = [nodes[j], nodes[j] + tau / 3.0 * slopes[j], nodes[j + 1] - tau / 3.0 * slopes[j + 1], nodes[j + 1]]
-            part = {symbol.index: _hull([point[k] for point in points]) for k, symbol in enumerate(symbols)}
+            part = [_hull([point[k] for point in points]) for k in range(len(symbols))]
             between = [3.0 * (points[i + 1] - points[i]) / tau for i in range(3)]  # Bernstein coefficients of the derivative
-            part |= {
-                symbol.index: _hull([point[len(symbols) - n + k] for point in between])
-                for k, symbol in enumerate(self._acceleration)
-            }
+            part += [_hull([point[len(symbols) - n + k] for point in between]) for k in range(n)]
             parts.append(part)
         return nodes, parts
 
@@ -318,6 +338,11 @@ def _changes(value: Interval, before: Scalar, after: Scalar, noise: Scalar | Non
         )
     changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
     return changes, math.where(value.low < -noise, math.where(value.high > noise, 1.0, 0.0), 0.0)
+
+
+def _intervals(ends) -> list[Interval]:
+    """Intervals of their ends, low and high one after the other."""
+    return list(starmap(Interval, ends.reshape(-1, 2)))
 
 
 def _divided(values: list, *counts: int) -> list[list]:

@@ -162,7 +162,7 @@ def _condition(node: Expression) -> Expression:
 
 
 def _changes(conditions, clock: Expression, begin: float, end: float, limitations: list[str]) -> np.ndarray:
-    """Times in an interval at which a condition changes, to rounding; if they are too many, ``limitations`` says so."""
+    """Times in an interval at which a condition changes, to rounding; ``limitations`` reports where they are too many."""
     ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
     low, high = ends[:-1], ends[1:]
     while low.size <= MOST_CELLS:

@@ -42,7 +42,7 @@ def n_controls(model, i: int) -> int:
 
 
 def control(model, i: int) -> float:
-    """What an actuator of one control is given when nobody gives anything: 0, or the end of its range that is nearest."""
+    """Default value of the control of an actuator: 0, or the nearest end of its range."""
     if n_controls(model, i) != 1 or is_off(model, "CLAMPCTRL"):
         return 0.0
     place = control_place(model, i)

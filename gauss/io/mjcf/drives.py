@@ -41,7 +41,7 @@ class ActuatorForce:
 
     @property
     def follows(self) -> bool:
-        """Whether it depends on the motion under the control that nobody gives."""
+        """Whether it depends on the motion under its default control."""
         return bool((self.gain * self.control + self.bias)[1:].any())
 
     def of(self, u, motion):

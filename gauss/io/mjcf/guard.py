@@ -1,4 +1,4 @@
-"""What a MJCF file may ask for before MuJoCo's parser sees it: no plugins, no files elsewhere; with what it includes."""
+"""Checks of an MJCF file, and of those that it includes, before MuJoCo's parser: no plugins, no files elsewhere."""
 
 from pathlib import Path
 from xml.etree.ElementTree import Element

@@ -20,7 +20,6 @@ from gauss.rotations import cross
 from gauss.scene import Scene
 
 LEAST = 1e-15  # kg, kg m², m²/s² …: MuJoCo's mjMINVAL, below which it takes this in place of a divisor
-N_FLUID = int(mujoco.mjNFLUID)
 Law = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # (v, ω) → (F, M)
 
 

@@ -1,4 +1,4 @@
-"""What a MuJoCo model holds that gauss does not model, each by name, with file and line."""
+"""Elements of a MuJoCo model that gauss does not model, each by name, with file and line."""
 
 from collections.abc import Iterator
 
@@ -128,7 +128,7 @@ def _inactive(named: Named, keyframe: str | int | None) -> list[tuple[str, list[
 
 
 def _uncontrolled(named: Named) -> list[tuple[str, list[str]]]:
-    """Actuators that do nothing, or that nobody can control."""
+    """Actuators without effect, or without a control."""
     model = named.model
     name = lambda i: named.name("actuator", i)  # noqa: E731
     acting = [i for i in actuators(model) if not is_switched_off(model, i)]
@@ -146,7 +146,7 @@ def _sticky(named: Named) -> list[str]:
 
 
 def _of_joint(named: Named, i: int) -> list[str]:
-    """What a ball or free joint has that only a hinge or slide may have."""
+    """Properties of a ball or free joint that only a hinge or slide may have."""
     model, dof, body = named.model, named.model.jnt_dofadr[i], int(named.model.jnt_bodyid[i])
     if named.kinds[i] != "free":
         return []

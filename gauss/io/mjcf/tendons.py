@@ -9,7 +9,7 @@ from gauss.scene import GROUND, Scene
 
 
 def add_tendon(scene: Scene, named: Named, i: int, stops: bool):
-    """What a tendon stands for; limits of fixed ones where stops are asked for, those of spatial ones always."""
+    """Elements of a tendon; limits of fixed ones where stops are requested, those of spatial ones always."""
     model, name, path = named.model, named.name("tendon", i), tendon_path(named, i)
     stiffness, damping = float(np.ravel(model.tendon_stiffness[i])[0]), float(np.ravel(model.tendon_damping[i])[0])
     low, high = map(float, model.tendon_lengthspring[i])

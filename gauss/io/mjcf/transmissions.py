@@ -21,7 +21,7 @@ JOINT, JOINT_IN_PARENT, TENDON, SITE = (int(getattr(mujoco.mjtTrn, f"mjTRN_{name
 
 @dataclass(frozen=True)
 class ActuatorTransmission:
-    """What an actuator acts on.
+    """Joints and bodies that an actuator acts on.
 
     Parameters
     ----------

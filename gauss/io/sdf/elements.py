@@ -28,7 +28,7 @@ WARNED |= {"actor": "actors, which move along paths of their own"}
 
 
 def check(source: Source, element: Element, left: set[str]):
-    """Refuse children that are neither read nor known not to move anything, and what is said twice.
+    """Refuse children that are neither read nor known not to move anything, and repeated ones.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from gauss.io.guard import Source
 from gauss.io.sdf.poses import TRUE, numbers, pose, value
 from gauss.system.frames import IDENTITY, Pose
 
-DENSITY = 1000.0  # kg/m³, of a collision that says nothing
+DENSITY = 1000.0  # kg/m³, of a collision without one
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -52,7 +52,7 @@ def of_link(source: Source, link: Element, placed) -> MassProperties:
         return _of_collisions(source, link, inertial, placed)
     R, com = pose(source, None if inertial is None else inertial.find("pose"))
     moments = None if inertial is None else inertial.find("inertia")
-    inertia = tuple(value(source, moments, tag, float(tag in MOMENTS[:3])) for tag in MOMENTS)  # of 1 where nothing is said
+    inertia = tuple(value(source, moments, tag, float(tag in MOMENTS[:3])) for tag in MOMENTS)  # 1 where not given
     return MassProperties(value(source, inertial, "mass", 1.0), inertia, com, R)
 
 

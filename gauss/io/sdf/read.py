@@ -20,7 +20,7 @@ from gauss.io.sdf.scopes import Scope
 from gauss.scene import GROUND, Scene
 from gauss.system.frames import compose, invert
 
-GRAVITY = (0.0, 0.0, -9.8)  # of a world that says nothing [m/s²]
+GRAVITY = (0.0, 0.0, -9.8)  # [m/s²] of a world without one
 ROOTS, LIMITS, MISSING = ("fixed", "free"), ("start", "stops"), ("refused", "left out")
 NOT_READ = {"population": "put its models into the file", "state": "put its poses into the models"}
 

@@ -60,7 +60,7 @@ class Scope:
 
     @cached_property
     def prefix(self) -> str:
-        """What names of the scope begin with in the scene; nothing where a file holds one model and nothing beside it."""
+        """Prefix of names of the scope in the scene; empty where a file holds one model and nothing beside it."""
         if self.parent is None or (self.parent.parent is None and len(self.parent.elements) == 1):
             return ""
         return f"{self.parent.prefix}{self.name}{JOINT}"

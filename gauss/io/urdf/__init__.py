@@ -1,1 +1,1 @@
-"""URDF: robots read through Pinocchio's parser, with a side file for what the format cannot say; scenes written."""
+"""URDF: robots read through Pinocchio's parser, with a side file for elements beyond the format; scenes written."""

@@ -1,8 +1,9 @@
-"""Optional content of a URDF file beside masses and joints: limits, damping and friction, collision shapes."""
+"""Optional content of a URDF file beside masses and joints: limits, resistance, collision shapes, motors."""
 
 import warnings
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -12,14 +13,22 @@ from gauss.io.guard import Source
 from gauss.io.numbers import add_stop, bounds
 from gauss.io.urdf.guard import guarded, placed
 from gauss.io.urdf.numbers import value, values
+from gauss.io.urdf.transmissions import add_motors
 from gauss.scene import GROUND, Box, Capsule, Scene, Sphere
 
 LIMITS = ("start", "stops")
 MANY = 4  # names that a warning gives before it counts
 
 
-def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance: bool = False, collisions: bool = False):
-    """Scene of a URDF file with its limits, resistance and collision shapes, as requested.
+def with_extras(
+    scene: Scene,
+    path: Path,
+    limits: str | None = None,
+    resistance: bool = False,
+    collisions: bool = False,
+    motors: bool = False,
+):
+    """Scene of a URDF file with its limits, resistance, collision shapes and motors, as requested.
 
     Parameters
     ----------
@@ -36,6 +45,9 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
         Whether spheres, boxes and capsules of ``<collision>`` become shapes, named LINK or LINK.2 …; contacts are added with
         ``scene.contacts_all``, of all shapes but those of neighbours, or with ``scene.contact``. Cylinders and meshes are
         not modelled.
+    motors : bool
+        Whether each simple ``<transmission>`` becomes an input, named like its actuator: the torque [N m] or force [N] of
+        the motor, which acts on the joint times the reduction, limited by the effort of the joint.
 
     Raises
     ------
@@ -45,11 +57,10 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
     Warns
     -----
     NotImportedWarning
-        Of damping and friction that are left out, of limits that leave no motion, and of collision shapes that are not
-        modelled.
+        Of damping and friction that are left out, of limits that leave no motion, and of collision shapes and transmissions
+        that are not modelled.
     """
-    if limits not in (None, *LIMITS):
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
+    _require_known(path, limits)
     source, left = guarded(path), []
     joints = [joint for joint in source.root.findall("joint") if joint.get("name") in scene.joints]
     if limits:
@@ -59,11 +70,18 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
     if not resistance:
         left += _named("damping and friction of {} (resistance=True or --read resistance reads them)", resisting)
     if collisions:
-        unlike = [what for link in source.root.findall("link") for what in _shapes(scene, source, link)]
+        unlike = chain.from_iterable(_shapes(scene, source, link) for link in source.root.findall("link"))
         left += _named("collision shapes that are not modelled: {}", unlike)
+    if motors:
+        left += _named("transmissions that are not modelled: {}", add_motors(scene, source))
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
     return scene
+
+
+def _require_known(path: Path, limits: str | None):
+    if limits not in (None, *LIMITS):
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
 
 
 def _named(text: str, names: Iterable[str | None]) -> list[str]:

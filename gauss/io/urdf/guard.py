@@ -1,4 +1,4 @@
-"""What a URDF file may ask for before Pinocchio's parser sees it: meshes of its own package only."""
+"""Checks of a URDF file before Pinocchio's parser: meshes of its own package only."""
 
 import re
 from contextlib import contextmanager
@@ -32,7 +32,7 @@ def place_of(source: Source, message: str) -> str:
 
 @contextmanager
 def placed(source: Source, element: Element):
-    """What a scene refuses, in a ``with`` statement, told with file and line of the element that it was read of.
+    """Context in which errors of a scene are raised with the file and line of an element.
 
     Raises
     ------

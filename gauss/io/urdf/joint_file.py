@@ -27,7 +27,7 @@ KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 
 @dataclass(frozen=True)
 class JointFile:
-    """What the file says.
+    """Contents of the file.
 
     Parameters
     ----------

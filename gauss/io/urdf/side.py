@@ -1,4 +1,4 @@
-"""What a URDF file cannot say, in a file beside it: robot.loops.toml beside robot.urdf, in tables of the scene format.
+"""Elements beyond URDF, in a file beside it: robot.loops.toml beside robot.urdf, in tables of the scene format.
 
 Loop closures are joints, mimic joints are couplings; loads, contacts, starts and gravity may stand there, too.
 """

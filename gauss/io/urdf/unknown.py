@@ -1,4 +1,4 @@
-"""What a file holds beside URDF: couplings between links are refused, misspelt elements too; a warning names the rest.
+"""Elements of a file that are no URDF: couplings between links and misspelt ones are refused; a warning names the rest.
 
 URDF is a tree. Loops, couplings and the like are elements of dialects (URDF+, Drake, Gazebo); without them a robot is
 another one. What moves a mechanism only in one simulator, as plugins of Gazebo do, is named.
@@ -44,7 +44,7 @@ MANY = 8  # elements that a warning names
 
 
 def refuse_couplings(source: Source):
-    """Refuse what makes another mechanism of the tree, elements that look like misspelt ones, and what is said twice.
+    """Refuse what makes another mechanism of the tree, elements that look like misspelt ones, and repeated ones.
 
     Raises
     ------

@@ -172,7 +172,7 @@ def _write_step(document: UrdfDocument, one: Limb, step: ElementaryJoint, on: st
 
 
 def _float(document: UrdfDocument, one: Limb, on: str, R, p):
-    """Floating link; a joint that says more goes beside it."""
+    """Floating link; a joint with more data goes beside it."""
     plain = _is_plain(document.system, one)
     _joint(document, one.joint.name if plain else f"{one.body} floats", "floating", on, one.body, R, p)
     if not plain:

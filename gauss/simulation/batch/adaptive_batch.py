@@ -26,7 +26,9 @@ from gauss.simulation.compiled_steps.loop_functions import adaptive
 from gauss.simulation.step_limits import BUDGET, LEAST_RESTART_STEP, SMALLEST_STEP, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
 
-DEVICE_BUDGET = 200  # steps of a motion on a device before those that are not at their end are gathered
+# steps of a motion on a device before those that are not at their end are gathered: of 4096 double pendulums, with 230 to
+# 1067 steps in 10 s, threads are busy for 95 % of the steps of a warp; with 200 for 84 %, where lanes are refilled for 86 %
+DEVICE_BUDGET = 50
 
 
 class AdaptiveBatchCode:

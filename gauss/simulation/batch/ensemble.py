@@ -15,6 +15,7 @@ from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
+from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.machine_code import FIXED
 from gauss.simulation.batch.rollout import ADAPTIVE
@@ -43,6 +44,8 @@ class Ensemble:
         Local error of adaptive steps, relative to coordinates and rates.
     atol : float, pair or mapping
         Absolute part of it, as for :func:`gauss.simulate`.
+    device : str, optional
+        Name of devices; this CPU by default.
 
     Raises
     ------
@@ -50,7 +53,16 @@ class Ensemble:
         If the systems cannot be compiled, with the reasons, or not with this integrator.
     """
 
-    def __init__(self, pattern: System, members: np.ndarray, integrator: str, step: float | None, rtol: float, atol):
+    def __init__(
+        self,
+        pattern: System,
+        members: np.ndarray,
+        integrator: str,
+        step: float | None,
+        rtol: float,
+        atol,
+        device: str | None = None,
+    ):
         laws = Laws(pattern)
         if integrator not in FIXED | ADAPTIVE:
             raise SimulationError(f"integrator {integrator!r} moves one system at a time.")
@@ -61,10 +73,10 @@ class Ensemble:
         system = self.family.system
         self.code: FixedStepBatchLoop | DeviceFixedStepLoop | AdaptiveBatchCode
         if integrator in FIXED:
-            self.code = fixed_batch(Program(system, laws, family=self.family), FIXED[integrator])
+            self.code = fixed_batch(Program(system, laws, family=self.family), FIXED[integrator], device)
         else:
             program = Program(system, laws, memory=method_state_size(pattern), family=self.family)
-            self.code = AdaptiveBatchCode(program, ADAPTIVE[integrator], self.tolerance.shares)
+            self.code = AdaptiveBatchCode(program, ADAPTIVE[integrator], self.tolerance.shares, device)
 
     def covers(self, members: np.ndarray) -> bool:
         """Whether systems with these numbers (batch, n) differ in the parameters only."""
@@ -118,7 +130,8 @@ class Ensemble:
                 ~(found.error <= ACCELERATION_TOLERANCE),
                 shares(system, found.energies, starts, found.samples[:, :, : len(starts)], duration),
             )
-        batch = FixedStepBatch(self.code, starts, parameters)
+        kind = DeviceFixedStepBatch if isinstance(self.code, DeviceFixedStepLoop) else FixedStepBatch
+        batch = kind(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         step = (times[1] - times[0]) / between
         samples = batch.run(between * (len(times) - 1), step, between, threads)

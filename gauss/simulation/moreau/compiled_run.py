@@ -98,6 +98,8 @@ class CompiledMoreauRun(CompiledFixedRun):
         if due != Due.OFF_GRID_SAMPLE:
             self.point, control.steps = reached, control.steps + 1
         control.sample, control.constraint_residual = control.sample + 1, np.inf  # unchecked
+        if int(control.sample) in self.holds:
+            self._hold(self.holds[int(control.sample)])
         control.status = LoopStatus.PAUSED
 
     def repeated(self, packed: np.ndarray, t: float) -> np.ndarray:

@@ -4,20 +4,25 @@ A step of bodies that move freely is :mod:`gauss.dynamics.contact.free_body_step
 :mod:`gauss.dynamics.contact.mechanism_step`.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.codegen.kernels import Due
 from gauss.dynamics.engines import Engine
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Point, Rates
-from gauss.simulation.moreau.contact_warnings import ParadoxWarnings, warn_of_laws
+from gauss.simulation.grid import grid_of, with_samples
+from gauss.simulation.moreau.contact_motion import ContactMotion
+from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, in_words
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
+
+CHUNK = 512  # steps between two looks at the progress
 
 
 class PairKernelEngine(Engine):
@@ -62,46 +67,74 @@ class PairKernelRun(PythonRun):
     """
 
     def __init__(self, problem: Problem):
-        self.stepper, system = contact_stepper(problem.system), problem.system
+        self.held, system = problem.held, problem.system
+        self.motion = ContactMotion(system, self.held is not None)
+        self.stepper = self.motion.stepper
         self.engine = PairKernelEngine(self.stepper)
         super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
-        self.largest, self.relaxed, self.paradoxes = 0.0, 0, ParadoxWarnings()
         self.h = problem.step or 0.0  # a fixed step is always given
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
-        self.stepper.forget()
+        self.motion.begin(start)
         self.stepper.refuse_penetration(start)
         found = super().collect(start, samples, progress)
-        warn_of_laws(self.largest, self.relaxed, self.steps)
+        warn_of_laws(self.motion.largest, self.motion.relaxed, self.steps)
         return found
 
     def _first(self, start: State) -> Point:
         self.stepper.check(start)
         return Point(start, np.zeros(self.powers), Rates(np.zeros(self.system.n_v), np.zeros(self.powers)))
 
-    def _advance(self, method: FixedStep, point: Point, t: float) -> Point:
-        reached = self._stepped(point, t)
-        if t >= self.end:
-            self.stepper.check(reached.state)
-        return reached
+    def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
+        """Points of fixed steps; samples between them are the ends of separate shorter steps."""
+        pairs = grid_of(method, point.state.t, self.end, self.h, samples, self.switching)
+        self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.h)
+        holds: dict[int, int] = {}
+        if self.held is not None:
+            pairs, holds = with_samples(pairs, self.held.times[1:], self.h, samples is None)
+            holds[0] = 0
+        ends, stops = _divided(pairs, holds)
+        done = 0
+        for place, stop in stops:
+            if place in holds:
+                self._hold(holds[place])
+            while done < stop:
+                for row in self.motion.advance(ends[done:stop]):
+                    begin, reached = (point.state, point.work), self._point(row, point)
+                    self.unseen += self.switching.share(point, reached)[0] < 1.0
+                    point, done, self.steps = reached, done + 1, self.steps + 1
+                    if point.state.t >= self.end:
+                        self.stepper.check(point.state)
+                    yield point, lambda t, state=begin[0], work=begin[1]: self.motion.beside(state, work, t)
 
-    def _stepped(self, point: Point, t: float) -> Point:
-        h = t - point.state.t
-        found = self.stepper.step(point.state, h)
-        self.engine.evaluations += 1
-        self.largest, self.relaxed = max(self.largest, found.error or 0.0), self.relaxed + (found.error is None)
-        self.paradoxes.warn(found.paradoxes, point.state.t)
-        state = self.stepper.projected(State(t, found.q, found.v))
-        return Point(state, point.work + h * found.power, point.rates)
+    def _hold(self, k: int):
+        """Set the inputs of a sample of the control law, at the present state."""
+        assert self.held is not None
+        state = self.motion.state
+        self.motion.hold(self.held.at(k, state.t, state.q.copy(), state.v.copy()))
 
-    def _off_grid(self, method: FixedStep, begin: Point, t: float) -> tuple[State, np.ndarray]:
-        known = self.stepper.known
-        reached = self._stepped(begin, t)
-        self.stepper.known = known
-        return reached.state, reached.work
+    def _point(self, row: np.ndarray, before: Point) -> Point:
+        n_q = self.system.n_q
+        return Point(State(float(row[0]), row[1 : 1 + n_q].copy(), row[1 + n_q : -3].copy()), row[-3:].copy(), before.rates)
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
+        motion = self.motion
+        self.engine.evaluations, self.events = motion.steps, [*self.events, *motion.events]
         whole = super()._trajectory(kept, samples, began)
-        method = in_words(self.h, self.largest, self.relaxed, whole.stats.method)
+        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method)
         return replace(whole, stats=whole.stats._replace(method=method), step=self.step)
+
+
+def _divided(pairs: np.ndarray, holds: dict[int, int]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Ends of all steps of a grid [s], and the parts that are made at once.
+
+    A part ends where inputs change, after a step that has samples inside, and after :data:`CHUNK` steps. It is given by the
+    number of pairs before it, and the number of steps at its end.
+    """
+    is_step = pairs[:, 1] != Due.OFF_GRID_SAMPLE
+    steps = np.cumsum(is_step)  # at the end of each pair
+    inside = np.flatnonzero(is_step & np.concatenate([[False], ~is_step[:-1]])) + 1
+    cuts = {0, len(pairs), *inside.tolist(), *holds, *range(0, len(pairs), CHUNK)}
+    places = sorted(cuts)
+    return pairs[is_step, 0], [(a, int(steps[b - 1])) for a, b in zip(places[:-1], places[1:], strict=True)]

@@ -16,8 +16,8 @@ from gauss.dynamics.assemble import assemble
 from gauss.dynamics.contact.mode_selection import ModeSelector, forces_of
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
+from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, closed_stop, cut_rows
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.lossy import LossyEngine, NonIdealRows, non_ideal_rows
 from gauss.dynamics.engines.tiering import tiered
 from gauss.dynamics.gap_functions import margin_kernel
 from gauss.dynamics.laws.switching_functions import SwitchingFunctions, watch_of
@@ -25,39 +25,46 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import MODES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.system_dynamics import SystemDynamics
-from gauss.system import ContactMode, State, System, build, phase_scene
+from gauss.system import ContactMode, State, System, build, phase_scene, sides
 
 REVERSED_FORCE = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
 
 
 class PhaseParts(NamedTuple):
-    """System, non-ideal constraints and margins of a phase, cached.
+    """System, cut rows and margins of a phase, cached.
 
     Attributes
     ----------
     system : System
         Smooth system of the contact mode; active constraints are rows.
-    links : NonIdealRows
-        Links with losses.
+    links : CutRows
+        Links with losses, and closed stops of joints.
     cut : System or None
-        The same system without the rows of these links, if there are any.
+        The same system without their rows, if there are any; phases that differ by closed stops share it.
     margins : Kernel or None
         Margins of the features in contact, where a body has several.
     """
 
     system: System
-    links: NonIdealRows
+    links: CutRows
     cut: System | None
     margins: Kernel | None
 
 
 def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places: Mapping) -> PhaseParts:
-    """System, non-ideal constraints and margins of a phase, built at its first occurrence."""
+    """System, cut rows and margins of a phase, built at its first occurrence."""
 
     def make() -> PhaseParts:
         system = build(phase_scene(whole.scene, names, mode, places), SystemDynamics())
-        links = non_ideal_rows(system, whole, mode)
-        cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics()) if links.names else None
+        found = [closed_stop(whole, gap) for gap in sides(whole.scene) if gap.name in names]
+        stops = [stop for stop in found if stop is not None]
+        links = cut_rows(system, whole, stops, mode)
+        cut = None
+        if stops:
+            others = phase_parts(whole, tuple(name for name in names if name not in links.names), mode, places)
+            cut = others.cut or others.system
+        elif links.names:
+            cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics())
         return PhaseParts(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
     return whole.mechanics.on_demand((PhaseParts, names, mode, tuple(places.items())), make)
@@ -94,9 +101,10 @@ class Phase:
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
         self.signs = np.array([mode.set_valued[name] for name in selector.names], dtype=int)
         self.system, self.links, cut, self.margins = phase_parts(whole, tuple(names), mode, places)
-        self.backend, may_compile = backend, MODES.plan(Question(self.system, self.laws, backend)).dynamics == "compiled"
+        smooth = self.system if cut is None else cut
+        self.backend, may_compile = backend, MODES.plan(Question(smooth, Laws(smooth), backend)).dynamics == "compiled"
         if cut is not None:
-            self.solvers: list = [LossyEngine(self.system, cut, self.links, backend, may_compile)]
+            self.solvers: list = [CutRowEngine(self.system, cut, self.links, backend, may_compile)]
         else:
             self.solvers = [CertifiedEngine(backend)]
         self.may_compile, self.counted = may_compile and not self.links.names, 0

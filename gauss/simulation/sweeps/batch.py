@@ -43,6 +43,8 @@ class SweepTask:
         Functions of the :class:`gauss.Trajectory` of a member that return a number.
     threads : int
         Number of threads.
+    device : str, optional
+        Name of devices; this CPU by default.
     """
 
     scene: Scene | Callable[..., Scene]
@@ -51,6 +53,7 @@ class SweepTask:
     settings: dict
     measure: dict[str, Callable[[Trajectory], float]] = field(default_factory=dict)
     threads: int = 1
+    device: str | None = None
 
 
 @dataclass
@@ -173,12 +176,12 @@ _ENSEMBLES: dict[tuple, Ensemble] = {}  # cached in the process: later pieces ar
 
 def _ensemble(task: SweepTask, first: _Member, values: np.ndarray) -> Ensemble | None:
     """Ensemble of members of a kind; None if it cannot be compiled."""
-    key = first.kind, repr(task.settings)
+    key = first.kind, repr(task.settings), task.device
     ensemble = _ENSEMBLES.get(key)
     if ensemble is None or not ensemble.covers(values):
         known = values if ensemble is None else np.concatenate([ensemble.known, values])
         try:
-            ensemble = Ensemble(first.system, known, **task.settings)
+            ensemble = Ensemble(first.system, known, **task.settings, device=task.device)
         except SimulationError:
             return None
         while len(_ENSEMBLES) >= MOST_ENSEMBLES:

@@ -71,7 +71,7 @@ class Members:
         return [dict(zip(self.names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
 
 
-def members(vary: Mapping[str, Sequence[float]], together: bool) -> Members:
+def members(vary: Mapping[str, Sequence[float] | np.ndarray], together: bool) -> Members:
     """Members of a sweep, checked.
 
     Raises

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from gauss.arguments import named_arguments
+from gauss.codegen.gpu.devices import double_precision
 from gauss.dynamics import compile_scene
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
@@ -33,7 +34,7 @@ DEFAULT_ATOL = 1e-9  # relative to the scale of the scene
 @named_arguments
 def sweep(
     scene: Scene | Callable[..., Scene],
-    vary: Mapping[str, Sequence[float]],
+    vary: Mapping[str, Sequence[float] | np.ndarray],
     duration: float,
     *,
     together: bool = False,
@@ -44,6 +45,7 @@ def sweep(
     atol: float | tuple[float, float] | Mapping[str, float] | None = None,
     measure: Mapping[str, Callable[[Trajectory], float]] | None = None,
     workers=None,
+    device: str | Sequence[str] | None = None,
     path=None,
     progress: bool = True,
 ):
@@ -74,6 +76,9 @@ def sweep(
     workers : int, executor or dask client, optional
         Number of processes of this machine, a client of Dask, or an executor with the interface of
         :mod:`concurrent.futures`; this process by default. The result does not depend on it.
+    device : str or sequence of str, optional
+        "cuda", "cuda:1", or several: GPUs that move the ensembles, a member in a thread; see :func:`gauss.rollout`. What an
+        ensemble does not confirm, and what cannot be one, is simulated on this CPU.
     path : str or Path, optional
         Folder ending in .zarr for the result, which grows with the finished members. An interrupted sweep continues there.
     progress : bool
@@ -100,6 +105,8 @@ def sweep(
         If no member can be simulated, with the reason of the first; or a setting is invalid.
     FileError
         If ``path`` is no sweep of the same parameters.
+    DeviceError
+        If there is no such device, or it cannot move the ensembles, with the reason.
     MissingPackageError
         If an optional package is not installed.
     KeyboardInterrupt
@@ -118,6 +125,7 @@ def sweep(
         settings=settings,
         measure=dict(measure or {}),
         threads=cores() if workers is None else 1,
+        device=None if device is None else double_precision(device),
     )
     blank = empty(task, system, _about(task, system))
     spans = list(pieces(chosen))

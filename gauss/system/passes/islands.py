@@ -5,9 +5,8 @@ Springs and forces between islands do not couple accelerations.
 
 from dataclasses import replace
 
-from gauss.system.passes.layout import kept_joints
 from gauss.system.placed_elements import PlacedFrame
-from gauss.system.subsystem import GROUND, BoundRelation, Subsystem, spanning_tree
+from gauss.system.subsystem import GROUND, BoundRelation, Subsystem, kept_joints, spanning_tree
 
 
 def islands(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:

@@ -8,9 +8,8 @@ import numpy as np
 from gauss import rotations
 from gauss.scene.body import principal_axes
 from gauss.system import frames
-from gauss.system.passes.layout import kept_joints
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
-from gauss.system.subsystem import GROUND, Subsystem, spanning_tree
+from gauss.system.subsystem import GROUND, Subsystem, kept_joints, spanning_tree
 
 Poses = dict[int, tuple[int, frames.Pose]]  # body → (body that stands for it, its central frame seen from there)
 

@@ -1,4 +1,4 @@
-"""What bodies look like: the meshes of their robot, or rods and plates between their joints, and their shapes of contact."""
+"""Forms of bodies: the meshes of their robot, or rods and plates between their joints, and their shapes of contact."""
 
 from dataclasses import dataclass
 from itertools import combinations

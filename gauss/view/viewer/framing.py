@@ -1,4 +1,4 @@
-"""Where the eye stands so that a motion fills the picture, and where the floor is."""
+"""Position of the camera for which a motion fills the picture, and height of the floor."""
 
 from typing import NamedTuple
 

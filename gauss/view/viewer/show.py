@@ -19,7 +19,7 @@ from gauss.view.viewer.player import Player
 from gauss.view.viewer.shown import FRAMES, Shown, shown
 from gauss.view.viewer.stage import ViewerStage
 
-LOOPBACK = "127.0.0.1"  # nobody else on the network sees the viewer
+LOOPBACK = "127.0.0.1"  # the viewer is not visible on the network
 HEIGHT = 520  # of the viewer inside a notebook
 
 

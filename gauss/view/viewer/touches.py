@@ -1,4 +1,4 @@
-"""Where bodies touch in a motion, and how hard they press."""
+"""Contact points of bodies along a motion, and contact forces."""
 
 import warnings
 from typing import NamedTuple

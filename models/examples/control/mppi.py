@@ -15,12 +15,12 @@ from gauss import view
 
 
 class Mppi:
-    def __init__(self, scene, cost, rows=50, samples=4096, rate=50.0, substeps=4, temperature=0.05):
+    def __init__(self, scene, cost, rows=50, samples=4096, rate=50.0, substeps=4, temperature=0.05, device=None):
         self.system, self.cost, self.shape = gauss.compile_scene(scene), cost, (samples, rows, len(scene.inputs))
         self.run = {"steps": rows * substeps, "step": 1.0 / (rate * substeps), "every": substeps, "threads": None}
+        self.run["device"] = device
         self.high = np.array([given.bounds[1] for given in scene.inputs.values()])
-        self.plan, self.temperature = np.zeros(self.shape[1:]), temperature
-        self.rng = np.random.default_rng(0)
+        self.plan, self.temperature, self.rng = np.zeros(self.shape[1:]), temperature, np.random.default_rng(0)
 
     def __call__(self, t, q, v):
         noise = 0.5 * self.high * self.rng.standard_normal(self.shape)

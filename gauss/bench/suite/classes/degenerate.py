@@ -17,7 +17,7 @@ WEIGHT = 40.0  # [N], of a table
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for legs in (4, 8, 12):
         for share, where in (
             (0.0, "at rest"),
@@ -56,7 +56,7 @@ def _wall(columns: int, rows: int) -> SuiteInstance:
 
 
 def _corner(copies: int) -> SuiteInstance:
-    """Mass in a corner whose planes are said in several scales, pushed along one of them."""
+    """Mass in a corner whose planes are repeated in several scales, pushed along one of them."""
     planes = np.vstack([2.0**k * np.eye(3) for k in range(copies)])
     story = f"Mass in a corner of three planes, said {copies} times in different scales, pushed along one."
     names = {"variables": ("ax", "ay", "az"), "units": ("m/s²",) * 3}

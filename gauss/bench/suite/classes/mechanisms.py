@@ -34,7 +34,7 @@ def of_compulsion(
 
 
 def loaded(name: str, **options):
-    """Scene of that name; what a robot's file says beyond its mechanics is not missed."""
+    """Scene of that name; elements of a robot's file beyond its mechanics are left out."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotImportedWarning)
         return load(name, **options)

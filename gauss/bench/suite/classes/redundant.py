@@ -1,7 +1,7 @@
-"""Rows that depend on each other: overconstrained loops, and rows said twice; x is unique, the multipliers are not.
+"""Rows that depend on each other: overconstrained loops, and repeated rows; x is unique, the multipliers are not.
 
 Rows of mechanisms depend on each other but for the rounding of their entries: each is kept to some sixteen digits, and
-what then remains is told as the contradiction of the reference. Rows said twice, and sums of others, do so exactly.
+the rest is reported as the contradiction of the reference. Repeated rows, and sums of others, do so exactly.
 """
 
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ GRID = 2.0**10  # entries are multiples of its inverse, so that sums of rows are
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for name in LOOPS:
         yield f"redundant {name}", partial(_loop, name, name, {})
     for n in (2, 5, 10, 20):

@@ -1,10 +1,12 @@
-"""Accelerations with non-ideal constraints, the losses of transmissions: M q̈ + h + Rᵀ λ = τ + (W − Rᵀ) Q, Q = −λ.
+"""Accelerations with rows R q̇ = 0 whose forces are found apart: M q̈ + h = τ + W Q with R q̈ = 0, affine in Q.
 
-A link with the row R q̇ = 0 has the reaction W Q instead of the ideal Rᵀ Q: a force Q on the driven joint, −f Q on the driver
-(Rotor chains, section 6). That is the minimum of the compulsion with the further load (W − Rᵀ) Q, where Q is the multiplier;
-or, without the row, the motion under the load W Q for which R q̈ = 0. Both are affine in Q.
+A closed stop of a joint is such a row, with the ideal reaction W = Rᵀ: the phases of a motion that differ by closed stops
+alone share the machine code of the system without them. A link with losses has a reaction W Q that is not Rᵀ Q: a force
+Q on the driven joint, −f Q on the driver (Rotor chains, section 6). With the rows in the system, that is the minimum of the
+compulsion with the further load (W − Rᵀ) Q, where Q = −λ is the multiplier.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -18,11 +20,12 @@ from gauss.backends.solution import Solution
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
-from gauss.dynamics.engines.engine import Engine
+from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.engines.tiering import tiered
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
+from gauss.scene import ClosedGap, Stop
 from gauss.scene.losses import joint_factors
 from gauss.system import ContactMode, State, System
 
@@ -34,19 +37,53 @@ MOST_ROUNDS = 20  # of Newton's method
 NOT_CONVERGED = "the forces of the links with losses did not converge."
 
 
-class NonIdealRows(NamedTuple):
-    """Non-ideal constraints of a system: links with losses.
+class ClosedStop(NamedTuple):
+    """Closed stop of a joint of one freedom: the row ± q̇ = 0.
+
+    Attributes
+    ----------
+    name : str
+        Name of the gap.
+    sign : float
+        The gap is sign · (q − bound).
+    bound : float
+        Coordinate of the stop [rad, m].
+    q, v : int
+        Places of the joint in q and v.
+    """
+
+    name: str
+    sign: float
+    bound: float
+    q: int
+    v: int
+
+
+def closed_stop(system: System, gap: ClosedGap) -> ClosedStop | None:
+    """Closed stop of a gap; None if its row is not constant."""
+    if not isinstance(gap.whole, Stop):
+        return None
+    placed, rate = system.coordinate(gap.whole.joint)
+    if rate is not None or placed.v.stop - placed.v.start != 1 or placed.q.stop - placed.q.start != 1:
+        return None
+    return ClosedStop(gap.name, *gap.whole.bounds[gap.index], placed.q.start, placed.v.start)
+
+
+class CutRows(NamedTuple):
+    """Constraint rows of a phase whose forces are found apart: links with losses, closed stops of joints.
 
     Attributes
     ----------
     names : tuple of str
-        Names of the m links.
+        Names of the m links and stops.
     rows : ndarray of int, shape (m,)
         Their rows.
     R, W : ndarray, shape (m, n_v)
         Jacobian of the rows, and generalised forces for Q = 1.
     units : ndarray, shape (m,)
         Forces of the scene along the driven joints [N m, N].
+    stops : tuple of ClosedStop
+        The closed stops among them.
     """
 
     names: tuple[str, ...]
@@ -54,19 +91,37 @@ class NonIdealRows(NamedTuple):
     R: np.ndarray
     W: np.ndarray
     units: np.ndarray
+    stops: tuple[ClosedStop, ...]
+
+    @property
+    def ideal(self) -> bool:
+        """Whether no link has losses: then the reactions are those of ideal constraints."""
+        return np.array_equal(self.R, self.W)
 
 
-def non_ideal_rows(system: System, whole: System, mode: ContactMode) -> NonIdealRows:
-    """Links with losses of a phase, with the directions of power flow of its mode."""
+def cut_rows(system: System, whole: System, stops: Sequence[ClosedStop], mode: ContactMode) -> CutRows:
+    """Rows of a phase to be cut: links with losses, with the directions of power flow of its mode, and closed stops."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if mode.power_flow.get(name) and name in places}
-    R, W = (np.zeros((len(links), system.n_v)) for _ in range(2))
-    for k, (name, link) in enumerate(links.items()):
-        for matrix, factors in ((R, link.acts_on), (W, joint_factors(link, mode.power_flow[name]))):
-            for joint, factor in factors.items():
-                matrix[k, system.column(joint)] += factor
-    units = np.array([system.scale.energy / system.scale.coordinates[system.column(link.driven)] for link in links.values()])
-    return NonIdealRows(tuple(links), np.array([places[name] for name in links], dtype=int), R, W, units)
+    names = (*links, *(stop.name for stop in stops))
+    held = [{stop.v: stop.sign} for stop in stops]
+    R = _matrix(system, [_places(system, link.acts_on) for link in links.values()] + held)
+    W = _matrix(system, [_places(system, joint_factors(link, mode.power_flow[name])) for name, link in links.items()] + held)
+    columns = [*(system.column(link.driven) for link in links.values()), *(stop.v for stop in stops)]
+    units = system.scale.energy / system.scale.coordinates[columns]
+    return CutRows(names, np.array([places[name] for name in names], dtype=int), R, W, units, tuple(stops))
+
+
+def _places(system: System, factors: Mapping[str, float]) -> dict[int, float]:
+    """Factors by place in v instead of joint."""
+    return {system.column(joint): factor for joint, factor in factors.items()}
+
+
+def _matrix(system: System, rows: Sequence[Mapping[int, float]]) -> np.ndarray:
+    matrix = np.zeros((len(rows), system.n_v))
+    for k, row in enumerate(rows):
+        matrix[k, list(row)] = list(row.values())
+    return matrix
 
 
 def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.ndarray:
@@ -87,6 +142,8 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
         If the iteration does not converge.
     """
     Q, left = guess, residual(guess)
+    if not np.isfinite(left).all():
+        raise SimulationError(NOT_CONVERGED)
     if not left.any():
         return Q
     for _ in range(MOST_ROUNDS):
@@ -106,18 +163,21 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
     raise SimulationError(NOT_CONVERGED)
 
 
-def with_losses(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.ndarray, Solution]:
-    """Forces Q (m,) of links in a compulsion with all rows and no inequalities, and the solution with losses.
+def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndarray, Solution]:
+    """Forces Q (m,) of rows in a compulsion with all rows and no inequalities, and the solution with losses.
 
     Parameters
     ----------
     compulsion : Compulsion
         Without the losses.
-    links : NonIdealRows
-        The links.
+    links : CutRows
+        The rows.
     answer : callable
         Compulsion → certified solution.
     """
+    if links.ideal:
+        found = answer(compulsion)
+        return -found.multipliers[links.rows], found
     factor, extra = Factor(compulsion), links.W - links.R
     still, none = np.zeros_like(compulsion.impressed), np.zeros_like(compulsion.D)
     jacobian = np.array([factor.solve(still, none, load)[2][links.rows] for load in extra]).T + np.eye(len(extra))
@@ -131,24 +191,24 @@ def with_losses(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np
     raise SimulationError(NOT_CONVERGED)
 
 
-class LossyEngine(Engine):
-    """Accelerations of a phase with losses: by numpy first, compiled above the threshold of evaluations.
+class CutRowEngine(Engine):
+    """Accelerations of a phase with cut rows: by numpy first, compiled above the threshold of evaluations.
 
     Parameters
     ----------
     system : System
         The phase, with all rows.
     cut : System
-        The same without the rows of the links with losses.
-    links : NonIdealRows
-        These links.
+        The same without the cut rows.
+    links : CutRows
+        The cut rows.
     backend : str, Backend or class
         How accelerations are solved.
     may_compile : bool
         Whether the phase may be compiled.
     """
 
-    def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str | Backend | type, may_compile: bool):
+    def __init__(self, system: System, cut: System, links: CutRows, backend: str | Backend | type, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
         self.certified, self.counted = CertifiedEngine(backend), 0
         self.compiled: CompiledEngine | None = None
@@ -176,14 +236,15 @@ class LossyEngine(Engine):
 
     def rates(self, system: System, state: State, load=None) -> Rates:
         """Accelerations, and the power of the loads; losses of the links count as dissipation."""
-        if self.compiled is None and self.may_compile:
-            self._compile()
+        self._compile()
         found = self._solved(state)[0] if self.compiled is None else self._compiled(self.compiled, state)
         lost = self.Q @ (self.links.W @ state.v)
         return Rates(found.acceleration, found.power - np.array([0.0, 0.0, lost]))
 
     def _compile(self):
-        """Compile the phase once the evaluations reach the threshold."""
+        """Compile the system without the rows once the evaluations reach the threshold."""
+        if self.compiled is not None or not self.may_compile:
+            return
         spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
         kernels = tiered(self.cut).kernels(self.laws, spent)
         if kernels is not None:
@@ -203,6 +264,8 @@ class LossyEngine(Engine):
 
     def _compiled(self, engine: CompiledEngine, state: State) -> Rates:
         found: Rates
+        if self.links.ideal:
+            return self._affine(engine, state)
 
         def residual(Q):
             nonlocal found
@@ -212,16 +275,54 @@ class LossyEngine(Engine):
         self.Q = piecewise_affine_root(residual, self.Q, self.links.units)
         return found
 
+    def _affine(self, engine: CompiledEngine, state: State) -> Rates:
+        """Rates with ideal rows: forces and accelerations are affine, and are corrected once for rounding."""
+        R, W, units = self.links.R, self.links.W, self.links.units
+        before, *changed = engine.accelerations(state, self.Q @ W + np.vstack([np.zeros_like(W[:1]), W * units[:, None]]))
+        responses = (np.array(changed) - before).T / units
+        if not np.isfinite(responses).all():
+            raise SimulationError(NOT_CONVERGED)
+        inverse = np.linalg.pinv(R @ responses)
+        self.Q = self.Q - inverse @ (R @ before)
+        found = engine.rates(self.cut, state, self.Q @ W)
+        correction = -inverse @ (R @ found.acceleration)
+        self.Q = self.Q + correction
+        acceleration = found.acceleration + responses @ correction
+        acceleration[[stop.v for stop in self.links.stops]] = 0.0  # without rounding, joints at stops stay there
+        return found._replace(acceleration=acceleration)
+
     def solution(self, state: State) -> tuple[Solution, np.ndarray]:
         """Certified solution with all rows, and the forces Q (m,) of the links."""
         return self._solved(state)[1], self.Q
 
     def project(self, system: System, state: State) -> State:
         """State after a step, projected onto the constraints."""
-        return project(self.system, state)
+        if self.compiled is None or self.cut.closes or len(self.links.stops) < len(self.links.names):
+            return project(self.system, state)
+        q, v = state.q.copy(), state.v.copy()
+        for stop in self.links.stops:
+            q[stop.q], v[stop.v] = stop.bound, 0.0
+        same = np.array_equal(q, state.q) and np.array_equal(v, state.v)
+        return state if same else replace(state, q=q, v=v)
 
     def check(self, point: Point, last: bool = False):
-        """Check compiled accelerations with the forces of the links as loads."""
-        if self.compiled is not None:
-            self._compiled(self.compiled, point.state)
+        """Check compiled accelerations with the forces of the rows as loads.
+
+        Raises
+        ------
+        DistrustError
+            If the residual is too large; from then on all rows are solved by the certified engine.
+        """
+        if self.compiled is None:
+            return
+        self._compiled(self.compiled, point.state)
+        try:
             self.compiled.check(point, last, self.Q @ self.links.W)
+        except DistrustError:
+            self.hand_over(point.state.t)
+            raise
+
+    def hand_over(self, t: float) -> bool:
+        """Switch to the certified engine with all rows; False if that is in use already."""
+        used, self.compiled, self.may_compile = self.compiled is not None, None, False
+        return used

@@ -1,0 +1,120 @@
+"""Contact problem of the active rows: W = h Y Yᵀ, Y = K Z; further gaps become active until none closes."""
+
+from llvmlite import ir
+
+from gauss.codegen import INTEGER
+from gauss.codegen.kernels.arrays import Array, Value
+from gauss.codegen.kernels.free_motion import FreeMotion
+from gauss.codegen.kernels.step_memory import StepMemory
+
+ROUNDS = 20  # of activating gaps
+
+
+class ActiveContacts:
+    """Emitter of the contact problem of a step.
+
+    Parameters
+    ----------
+    memory : StepMemory
+        Arrays of the step.
+    free : FreeMotion
+        Emitter of accelerations.
+    functions : StepFunctions
+        Traced functions of a step.
+    solver : llvmlite.ir.Function
+        Solver of a problem.
+    """
+
+    def __init__(self, memory: StepMemory, free: FreeMotion, functions, solver: ir.Function):
+        self.at, self.r = memory, memory.r
+        self.free, self.functions, self.solver = free, functions, solver
+
+    def solve(self, m: Value) -> Value:
+        """Forces of the active rows; returned is whether they obey their laws, and no other gap closes."""
+        r, n, s, n_v, g = self.r, self.at.n, self.at.settings, self.at.n["n_v"], self.at.n["g"]
+        rows = m * 3 + g + n["s"]
+        scale = r.variable(0.0)
+        with r.each(rows) as i:
+            push = self.at.dot(self.at["K"].after(i * n_v), self.at["a"], n_v)
+            self.at["after"][i] = self.at["rate"][i] + s["h"] * (push + self.at.remaining * self.at["bias"][i])
+            scale[0] = r.maximum(r.absolute(self.at["rate"][i]), scale[0])
+        with r.each(m + g) as i:
+            given = self.at["gap"][i], self.at["rate"][i], s["h"], s["rest"], s["share"]
+            (plastic,) = r.inline(self.functions.plastic, *given)
+            (elastic,) = r.inline(self.functions.elastic, *given[:2], self.at["e"][i], *given[2:])
+            self.at["after"][i] = self.at["after"][i] - r.choose(self.at["e"][i] > 0.0, elastic, plastic)
+            self.at["active"][i] = r.choose((self.at["after"][i] < 0.0) | (self.at["force"][i] > 0.0), 1.0, 0.0)
+        again, tries, solved = r.variable(1, INTEGER), r.variable(0, INTEGER), r.variable(1.0)
+        with r.loop() as leave_if:
+            leave_if((again[0] < 1) | (tries[0] > ROUNDS) | (solved[0] < 0.0))
+            self._solve_active(m, solved)
+            again[0], tries[0] = 0, tries[0] + 1
+            with r.each(m + g) as i:
+                push = self.at.dot(self.at["K"].after(i * n_v), self.at["added"], n_v)
+                closes = self.at["after"][i] + s["h"] * push < s["missed"] * (scale[0] + 1.0) * -1.0
+                with r.when(closes & (self.at["active"][i] < 1.0)):
+                    self.at["active"][i], again[0] = 1.0, 1
+        return (solved[0] >= 0.0) & (again[0] < 1)
+
+    def _solve_active(self, m: Value, solved: Array):
+        """Problem of the active rows, its forces, and the accelerations that they add."""
+        r, n, k, n_v, g = self.r, self.at.n, self.at.n["r"], self.at.n["n_v"], self.at.n["g"]
+        under, which = self.at.table("under"), self.at.table("under").after(n["capacity"] * 2)
+        normals, rough, count = (r.variable(0, INTEGER) for _ in range(3))
+        order = which.after(n["capacity"] * 3 + g + n["s"])
+        with r.each(m + g) as i, r.when(self.at["active"][i] > 0.0):
+            which[normals[0]], order[i] = i, normals[0]
+            normals[0] = normals[0] + 1
+        count[0] = normals[0]
+        with r.each(m) as c, r.when((self.at["active"][c] > 0.0) & (self.at["mu"][c] > 0.0)):
+            under[rough[0]], self.at["active_mu"][rough[0]] = order[c], self.at["mu"][c]
+            which[count[0]], which[count[0] + 1] = m + g + c * 2, m + g + c * 2 + 1
+            rough[0], count[0] = rough[0] + 1, count[0] + 2
+        with r.each(n["s"]) as j:
+            which[count[0]] = m * 3 + g + j
+            count[0] = count[0] + 1
+        total = count[0]
+        with r.each(total) as i:
+            row, Y = which[i], self.at["Y"].after(i * k)
+            self.at["b"][i], self.at["f"][i] = self.at["after"][row], self.at["force"][row]
+            with r.each(k) as j:
+                Y[j] = 0.0
+            with r.each(n_v) as p:
+                entry = self.at["K"][row * n_v + p]
+                with r.when(r.absolute(entry) > 0.0), r.each(k) as j:
+                    Y[j] = Y[j] + entry * self.at["Z"][p * k + j]
+            with r.each(i + 1) as j:
+                value = self.at.dot(Y, self.at["Y"].after(j * k), k) * self.at.settings["h"]
+                self.at["W"][i * total + j], self.at["W"][j * total + i] = value, value
+        self.at["residual"][0] = 0.0
+        with r.when(total > 0):
+            sizes = normals[0], rough[0], n["s"]
+            r.call(
+                self.solver,
+                *(*sizes, self.at["W"], self.at["b"], under, self.at["active_mu"], self.at["limit"]),
+                *(self.at["f"], self.at["residual"], self.at["room"]),
+            )
+        solved[0] = self.at["residual"][0]
+        with r.each(m * 3 + g + n["s"]) as i:
+            self.at["force"][i] = 0.0
+        with r.each(k) as j:
+            self.at["z"][j] = 0.0
+        with r.each(total) as i:
+            self.at["force"][which[i]] = self.at["f"][i]
+            with r.each(k) as j:
+                self.at["z"][j] = self.at["z"][j] + self.at["f"][i] * self.at["Y"][i * k + j]
+        self._jams(normals[0], total, which, solved)
+        self.free.spread(self.at["added"])
+
+    def _jams(self, normals: Value, total: Value, which: Array, solved: Array):
+        """Leave the step to Python if a normal force moves nothing, because the loop constraints forbid it."""
+        r, s, n_v = self.r, self.at.settings, self.at.n["n_v"]
+        with r.when(self.at.n["loops"] > 0), r.each(normals) as i:
+            alone = r.variable(0.0)
+            with r.each(n_v) as j:
+                inertia, entry = self.at["flat:M"][j * n_v + j], self.at["K"][which[i] * n_v + j]
+                with r.when(inertia > 0.0):
+                    alone[0] = alone[0] + entry * entry / inertia
+            response = self.at["W"][i * total + i]
+            with r.when((r.absolute(self.at["f"][i]) > 0.0) & (response <= s["jammed"] * s["h"] * alone[0])):
+                solved[0] = -1.0

@@ -1,0 +1,103 @@
+"""Free motion of a mechanism: terms after the share of a step, accelerations a = Z Zᵀ τ without contact forces.
+
+    H = N (Nᵀ M N)⁻¹ Nᵀ = Z Zᵀ,   Z = N C⁻ᵀ
+
+with the Cholesky factor C of Nᵀ M N; N are the rates of independent coordinates, by couplings with one entry in each row.
+"""
+
+from gauss.codegen.kernels.arrays import Array, Value
+from gauss.codegen.kernels.step_memory import StepMemory
+
+
+class FreeMotion:
+    """Emitter of the terms of a step.
+
+    Parameters
+    ----------
+    memory : StepMemory
+        Arrays of the step.
+    """
+
+    def __init__(self, memory: StepMemory):
+        self.at, self.r = memory, memory.r
+
+    def begin(self):
+        """Terms after the share of the step, compliance, accelerations without contact forces, rates that they lead to."""
+        r, n, s, given = self.r, self.at.n, self.at.settings, self.at["given"]
+        n_q, n_v = n["n_q"], n["n_v"]
+        self.at.copy(given, self.at["q"], n_q)
+        with r.each(n_v) as i:
+            given[n_q + i] = s["share"] * s["h"] * self.at["v"][i]
+        self.at.call("move", given, self.at["end_q"])
+        given[0] = s["t"] + s["share"] * s["h"]
+        self.at.copy(given.after(1), self.at["end_q"], n_q)
+        self.at.copy(given.after(n_q + 1), self.at["v"], n_v)
+        self.at.call("begin", given, self.at["out"])
+        self.at.copy(self.at["flat"], self.at["fixed"], n["flat"])
+        entries = self.at.table("entries")
+        with r.each(n["entries"]) as i:
+            self.at["flat"][entries[i]] = self.at["out"][i]
+        self._factor()
+        self._accelerate(self.at["flat:tau"])
+        self.at.copy(self.at["results"], self.at["flat:power"], 3)
+        with r.when(s["share"] > 0.0):
+            with r.each(n_v) as i:
+                given[n_q + 1 + i] = self.at["v"][i] + s["share"] * s["h"] * self.at["a"][i]
+            self.at.call("forces", given, self.at["out"])
+            self._accelerate(self.at["out"])
+            self.at.copy(self.at["results"], self.at["out"].after(n_v), 3)
+        with r.each(n_v) as i:
+            self.at["total"][i] = self.at["v"][i] + s["h"] * self.at["a"][i]
+
+    def _factor(self):
+        """Cholesky factor C of Nᵀ M N, and Z = N C⁻ᵀ; each row of N has one entry."""
+        r, n = self.r, self.at.n
+        value, C, E, Z, M = (self.at[name] for name in ("value", "C", "E", "Z", "flat:M"))
+        k, n_v, column = n["r"], n["n_v"], self.at.table("column")
+        with r.each(k * k) as i:
+            C[i], E[i] = 0.0, 0.0
+        with r.each(n_v) as i, r.each(n_v) as j:
+            at = column[i] * k + column[j]
+            C[at] = C[at] + value[i] * value[j] * M[i * n_v + j]
+        with r.each(k) as j:
+            with r.each(j) as p:
+                C[j * k + j] = C[j * k + j] - C[j * k + p] * C[j * k + p]
+            C[j * k + j] = r.square_root(C[j * k + j])
+            with r.each(k, j + 1) as i:
+                C[i * k + j] = (C[i * k + j] - self.at.dot(C.after(i * k), C.after(j * k), j)) / C[j * k + j]
+        with r.each(k) as i, r.each(k, i) as j:
+            total = r.variable(0.0)
+            with r.when(j <= i):
+                total[0] = 1.0
+            with r.each(j, i) as p:
+                total[0] = total[0] - E[i * k + p] * C[j * k + p]
+            E[i * k + j] = total[0] / C[j * k + j]
+        with r.each(n_v) as i, r.each(k) as j:
+            Z[i * k + j] = value[i] * E[column[i] * k + j]
+
+    def _accelerate(self, tau: Array):
+        """Accelerations a = Z Zᵀ τ."""
+        r, k, n_v = self.r, self.at.n["r"], self.at.n["n_v"]
+        with r.each(k) as j:
+            self.at["z"][j] = r.sum(n_v, lambda i: self.at["Z"][i * k + j] * tau[i])
+        self.spread(self.at["a"])
+
+    def spread(self, target: Array):
+        """Accelerations Z z."""
+        r, k = self.r, self.at.n["r"]
+        with r.each(self.at.n["n_v"]) as i:
+            target[i] = self.at.dot(self.at["Z"].after(i * k), self.at["z"], k)
+
+    def speed(self, v: Array) -> Value:
+        """Largest speed of a point of a shape."""
+        r, n_v, largest = self.r, self.at.n["n_v"], self.r.variable(0.0)
+        with r.each(self.at.n["bodies"] - 1) as b:
+            squares = []
+            for half in range(2):
+                total = r.variable(0.0)
+                for i in range(3):
+                    rate = self.at.dot(self.at["flat:J"].after((b * 6 + (3 * half + i)) * n_v), v, n_v)
+                    total[0] = total[0] + rate * rate
+                squares.append(r.square_root(total[0]))
+            largest[0] = r.maximum(squares[1] + squares[0] * self.at["reach"][b], largest[0])
+        return largest[0]

@@ -1,0 +1,137 @@
+"""Working memory of the step of a mechanism, and its view in the emitted code: sizes, addresses, arrays by name.
+
+All arrays of doubles lie in one block, at places that depend on the sizes of a scene; arrays of integers, kernels of the
+scene and those of the search for near contacts are reached by a table of addresses.
+"""
+
+from llvmlite import ir
+
+from gauss.codegen import INTEGER, POINTER
+from gauss.codegen.kernels.arrays import Array, Routine, Value
+from gauss.codegen.kernels.contact_solver import room_of
+from gauss.codegen.kernels.near_pairs import INTEGERS
+
+SIZES = ("n_q", "n_v", "r", "bodies", "g", "s", "entries", "flat", "parts", "pairs", "capacity", "loops", "input", "laws")
+ADDRESSES = (
+    *("begin", "forces", "move", "entries"),
+    *("body", "pair", "kind", "feature", "found", "count"),
+    *("own", "signs", "deepest", "near_settings", "moved", "rows", "depth"),
+    *("law", "known_found", "known_count", "under", "status", "column"),
+    *("modes", "next_modes", "closed", "fresh", "counts"),
+)
+TERMS = ("M", "tau", "power", "bodies", "J", "gap", "rate", "K", "bias")  # of the mechanism, in this order
+FINISHED, REPEATED, IMPACT = range(3)  # status of a step: what Python does where it is not finished
+STEP_SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "missed", "jammed", "contact_unit")
+LOOP_SETTINGS = ("pace", "resting", "sliding", "shares", "recorded", "largest")
+CHANGE = 5  # step, element, its mode, whether it had an impact, energy lost
+CHANGES_ROOM = 256  # changes of the contact mode that are kept, beside those of one step
+RESULTS = ("power0", "power1", "power2", "error", "doubtful")
+MOST_SLIDING = 6  # sliding contacts that are examined for Painlevé's paradox
+
+
+def slots(n: dict[str, int]) -> dict[str, int]:
+    """Lengths of the arrays of working memory by name, for the sizes of a scene; terms lie in "flat"."""
+    v, r, m, others = n["n_v"], n["r"], n["capacity"], n["g"] + n["s"]
+    rows, elements = 3 * m + others, n["laws"] + others
+    return {
+        "settings": len(STEP_SETTINGS),
+        "results": len(RESULTS),
+        "q": n["n_q"],
+        "v": v,
+        "end_q": n["n_q"],
+        "end_v": v,
+        "given": 1 + n["n_q"] + v + n["input"],
+        "out": max(n["entries"], v + 3),
+        "fixed": n["flat"],
+        "flat": n["flat"],
+        "reach": n["bodies"],
+        "value": v,
+        "C": r * r,
+        "E": r * r,
+        "Z": v * r,
+        "a": v,
+        "added": v,
+        "total": v,
+        "z": r,
+        "friction": n["laws"] + 1,
+        "restitution": n["laws"] + 1,
+        "other_restitution": n["g"],
+        "unit": rows,
+        "other_unit": n["g"],
+        "set_unit": n["s"],
+        "limit": n["s"],
+        "lossy": n["s"],
+        "known": 3 * m,
+        "known_others": others,
+        "K": rows * v,
+        "Y": rows * r,
+        "rate": rows,
+        "bias": rows,
+        "gap": m + n["g"],
+        "e": m + n["g"],
+        "mu": m,
+        "after": rows,
+        "force": rows,
+        "active": m + n["g"],
+        "W": rows * rows,
+        "b": rows,
+        "f": rows,
+        "active_mu": m,
+        "slide": MOST_SLIDING * (2 * r + MOST_SLIDING),
+        "residual": 1,
+        "room": room_of(rows),
+        "loop": len(LOOP_SETTINGS),
+        "own": v,
+        "work": 3,
+        "row_work": rows,
+        "hit": elements,
+        "lost": elements,
+        "changes": CHANGE * (CHANGES_ROOM + 2 * elements),
+    } | {f"flat:{name}": 0 for name in TERMS}
+
+
+class StepMemory:
+    """Arrays of one step in the emitted code, by name.
+
+    Parameters
+    ----------
+    r : Routine
+        Routine of the code.
+    given : list of Array
+        Sizes and places, addresses, and working memory.
+    """
+
+    def __init__(self, r: Routine, given: list[Array]):
+        self.r = r
+        ints, self.addresses, self.work = given
+        self.n = {name: ints[k] for k, name in enumerate(SIZES)}
+        self.places = ints.after(len(SIZES))
+        kinds = [INTEGER, POINTER, INTEGER, POINTER, INTEGER]
+        self.kernel = ir.FunctionType(ir.VoidType(), kinds).as_pointer()
+        self.names = list(slots(dict.fromkeys(SIZES, 0)))
+        self.arrays = {name: self.work.after(self.places[k]) for k, name in enumerate(self.names)}
+        self.settings = {name: self.arrays["settings"][k] for k, name in enumerate(STEP_SETTINGS)}
+        self.remaining = self.settings["share"] * -1.0 + 1.0
+
+    def __getitem__(self, name: str) -> Array:
+        return self.arrays[name]
+
+    def table(self, name: str, kind=INTEGERS) -> Array:
+        """Array by its address."""
+        b, address = self.r.b, self.addresses[ADDRESSES.index(name)]
+        return Array(b, b.inttoptr(address.value, kind))
+
+    def call(self, name: str, given: Array, found: Array):
+        """Call a kernel of the scene by its address."""
+        b, one = self.r.b, INTEGER(1)
+        pointer = b.inttoptr(self.addresses[ADDRESSES.index(name)].value, self.kernel)
+        b.call(pointer, [one, given.pointer, one, found.pointer, one])
+
+    def copy(self, target: Array, source: Array, count):
+        """Copy numbers."""
+        with self.r.each(count) as i:
+            target[i] = source[i]
+
+    def dot(self, one: Array, other: Array, count) -> Value:
+        """Scalar product."""
+        return self.r.sum(count, lambda i: one[i] * other[i])

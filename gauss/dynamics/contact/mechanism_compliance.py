@@ -1,0 +1,68 @@
+"""Compliance of a mechanism: accelerations H τ by generalised forces τ that its couplings and loops allow.
+
+    H = M⁻¹ (1 − Gᵀ (G M⁻¹ Gᵀ)⁺ G M⁻¹),   or H = N (Nᵀ M N)⁻¹ Nᵀ with independent rates, v = N ẏ
+
+Rows of loops G may be redundant, hence the pseudo-inverse. The coordinates of couplings alone are made independent.
+"""
+
+import numpy as np
+
+from gauss.dynamics.contact.mechanism_kernels import MechanismTerms, is_coupled_tree
+from gauss.system import System
+
+REDUNDANT_LOOPS = 1e-10  # eigenvalue of the scaled G M⁻¹ Gᵀ, relative to the largest one: smaller ones are redundant rows
+
+
+class Compliance:
+    """Compliance of one system.
+
+    Parameters
+    ----------
+    smooth : System
+        The system without unilateral and set-valued elements.
+
+    Attributes
+    ----------
+    free_columns : ndarray, shape (n_v, k), or None
+        Rates N of independent coordinates; None with loops.
+    """
+
+    def __init__(self, smooth: System):
+        self.free_columns = _null_space(smooth) if is_coupled_tree(smooth) else None
+
+    @property
+    def is_single(self) -> bool:
+        """Whether each rate is a multiple of one independent rate."""
+        N = self.free_columns
+        return N is not None and bool((np.count_nonzero(N, axis=1) <= 1).all())
+
+    def of(self, terms: MechanismTerms) -> tuple[np.ndarray, np.ndarray]:
+        """Compliance H (n_v, n_v), and accelerations (n_v,) by the biases of loops."""
+        M = terms.M
+        if self.free_columns is not None:
+            N = self.free_columns
+            return N @ np.linalg.inv(N.T @ M @ N) @ N.T, np.zeros(len(M))
+        tree = M.diagonal() > 0.0
+        H = np.zeros_like(M)
+        H[np.ix_(tree, tree)] = np.linalg.inv(M[np.ix_(tree, tree)])
+        Y = H @ terms.G.T
+        S = terms.G @ Y
+        sizes = S.diagonal()
+        scale = 1.0 / np.sqrt(np.maximum(sizes, REDUNDANT_LOOPS * sizes.max()))
+        P = scale[:, None] * np.linalg.pinv(scale[:, None] * S * scale, rcond=REDUNDANT_LOOPS, hermitian=True) * scale
+        return terms.B @ (H - Y @ P @ Y.T) @ terms.B.T, terms.B @ (Y @ (P @ terms.gamma)) + terms.beta
+
+
+def _null_space(system: System) -> np.ndarray:
+    """Rates (n_v, k) of independent coordinates: v = N ẏ for the couplings of a tree."""
+    ratios = np.eye(system.n_v)
+    dependent = set[int]()
+    for coupling in system.scene.couplings.values():
+        driven, driver = system.column(coupling.driven), system.column(coupling.driver)
+        row = ratios[driven] - coupling.ratio * ratios[driver]
+        if not np.abs(row).max():
+            continue
+        pivot = int(np.argmax(np.abs(row) * (np.arange(row.size) == driven) * 2.0 + np.abs(row)))
+        ratios = ratios - np.outer(ratios[:, pivot], row) / row[pivot]
+        dependent.add(pivot)
+    return ratios[:, [k for k in range(system.n_v) if k not in dependent]]

@@ -1,0 +1,76 @@
+"""Shapes in each other at the start, moved apart by the least motion in the metric of the masses.
+
+    minimise ½ δᵀ M δ   subject to   g + K δ ≥ 0 of all gaps
+
+This is Gauss's principle for a displacement: δ = H Kᵀ f, 0 ≤ f ⟂ g + W f ≥ 0 with W = K H Kᵀ. The gaps are not linear, hence
+some repetitions.
+"""
+
+import numpy as np
+
+from gauss.arguments import named_arguments
+from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem
+from gauss.dynamics.contact.contact_stepper import new_contact_stepper
+from gauss.dynamics.contact.moreau_step import START_OVERLAP
+from gauss.errors import StateError, require
+from gauss.system import State, System, retract
+
+REPETITIONS = 50
+CLEARANCE = 0.25  # of the largest penetration at the start: overlaps are resolved to no more than that
+
+
+@named_arguments
+def resolve_overlaps(system: System, state: State | None = None) -> State:
+    """Nearest state, in the metric of the masses, in which no shapes overlap and no stop is passed.
+
+    Parameters
+    ----------
+    system : System
+        System with contacts of shapes.
+    state : State, optional
+        The state; the initial state of the scene when not given.
+
+    Returns
+    -------
+    State
+        State with the same rates, to be given to :func:`gauss.simulate` as ``state=``.
+
+    Raises
+    ------
+    StateError
+        If none is found: joints, or other shapes, keep some shapes in each other.
+    """
+    require(system, (System,), "resolve_overlaps")
+    stepper = new_contact_stepper(system, True)
+    return resolved(stepper, system.initial_state() if state is None else system.projected(state))
+
+
+def resolved(stepper, state: State) -> State:
+    """Nearest state whose gaps are not negative, at the same rates.
+
+    Parameters
+    ----------
+    stepper : MechanismStepper
+        Steps of the system.
+    state : State
+        The state.
+
+    Raises
+    ------
+    StateError
+        If none is found: the joints, or other shapes, keep some shapes in each other.
+    """
+    for _ in range(REPETITIONS):
+        gap, K, H, _ = stepper.gaps_at(state)
+        if not gap.size or gap.min() >= -CLEARANCE * START_OVERLAP:
+            return state
+        n = np.zeros(0, dtype=int)
+        laws = ContactLaws(np.arange(gap.size), n.reshape(0, 2), n, np.zeros(0), n, np.zeros(0))
+        response = K @ H
+        force, _ = ContactProblem(response @ K.T, gap, laws).solve(np.zeros(gap.size))
+        state = stepper.projected(State(state.t, retract(stepper.system, state.q, force @ response), state.v))
+    gap, _, _, names = stepper.gaps_at(state)
+    raise StateError(
+        f"t = {state.t:.6g} s: shapes of {names[int(np.argmin(gap))]!r} stay in each other; its joints or other shapes hold "
+        "them there. Move them apart with scene.start."
+    )

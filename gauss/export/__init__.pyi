@@ -1,0 +1,21 @@
+from gauss.export.c_files import CCode, to_c
+from gauss.export.casadi_function import to_casadi
+from gauss.export.exported_function import DEFAULTS, ExportedFunction, exported_functions
+from gauss.export.formulas import Formulas, latex_document, to_sympy
+from gauss.export.jax_module import jax_source, to_jax
+from gauss.export.save import save_as
+
+__all__ = [
+    "CCode",
+    "DEFAULTS",
+    "ExportedFunction",
+    "Formulas",
+    "exported_functions",
+    "jax_source",
+    "latex_document",
+    "save_as",
+    "to_c",
+    "to_casadi",
+    "to_jax",
+    "to_sympy",
+]

@@ -1,0 +1,182 @@
+"""Functions of a system as traced graphs without calls, with names and shapes of their arguments and results.
+
+The mechanics is traced as for machine code of this process (:mod:`gauss.dynamics.state_functions`); the writers of C,
+CasADi, JAX and SymPy read the graph, and know no mechanics.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import prod
+
+import numpy as np
+
+from gauss.codegen import Expression, Function, Graph, write
+from gauss.dynamics import compile_scene
+from gauss.dynamics.acceleration_derivatives import LoadedMechanism, acceleration_derivatives
+from gauss.dynamics.inputs import input_loads
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.plan import EXPORTS
+from gauss.dynamics.rules import Question
+from gauss.dynamics.state_functions import TERMS, traced_function
+from gauss.errors import ArgumentError, SimulationError, did_you_mean, require
+from gauss.scene import Scene
+from gauss.system import System, refuse_changed
+
+DEFAULTS = "forward_dynamics", "inverse_dynamics", "mass_matrix", "bias_forces", "acceleration_derivatives"
+LOADED = {  # functions under loads and inputs: names and shapes of their results, digits or n_v
+    "forward_dynamics": {"acceleration": "v"},
+    "acceleration_derivatives": {"by_q": "vv", "by_v": "vv", "by_load": "vv"},
+}
+RESULTS = {  # names of the results of the other functions, "result" of one alone
+    "forward_kinematics": ("rotation", "position"),
+    "inverse_dynamics": ("load",),
+    "inverse_dynamics_derivatives": ("by_q", "by_v"),
+    "loop_constraints": ("residual", "jacobian", "bias"),
+}
+Shape = tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedFunction:
+    """Function of a state of a system, as a graph without calls.
+
+    Parameters
+    ----------
+    name : str
+        Name of the function, as "jacobian:hand".
+    function : Function
+        Graph; its inputs and outputs are those of ``inputs`` and ``outputs``, flattened in their order.
+    inputs, outputs : dict of str to tuple of int
+        Shapes of the arguments and of the results; () is a number.
+    """
+
+    name: str
+    function: Function
+    inputs: dict[str, Shape]
+    outputs: dict[str, Shape]
+
+    @property
+    def identifier(self) -> str:
+        """Name as an identifier of C and Python."""
+        return identifier(self.name)
+
+    def split(self, values: Sequence, shapes: dict[str, Shape]) -> dict[str, np.ndarray]:
+        """Entries of arguments or results by name, object arrays of their shapes."""
+        ends = np.cumsum([prod(shape) for shape in shapes.values()])[:-1]
+        parts = np.split(np.array([*values, None], dtype=object)[:-1], ends)
+        return {name: part.reshape(shape) for part, (name, shape) in zip(parts, shapes.items(), strict=True)}
+
+
+def exported_functions(system: System | Scene, names: Sequence[str] | str | None = None) -> list[ExportedFunction]:
+    """Functions of a system to be written in another language.
+
+    Parameters
+    ----------
+    system : System or Scene
+        The system.
+    names : sequence of str, optional
+        Names of :meth:`gauss.System.function`, "forward_dynamics" included: ``DEFAULTS`` when not given, with
+        "loop_constraints" where joints close loops.
+
+    Returns
+    -------
+    list of ExportedFunction
+        Each takes q, v, acceleration or load as it needs them, u if the scene has inputs on which it depends, and t. Loads
+        are those of the scene as they are now. They check no argument: quaternions are to be of unit length, and near
+        singular configurations results are as inaccurate as the configuration makes them.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such function.
+    SimulationError
+        If the scene has elements that no smooth function describes, by their names.
+    """
+    require(system, (System, Scene), "export")
+    system = compile_scene(system) if isinstance(system, Scene) else system
+    if names is None:
+        names = (*DEFAULTS, "loop_constraints") if system.has_closures else DEFAULTS
+    names = (names,) if isinstance(names, str) else tuple(names)
+    if not system.n_v:
+        raise SimulationError(f"scene {system.scene.name!r} cannot be exported: nothing in it can move.")
+    refuse_changed(system)
+    return [_loaded(system, name) if name in LOADED else _of_state(system, name) for name in names]
+
+
+def identifier(name: str) -> str:
+    """Name with underscores for all that is neither letter nor digit."""
+    found = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return f"_{found}" if not found or found[0].isdigit() else found
+
+
+def _of_state(system: System, name: str) -> ExportedFunction:
+    """Function of the table of terms."""
+    own = name.partition(":")[0] if isinstance(name, str) else ""
+    if own not in TERMS:
+        raise ArgumentError(f"export: no function {name!r} of a state. {did_you_mean(str(name), (*TERMS, *LOADED))}")
+    function, interface = traced_function(system, (name,))
+    kept = function.outputs[: -len(interface.limits)]
+    inputs: dict[str, Shape] = {one: (size,) for one, size in interface.vectors.items()}
+    inputs[interface.number] = ()
+    results = RESULTS.get(own, ("result",))
+    outputs = dict(zip(results, interface.shapes, strict=True))
+    return ExportedFunction(name, without_calls(Function(name, function.inputs, kept)), inputs, outputs)
+
+
+def _loaded(system: System, name: str) -> ExportedFunction:
+    """Function of the system under its loads and inputs."""
+    laws, given = Laws(system), tuple(system.scene.inputs)
+    EXPORTS.plan(Question(system, laws))
+    loads = [*laws.traced, *input_loads(system)]
+
+    def values(q, v, load, t):
+        for one in given:  # in the order of the scene, whether the result depends on them or not
+            t[0].graph.parameter(one)
+        if name == "acceleration_derivatives":
+            return acceleration_derivatives(system, loads, t[0], q, v, load)
+        return LoadedMechanism(system, loads, t[0], q, v, load).motion()[0]
+
+    found = write(values, system.n_q, system.n_v, system.n_v, 1, name=name)
+    state, (t, *u) = np.split(np.array(found.inputs, dtype=object), [-1 - len(given)])
+    inputs: dict[str, Shape] = {"q": (system.n_q,), "v": (system.n_v,), "load": (system.n_v,)}
+    inputs |= ({"u": (len(given),)} if given else {}) | {"t": ()}
+    shapes = {result: (system.n_v,) * len(letters) for result, letters in LOADED[name].items()}
+    return ExportedFunction(name, without_calls(Function(name, [*state, *u, t], found.outputs)), inputs, shapes)
+
+
+def without_calls(function: Function) -> Function:
+    """The same function with the operations of called functions in their places.
+
+    Raises
+    ------
+    SimulationError
+        If it calls a function that is machine code and has no graph.
+    """
+    if not any(node.op == "call" for node in function.nodes):
+        return function
+    graph = Graph()
+    inputs = [graph.symbol(symbol.value) for symbol in function.inputs]
+    return Function(function.name, inputs, _copied(graph, function, inputs))
+
+
+def _copied(graph: Graph, function: Function, given: list) -> list:
+    """Outputs of a function in another graph."""
+    if not isinstance(function, Function):
+        raise SimulationError(f"{function.name!r} cannot be exported: it is machine code without a graph.")
+    results: dict[int, list] = {}  # of calls
+    values = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
+    for node in function.nodes:
+        if node.op == "call":
+            results[node.index] = _copied(graph, node.value, _passed(node.operands, values, results))
+        elif node.op == "item":
+            values[node.index] = results[node.operands[0].index][node.value]
+        elif node.op != "symbol":
+            values[node.index] = graph.copy(node, [values[x.index] for x in node.operands])
+    return [values[x.index] if isinstance(x, Expression) else graph.constant(x) for x in function.outputs]
+
+
+def _passed(operands, values: dict, results: dict) -> list:
+    """Arguments of a call; the results of another call may stand for the first of them."""
+    parts = [results[x.index] if x.op == "call" else [values[x.index]] for x in operands]
+    return [entry for part in parts for entry in part]

@@ -1,0 +1,95 @@
+"""Files of functions of a system in other languages; one writer for each language."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from gauss.errors import ArgumentError, did_you_mean
+from gauss.export.exported_function import exported_functions, identifier
+from gauss.scene import Scene
+from gauss.system import System
+
+
+def save_as(
+    system: System | Scene, language: str, folder=".", names: Sequence[str] | None = None, name: str | None = None
+) -> list[Path]:
+    """Write functions of a system as code of another language.
+
+    Parameters
+    ----------
+    system : System or Scene
+        The system.
+    language : str
+        "c": a header and a source; "casadi": one file for each function, for ``casadi.Function.load``; "jax": a Python
+        module; "latex": a document with the equations of motion in symbols.
+    folder : str or Path
+        Folder of the files; it is made if it does not exist.
+    names : sequence of str, optional
+        Functions, see :func:`gauss.export.exported_functions`.
+    name : str, optional
+        Name of the files; that of the scene when not given.
+
+    Returns
+    -------
+    list of Path
+        Files that were written.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such language or function.
+    MissingPackageError
+        If the language needs a package that is not installed.
+    SimulationError
+        If the scene has elements that no smooth function describes, by their names.
+    """
+    if language not in WRITERS:
+        raise ArgumentError(f"export: no language {language!r}. {did_you_mean(str(language), WRITERS)}")
+    scene = system if isinstance(system, Scene) else system.scene
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    return WRITERS[language](system, folder, names, identifier(scene.name if name is None else name))
+
+
+def _save_c(system, folder: Path, names, name: str) -> list[Path]:
+    from gauss.export.c_files import to_c
+
+    return list(to_c(system, names, name).save(folder))
+
+
+def _save_casadi(system, folder: Path, names, name: str) -> list[Path]:
+    from gauss.export.casadi_function import casadi_function
+
+    paths = []
+    for exported in exported_functions(system, names):
+        paths.append(folder / f"{name}_{exported.identifier}.casadi")
+        casadi_function(exported).save(str(paths[-1]))
+    return paths
+
+
+def _save_text(make: Callable[..., str], suffix: str) -> Callable:
+    def save(system, folder: Path, names, name: str) -> list[Path]:
+        path = folder / f"{name}{suffix}"
+        path.write_text(make(system, names), encoding="utf-8")
+        return [path]
+
+    return save
+
+
+def _jax(system, names) -> str:
+    from gauss.export.jax_module import jax_source
+
+    return jax_source(system, names)
+
+
+def _latex(system, names) -> str:
+    from gauss.export.formulas import latex_document
+
+    return latex_document(system, names)
+
+
+WRITERS: dict[str, Callable] = {
+    "c": _save_c,
+    "casadi": _save_casadi,
+    "jax": _save_text(_jax, ".py"),
+    "latex": _save_text(_latex, ".tex"),
+}

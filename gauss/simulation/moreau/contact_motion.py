@@ -1,0 +1,169 @@
+"""A motion by kernels of pairs of shapes, advanced from time to time: by machine code, and by Python where that stops."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gauss.codegen.kernels.step_memory import CHANGES_ROOM
+from gauss.dynamics.contact.contact_changes import ModeChange
+from gauss.dynamics.contact.contact_stepper import contact_stepper, new_contact_stepper
+from gauss.errors import GaussError
+from gauss.simulation.moreau.contact_warnings import ParadoxWarnings
+from gauss.simulation.trajectory import Event
+from gauss.system import State, System
+
+CHANGES = {(0, 1): "closes", (0, 2): "closes", (1, 2): "slips", (2, 1): "holds"}  # kinds of events by the modes
+
+
+class ContactMotionState(NamedTuple):
+    """What a motion continues from.
+
+    Attributes
+    ----------
+    state : State
+        The state.
+    work : ndarray, shape (3,)
+        Work of drives and of forces on bodies, energy lost, since the start [J].
+    known : object
+        Forces of the last step.
+    modes : ndarray of int
+        Modes of the contacts and set-valued elements after it.
+    """
+
+    state: State
+    work: np.ndarray
+    known: Any
+    modes: np.ndarray
+
+
+class ContactMotion:
+    """State of a motion, its work, its events, and the record of its steps.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    held : bool
+        Whether the inputs of the scene are held in each step; otherwise they are zero.
+    own : bool
+        Whether the stepper is of this motion alone: of one that others may interrupt.
+
+    Attributes
+    ----------
+    stepper : FreeBodyStepper or MechanismStepper
+        Steps of the system.
+    steps, relaxed : int
+        Steps, and those of the convex relaxation of Coulomb's law.
+    largest : float
+        Largest error of the laws of contact, relative.
+    events : list of Event
+        Changes of the contact mode.
+    """
+
+    def __init__(self, system: System, held: bool = False, own: bool = False):
+        self.system, self.stepper = system, (new_contact_stepper if own else contact_stepper)(system, held)
+        self.row = 4 + system.n_q + system.n_v
+        self.paradoxes, self.warned = ParadoxWarnings(), set[bytes]()
+
+    def begin(self, start: State):
+        """Begin at a state."""
+        self.stepper.forget()
+        self.state, self.work, self.start = start, np.zeros(3), start.t
+        self.steps, self.relaxed, self.largest = 0, 0, 0.0
+        self.events: list[Event] = []
+
+    def hold(self, inputs: np.ndarray):
+        """Set the inputs of the next steps."""
+        self.stepper.inputs[:] = inputs
+
+    def advance(self, ends: np.ndarray) -> np.ndarray:
+        """Make steps to some times [s], and return (t, q, v, work) at these, (k, row).
+
+        Raises
+        ------
+        GaussError
+            If the first step fails. If another one fails, the rows end before it.
+        """
+        ends, done = np.ascontiguousarray(ends), 0  # machine code reads them
+        rows = np.empty((ends.size, self.row))
+        while done < ends.size:
+            count, goes_on = self._by_machine_code(ends[done:], rows[done:])
+            done += count
+            if done == ends.size or goes_on:
+                continue
+            try:
+                rows[done] = self._by_python(float(ends[done]))
+            except GaussError:
+                if not done:
+                    raise
+                return rows[:done]
+            done += 1
+        return rows
+
+    def _by_machine_code(self, ends: np.ndarray, rows: np.ndarray) -> tuple[int, bool]:
+        """Number of steps that machine code finishes, and whether it may continue."""
+        begin, loop = self.state, self.stepper.run(self.state, self.work, ends, rows)
+        if not loop.count:
+            return 0, False
+        self._note([begin.t, *ends], loop.changes)
+        self.steps, self.largest = self.steps + loop.count, max(self.largest, loop.largest)
+        if loop.doubtful:
+            before = begin if loop.count == 1 else self._state_of(rows[loop.count - 2])
+            self._examine(before, float(ends[loop.count - 1]))
+        last = rows[loop.count - 1]
+        self.state, self.work = self._state_of(last), last[-3:].copy()
+        return loop.count, loop.doubtful or len(loop.changes) >= CHANGES_ROOM
+
+    def _examine(self, before: State, t: float):
+        """Warn of Painlevé's paradoxes of a step, unless the same contacts were warned of."""
+        key = self.stepper.record.modes.tobytes()
+        if key not in self.warned:
+            found = self.stepper.examined(before, t - before.t)
+            self.paradoxes.warn(found, before.t)
+            self.warned |= {key} if found else set()
+
+    def _state_of(self, row: np.ndarray) -> State:
+        n_q = self.system.n_q
+        return State(float(row[0]), row[1 : 1 + n_q].copy(), row[1 + n_q : -3].copy())
+
+    def _by_python(self, t: float) -> np.ndarray:
+        begin, h = self.state, t - self.state.t
+        found = self.stepper.python_step(begin, h)
+        self.steps += 1
+        self.largest, self.relaxed = max(self.largest, found.error or 0.0), self.relaxed + (found.error is None)
+        self.paradoxes.warn(found.paradoxes, begin.t)
+        if found.modes is not None:
+            self._note([begin.t, t], self.stepper.record.update(found.modes))
+        self.state, self.work = self.stepper.projected(State(t, found.q, found.v)), self.work + h * found.power
+        return np.concatenate([[t], self.state.q, self.state.v, self.work])
+
+    def _note(self, times, changes: list[ModeChange]):
+        """Keep changes of the contact mode as events, each at the end of its step; those that begin closed are none."""
+        names, first = self.stepper.elements, self.stepper.first_set_valued
+        for change in changes:
+            hits = change.hit and not change.before
+            begins = not change.before and (change.element >= first or times[change.step] == self.start)
+            if hits or not begins:
+                kind = "impact" if hits else CHANGES.get((change.before, change.after), "opens")
+                t, lost = float(times[change.step + 1]), change.lost if hits else 0.0
+                self.events.append(Event(t, kind, (names[change.element],), lost))
+
+    def beside(self, begin: State, work: np.ndarray, t: float) -> tuple[State, np.ndarray]:
+        """State and work at a time after a shorter step from another state; the motion does not continue from there."""
+        now, events, counts = self.kept(), self.events, (self.steps, self.relaxed, self.largest)
+        self.state, self.work, self.events = begin, work, []
+        try:
+            self.advance(np.array([t]))
+            return self.state, self.work
+        finally:
+            self.take(now)
+            self.events, (self.steps, self.relaxed, self.largest) = events, counts
+
+    def kept(self) -> ContactMotionState:
+        """What the motion continues from."""
+        return ContactMotionState(self.state, self.work, self.stepper.known, self.stepper.record.kept())
+
+    def take(self, kept: ContactMotionState):
+        """Continue from what was kept."""
+        self.state, self.work, self.stepper.known, modes = kept
+        self.stepper.record.take(modes)

@@ -1,0 +1,119 @@
+"""Steps of a simulator by kernels of pairs of shapes: its point holds the mean accelerations of the last step."""
+
+import numpy as np
+
+from gauss.codegen.kernels import Control, LoopStatus
+from gauss.dynamics.conditions import smooth_question
+from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.mechanism_step import MechanismStepper
+from gauss.dynamics.contact.resolve_overlaps import resolved
+from gauss.dynamics.traced_system import Program
+from gauss.errors import GaussError, SimulationError
+from gauss.integrators import FixedStep, Point, Rates
+from gauss.simulation.moreau.contact_motion import ContactMotion
+from gauss.simulation.problem import Problem
+from gauss.system import State
+
+
+class PairKernelSteps:
+    """Steps of one motion, called as the machine code of a loop of fixed steps.
+
+    Parameters
+    ----------
+    problem : Problem
+        Initial value problem, from a start without penetration.
+
+    Attributes
+    ----------
+    control : Control
+        Record of the calls.
+    program : Program
+        Functions of the system without unilateral and set-valued elements; the method state are the normal forces of all
+        gaps, if an output of the scene depends on them.
+    """
+
+    kind = "pair kernels"
+
+    def __init__(self, problem: Problem):
+        assert isinstance(problem.method, FixedStep)
+        held = problem.held is not None
+        self.method, self.control = problem.method, Control()
+        self.motion, ask = ContactMotion(problem.system, held, own=True), smooth_question(problem.question)
+        self.motion.stepper.refuse_penetration(problem.start)
+        self.motion.stepper.check(problem.start)
+        measured = any(output.kind == "contact_force" for output in problem.system.scene.outputs.values())
+        self.gaps = self.motion.stepper.gap_count if measured else 0
+        self.program = Program(ask.system, ask.laws, memory=self.gaps, inputs=held)
+        self.layout, self.key = self.program.layout, (ask.laws.key, held, self.gaps)
+        self.inputs = np.zeros(len(self.layout.parameters))
+
+    @property
+    def entry(self) -> "PairKernelSteps":
+        """The steps themselves: they are called as machine code is."""
+        return self
+
+    def prepared(self) -> "PairKernelSteps":
+        """The steps themselves."""
+        return self
+
+    def arrays(self, point: np.ndarray, confirmed: np.ndarray, grid: np.ndarray, out: np.ndarray) -> tuple:
+        """Arguments of :meth:`call`."""
+        return point, grid
+
+    def separated(self, state: State) -> State:
+        """State whose shapes do not overlap."""
+        stepper = self.motion.stepper
+        if not isinstance(stepper, MechanismStepper):
+            stepper = contact_stepper(self.motion.system, True)
+        return resolved(stepper, state)
+
+    def begun(self, start: State) -> np.ndarray:
+        """Point (layout.size,) of a new motion."""
+        self.motion.begin(start)
+        rates = Rates(np.zeros(start.v.size), np.zeros(3))
+        return self.layout.pack(Point(start, np.zeros(3), rates, np.zeros(self.gaps)), self.inputs)
+
+    def call(self, point: np.ndarray, grid: np.ndarray, n: int):
+        """Make n steps from a point to the times of a grid."""
+        motion, layout, n_v = self.motion, self.layout, self.layout.n_v
+        row, end = point[: layout.row].copy(), 1 + layout.n_q
+        motion.state, motion.work = State(float(row[0]), row[1:end], row[end : end + n_v]), row[-3:]
+        motion.hold(point[layout.size - self.inputs.size :])
+        try:
+            rows = motion.advance(grid[:n, 0])
+        except GaussError:
+            self.control.status = float(LoopStatus.UNSOLVED)
+            return
+        self.control.status = float(LoopStatus.DONE if len(rows) == n else LoopStatus.UNSOLVED)
+        row = rows[-2] if len(rows) > 1 else row
+        last = rows[-1]
+        point[: layout.row] = last
+        mean = (last - row) / (last[0] - row[0])
+        point[layout.row : layout.row + n_v] = mean[-3 - n_v : -3]
+        point[layout.row + n_v : layout.row + n_v + 3] = mean[-3:]
+        if self.gaps:
+            point[layout.row + n_v + 3 :][: self.gaps] = motion.stepper.gap_forces()
+
+    def repeated(self, point: np.ndarray, t: float) -> np.ndarray:
+        """Point after a step to a time [s].
+
+        Raises
+        ------
+        SimulationError
+            If the motion cannot continue.
+        """
+        try:
+            self.motion.advance(np.array([t]))
+        except GaussError as error:
+            raise SimulationError(str(error)) from error
+        reached = point.copy()
+        reached[: self.layout.row] = [t, *self.motion.state.q, *self.motion.state.v, *self.motion.work]
+        return reached
+
+    def kept(self):
+        """What the motion continues from, beside its point."""
+        return self.motion.kept()
+
+    def take(self, kept):
+        """Continue from what was kept."""
+        self.motion.take(kept)
