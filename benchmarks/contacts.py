@@ -17,7 +17,12 @@ active-set kernels are compiled after some motions (tiered compilation); those t
 first motion of all, with the machine code that it makes, or finds on the disk.
 
 The last scenes have many contacts: a stack, dominoes, balls that fall into a bin. Their error is the deepest penetration at
-the end [m], of boxes into the floor and of balls into each other and the walls.
+the end [m], of boxes into the floor and of balls into each other and the walls. Rows of 30, 100 and 1000 balls show how a
+step grows with their number.
+
+Robots of Gymnasium follow, with stops and contacts, stepped for 1 s under random inputs that change every 5 steps. Their
+first motion includes reading the file. Their error is the deepest penetration at the end: the largest change of a coordinate
+that moves the shapes apart [m, rad] for gauss, the least distance of a contact for MuJoCo.
 
 Writes benchmarks/results/contacts.md and .csv.
 """
@@ -32,7 +37,7 @@ import mujoco
 import numpy as np
 
 import gauss
-from benchmarks import free_bodies
+from benchmarks import free_bodies, walkers
 from benchmarks.command import command, load_at_the_end
 from gauss.bench.contest import Competitor, Contest, measure, repeated
 from gauss.bench.machine import header
@@ -179,7 +184,18 @@ def crowded() -> list[list[Way]]:
         many("10 dominoes", free_bodies.dominoes(10), 0.6, lambda q: free_bodies.box_depth(q, free_bodies.TILE)),
         many("30 balls in a bin", free_bodies.bin_of_balls(30), 1.0, lambda q: free_bodies.ball_depth(q, free_bodies.WALL)),
         many("100 balls in a bin", free_bodies.bin_of_balls(100, wall=wide), 0.6, lambda q: free_bodies.ball_depth(q, wide)),
+        many("1000 balls in a bin", free_bodies.bin_of_balls(1000, wall=0.6), 0.3, lambda q: free_bodies.ball_depth(q, 0.6)),
     ]
+
+
+def robots() -> list[list[Way]]:
+    """Walking robots under random inputs."""
+    steps, found = walkers.ACTIONS * walkers.HOLD, []
+    for name, file in walkers.models().items():
+        one, other = walkers.ours(file), walkers.theirs(file)
+        ours_, theirs_ = f"gauss.Simulator, {walkers.STEP:g} s", f"mujoco.mj_step, {walkers.STEP:g} s"
+        found.append([Way(name, ours_, *one, steps, warm=1), Way(name, theirs_, *other, steps)])
+    return found
 
 
 def evaluations(corners: int) -> list[Way]:
@@ -223,7 +239,7 @@ def evaluations(corners: int) -> list[Way]:
 def rows(rounds: int) -> list[dict]:
     """Rows of the table."""
     found = []
-    for power_flow in (block(), box(4), box(8), cradle(), evaluations(4), evaluations(8), *crowded()):
+    for power_flow in (block(), box(4), box(8), cradle(), evaluations(4), evaluations(8), *crowded(), *robots()):
         errors, first = {}, {}
         for way in power_flow:
             began = time.process_time()

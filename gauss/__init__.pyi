@@ -14,6 +14,9 @@ from gauss import (
     errors as errors,
 )
 from gauss import (
+    export as export,
+)
+from gauss import (
     integrators as integrators,
 )
 from gauss import (
@@ -65,7 +68,7 @@ from gauss.analysis.recommendation import advise
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
-from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes
+from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes, resolve_overlaps
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import GaussError
@@ -137,6 +140,7 @@ __all__ = [
     "load_sweep",
     "mobility",
     "paradoxes",
+    "resolve_overlaps",
     "prepare",
     "reactions",
     "rollout",

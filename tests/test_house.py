@@ -195,3 +195,14 @@ def test_public_names_have_pages(package):
 def test_tests_stand_in_the_rooms_of_gauss():
     folders = {path.parent.name for path in TESTS.glob("*/__init__.py")}
     assert folders == {*PACKAGES, "support", "validation"}
+
+
+def test_the_table_of_rooms_is_whole():
+    """Each room has its row, and each file that a page names is there."""
+    text = (ROOT.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rooms = set(
+        chain.from_iterable(re.findall(r"`(\w+)`", line.split("|")[1]) for line in text.splitlines() if line[:3] == "| `")
+    )
+    files = re.findall(r"`([\w/]+\.pyi?)`", text)
+    assert set(PACKAGES) <= rooms
+    assert files and [name for name in files if not any(ROOT.glob(f"**/{name}"))] == []

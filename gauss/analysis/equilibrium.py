@@ -141,7 +141,11 @@ def equilibria(
 
 def _compiled(system: System | Scene, name: str) -> System:
     require(system, (System, Scene), name)
-    return compile_scene(system) if isinstance(system, Scene) else system
+    system = compile_scene(system) if isinstance(system, Scene) else system
+    if system.scene.states:
+        names = ", ".join(map(repr, system.scene.states))
+        raise SimulationError(f"{name}: the states {names} have values at rest, too; simulate until nothing moves.")
+    return system
 
 
 def _random(system: System, base: State, rng: np.random.Generator, held: list[int], keep) -> State:

@@ -159,8 +159,8 @@ def linearise(
         Inputs of the scene, or coordinates along which generalised forces act [N m, N]; all inputs of the scene when not
         given.
     outputs : sequence of str, optional
-        Outputs of the scene, or coordinates, or their rates as in "pin rate"; when not given, all outputs of the scene, or
-        all independent coordinates where it has none.
+        Outputs of the scene, or coordinates, or their rates as in "pin rate", or states of one's own; when not given,
+        all outputs of the scene, or all independent coordinates where it has none.
     independent : sequence of str, optional
         Joints or rates to describe the system with, one for each freedom; well-conditioned ones when not given.
     load : array_like, shape (n_v,), optional
@@ -210,12 +210,26 @@ def linearise(
     along = np.concatenate([along_q, np.concatenate([D, rate], axis=1), np.concatenate([by_q, by_v], axis=1)])
     states = (*(names[p] for p in places), *(f"{names[p]} rate" for p in free))
     own, unit = system.accelerations(state, load), system.scale.rates / system.scale.time
+    C, places, A, B, N, states = _without_integrals(system, rows @ along, places, A, B, N, states)
     is_equilibrium = bool(
         (np.abs(own) <= STEADY * unit).all() and (np.abs(state.v[places]) <= STEADY * system.scale.rates[places]).all()
     )
-    return LinearModel(
-        A, B, rows @ along, direct @ response, states, input_names, output_names, system, state, N, is_equilibrium
+    return LinearModel(A, B, C, direct @ response, states, input_names, output_names, system, state, N, is_equilibrium)
+
+
+def _without_integrals(system: System, C, places, A, B, N, states):
+    """The model without the integrals over time of states of one's own on which nothing depends; states have their names."""
+    own = system.scene.states
+    used = A.any(axis=0) | C.any(axis=0)
+    integrals = np.array(
+        [system.coordinates[place] in own for place in places] + [False] * (len(A) - len(places)), dtype=bool
     )
+    kept = used | ~integrals
+    moved = kept[: len(places)]
+    names = {f"{name} rate": name for name in own} | {name: f"integral of {name}" for name in own}
+    named = tuple(names.get(name, name) for name in np.array([*states, None], dtype=object)[:-1][kept])
+    left = [place for place, is_kept in zip(places, moved, strict=True) if is_kept]
+    return C[:, kept], left, A[np.ix_(kept, kept)], B[kept], N[:, moved], named
 
 
 def _described_by(system: System, N: np.ndarray, independent) -> np.ndarray:
@@ -248,29 +262,36 @@ def _input_slope(system: System, state: State, place: int) -> np.ndarray:
     unit = np.eye(len(inputs.low))[place]
     if inputs.is_plain:
         return unit @ np.eye(system.n_v)[inputs.columns]
-    slope = write(lambda u: forward(inputs.forces(u, state), u, unit), unit.size, name="input")
-    return Kernel(slope, batch=False)(np.zeros(unit.size))
+    slopes = lambda t, q, v, u: forward(inputs.forces(u, State(t[0], q, v)), u, unit)  # noqa: E731
+    slope = write(slopes, 1, system.n_q, system.n_v, unit.size, name="input")
+    return Kernel(slope, batch=False)(np.concatenate([[state.t], state.q, state.v, np.zeros(unit.size)]))
 
 
 def _output_rows(system: System, state: State, outputs, places, load):
     """∂y/∂(ξ, v, q̈) (p, 3 n_v), its part of q̈, and the names."""
     known, n = system.scene.outputs, system.n_v
-    names = outputs if outputs is not None else (tuple(known) or tuple(system.coordinates[p] for p in places))
+    names = _default_outputs(system, places) if outputs is None else outputs
     names = (names,) if isinstance(names, str) else tuple(names)
     own = system.accelerations(state, load)
-    rows, labels = [], []
+    rows, labels = [], list[str]()
     for name in names:
         if name in known:
             found = _slopes_of(system, state, own, known[name])
             labels += [name] if len(found) == 1 else [f"{name}[{i}]" for i in range(len(found))]
             rows.append(found)
             continue
-        coordinate, is_rate = (name.removesuffix(" rate"), name.endswith(" rate"))
+        coordinate, is_rate = (name.removesuffix(" rate"), name.endswith(" rate") or name in system.scene.states)
         column = _column(system, coordinate, "outputs", (*known, *(f"{one} rate" for one in system.coordinates)))
         rows.append(np.eye(3 * n)[[column + n * is_rate]])
         labels.append(name)
     whole = np.concatenate(rows) if rows else np.zeros((0, 3 * n))
     return whole, whole[:, 2 * n :], tuple(labels)
+
+
+def _default_outputs(system: System, places) -> tuple[str, ...]:
+    """Outputs of the scene, or independent coordinates where it has none."""
+    coordinates = (system.coordinates[place] for place in places)
+    return tuple(system.scene.outputs) or tuple(name for name in coordinates if name not in system.scene.states)
 
 
 def _slopes_of(system: System, state: State, own: np.ndarray, output) -> np.ndarray:

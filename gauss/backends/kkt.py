@@ -10,6 +10,7 @@ from scipy.linalg import LinAlgWarning, lapack, lu_factor, lu_solve
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Answer, failure
+from gauss.backends.svd import equilibrate
 
 SINGULAR_CONDITION = (
     1e-14  # reciprocal condition of the equilibrated matrix below which rows are redundant or motion is free
@@ -44,12 +45,3 @@ class KKT:
             )
         x = scale * lu_solve(factors, right)
         return Answer(x[:n], x[n : n + p], x[n + p :], np.zeros(0))
-
-
-def equilibrate(K: np.ndarray, sweeps: int = 3) -> np.ndarray:
-    """Symmetric scaling that brings the largest entry of each row near 1 (Ruiz, RAL-TR-2001-034)."""
-    scale = np.ones(len(K))
-    for _ in range(sweeps):
-        largest = np.abs(scale[:, None] * K * scale).max(axis=1)
-        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
-    return scale

@@ -9,8 +9,8 @@ from gauss.backends.backend import BACKENDS, Backend
 from gauss.backends.compulsion import Compulsion
 from gauss.errors import ArgumentError, BackendError, did_you_mean
 
-# QP solvers that are called directly and keep their workspace; the others go through qpsolvers.
-DIRECT = {"osqp": "OSQP", "clarabel": "Clarabel", "piqp": "PIQP"}
+# QP solvers that are called directly; the others go through qpsolvers, which imports all of them.
+DIRECT = {"osqp": "OSQP", "clarabel": "Clarabel", "piqp": "PIQP", "daqp": "DAQP"}
 
 
 def available() -> list[str]:
@@ -21,6 +21,17 @@ def available() -> list[str]:
 def installed_solvers() -> list[str]:
     """Names of the installed QP solvers."""
     return _foreign().installed()
+
+
+def is_installed(solver: str) -> bool:
+    """Whether a QP solver is installed; one that is called directly is imported without qpsolvers."""
+    if solver not in DIRECT:
+        return solver in installed_solvers()
+    try:
+        import_module(solver)
+    except ImportError:
+        return False
+    return True
 
 
 def choose(compulsion: Compulsion) -> str:
@@ -100,7 +111,7 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
         return getattr(import_module(f"gauss.backends.{backend}"), BACKENDS[backend])()
     programmed = import_module("gauss.backends.programme").Programmed
     solver = backend.removeprefix("qpsolvers:")
-    if solver not in installed_solvers():
+    if not (is_installed(solver) if backend in DIRECT else solver in installed_solvers()):
         raise BackendError(
             f"no backend {backend!r}. {did_you_mean(backend, available())} QP solvers come with "
             "pip install 'qpsolvers[NAME]'."
@@ -108,7 +119,7 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
     settings = own_settings(solver) | settings
     if backend in DIRECT:
         method = getattr(import_module(f"gauss.backends.{backend}_"), DIRECT[backend])
-        return programmed(method(**(KEPT[backend] | settings)), form)
+        return programmed(method(**(KEPT.get(backend, {}) | settings)), form)
     return programmed(_foreign().QPSolvers(solver, **settings), form)
 
 

@@ -6,7 +6,9 @@ hard to tell; other QP solvers where an active-set method stalls. Answers with i
 their active rows are taken as equalities, and the correction that the certificate finds is taken off.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from gauss.backends.answering import certified
 from gauss.backends.backend import Backend
 from gauss.backends.certificate import TOLERANCE, certify, conclude
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.registry import choose, installed_solvers, make, ready
+from gauss.backends.registry import choose, is_installed, make, ready
 from gauss.backends.solution import Solution
 from gauss.errors import judged_later, require
 
@@ -75,30 +77,27 @@ def automatic(compulsion: Compulsion, tolerance: float, settings: dict) -> Solut
     settings : dict
         ``form`` and settings of the method that :func:`gauss.backends.choose` names.
     """
-    names, failed, solutions = _candidates(compulsion), list[str](), list[Solution]()
-    for name in names:
+    failed, solutions = dict[str, str](), list[Solution]()
+    for name in _candidates(compulsion):
         method = make(name, **(settings if name == choose(compulsion) else {}))
         solution = certified(compulsion, method, tolerance)
         if compulsion.h.size:
             solution = refined(solution, tolerance)
         if solution.status.certified:
-            rescued = "; ".join(failed)
+            rescued = "; ".join(f"{other}: {reason}" for other, reason in failed.items())
             return replace(solution, status=replace(solution.status, rescued=rescued)) if rescued else solution
-        failed.append(f"{name}: {solution.status.reason}")
+        failed[name] = solution.status.reason
         solutions.append(solution)
-    first, others = solutions[0], f"; nor by {', '.join(names[1:])}" if names[1:] else ""
+    first, others = solutions[0], f"; nor by {', '.join([*failed][1:])}" if len(failed) > 1 else ""
     reason = f"{first.status.reason.removesuffix('.')}{others}"
     return replace(first, status=replace(first.status, reason=reason))
 
 
-def _candidates(compulsion: Compulsion) -> tuple[str, ...]:
+def _candidates(compulsion: Compulsion) -> Iterator[str]:
     """Names of the methods to try, in order; one alone where numbers are not finite: no other could do better."""
-    names: tuple[str, ...] = EQUALITIES
-    if compulsion.h.size:
-        present = installed_solvers()
-        names = tuple(name for name in INEQUALITIES if name in present)
     finite = all(np.isfinite(part).all() for part in (compulsion.impressed, compulsion.D, compulsion.P, compulsion.h))
-    return names if finite else names[:1]
+    names = filter(is_installed, INEQUALITIES) if compulsion.h.size else iter(EQUALITIES)
+    return names if finite else islice(names, 1)
 
 
 def refined(solution: Solution, tolerance: float) -> Solution:

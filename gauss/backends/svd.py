@@ -9,7 +9,6 @@ tells undetermined multipliers from undetermined accelerations.
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.kkt import equilibrate
 from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.rank import KKT_RANK, numerical_rank
 from gauss.backends.recursion import Recursion
@@ -85,3 +84,12 @@ class SVD:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         return Recursion().solve_with(FullFactor(compulsion))[0]
+
+
+def equilibrate(K: np.ndarray, sweeps: int = 3) -> np.ndarray:
+    """Symmetric scaling that brings the largest entry of each row near 1 (Ruiz, RAL-TR-2001-034)."""
+    scale = np.ones(len(K))
+    for _ in range(sweeps):
+        largest = np.abs(scale[:, None] * K * scale).max(axis=1)
+        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
+    return scale

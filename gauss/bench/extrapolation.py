@@ -1,4 +1,4 @@
-"""Richardson extrapolation of what steps of one length find, x(h) = x₀ + c₁ h + c₂ h² + …, to h = 0.
+"""Richardson extrapolation of the results of steps of one length, x(h) = x₀ + c₁ h + c₂ h² + …, to h = 0.
 
 Time stepping is of order 1 where sliding begins or ends within a step, and the error then depends on where in the step
 this is: halved steps may meet the same place again and again, agree to all digits, and be off together. So numbers of steps
@@ -16,7 +16,7 @@ QUANTILE = 5.0  # of Student's t: 99.9 % with the eleven degrees of freedom left
 
 
 class Extrapolated(NamedTuple):
-    """Values at h = 0 (n,), and how far any of them may be off."""
+    """Values at h = 0 (n,), and a bound of their errors."""
 
     values: np.ndarray
     uncertainty: float
@@ -28,7 +28,7 @@ def divisions(finest: int) -> list[int]:
 
 
 def extrapolated(values: Callable[[float], np.ndarray], duration: float, finest: int) -> Extrapolated:
-    """Extrapolate what steps find to steps of no length.
+    """Extrapolate results of steps to h = 0.
 
     Parameters
     ----------

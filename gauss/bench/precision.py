@@ -72,7 +72,7 @@ class Attempt:
 
     @property
     def failed(self) -> bool:
-        """Whether there is no result, or one that is beside the point."""
+        """Whether there is no result, or none of use."""
         return bool(self.reason)
 
 

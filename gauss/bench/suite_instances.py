@@ -1,4 +1,4 @@
-"""Classes of the suite as the comparison takes them: programmes, verdicts, and where warm starts begin."""
+"""Classes of the suite in the form of the comparison: programmes, verdicts, and starts of warm starts."""
 
 from collections.abc import Iterator
 from dataclasses import replace

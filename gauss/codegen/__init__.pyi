@@ -7,7 +7,7 @@ from gauss.codegen.device_module import DeviceModule, vector_width
 from gauss.codegen.disk_cache import from_disk, is_noted, note
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Entry, Expression, Scalar, as_number, graph_of, reachable
-from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
+from gauss.codegen.fastcall import EntryCode, entry_code, fastcall, made_from
 from gauss.codegen.function import Function, count, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.graph import Graph
@@ -19,6 +19,7 @@ from gauss.codegen.ldlt import LDLT, least_degree
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.optimiser import one_tier
 from gauss.codegen.outlining import fresh_symbols, outlined
+from gauss.codegen.python_callback import PythonCallback, Receiver, callbacks_are_available
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
 from gauss.codegen.schedule import schedule
@@ -52,7 +53,9 @@ __all__ = [
     "Lanes",
     "NativeFunction",
     "POINTER",
+    "PythonCallback",
     "PythonWrapper",
+    "Receiver",
     "ROW",
     "Scalar",
     "Series",
@@ -60,6 +63,7 @@ __all__ = [
     "as_number",
     "batch_code",
     "branches",
+    "callbacks_are_available",
     "compile_notice",
     "constant_array",
     "content_digest",
@@ -72,6 +76,7 @@ __all__ = [
     "entered",
     "external",
     "fastcall",
+    "made_from",
     "forward",
     "fresh_symbols",
     "from_disk",

@@ -52,7 +52,24 @@ class _FastcallOwner(NamedTuple):
     entry: "_PythonEntry"
 
     def __reduce__(self):
-        return self.fallback.__reduce__()
+        make, arguments = self.fallback.__reduce__()
+        return _RemadeOwner, (make, arguments)
+
+
+class _RemadeOwner:
+    """Owner of a built-in function that was made again: pickle asks it for the function by its name."""
+
+    def __init__(self, make: Callable, arguments: tuple):
+        function = make(*arguments)
+        setattr(self, function.__name__, function)
+
+
+def made_from(function, make: Callable, *arguments):
+    """The same compiled function, which pickle sends as what makes it: ``make(*arguments)`` in the other process."""
+    wrapper = getattr(getattr(function, "__self__", None), "fallback", function)
+    if isinstance(wrapper, PythonWrapper):
+        wrapper.maker = make, arguments
+    return function
 
 
 class EntryCode(NamedTuple):

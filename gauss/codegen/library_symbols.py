@@ -1,4 +1,4 @@
-"""Routines of SciPy's LAPACK that machine code calls by name.
+"""Routines of SciPy's LAPACK, and Python itself, that machine code calls by name.
 
 Their addresses are those of this process: they are registered whenever object code that calls them is linked, made here or
 read from the disk.
@@ -11,6 +11,7 @@ from functools import cache
 import llvmlite.binding as llvm
 
 PREFIX = "gauss_lapack_"
+CALLBACK = b"gauss_python_callback"  # see :mod:`gauss.codegen.python_callback`
 SYMBOL = re.compile(rb"gauss_lapack_([a-z0-9]+)")
 
 
@@ -22,6 +23,10 @@ def symbol(routine: str) -> str:
 def register_symbols_of(objects: list[bytes]):
     """Register the addresses of the routines that object code calls with LLVM."""
     for content in objects:
+        if CALLBACK in content:
+            from gauss.codegen.python_callback import register_callback  # few modules need it
+
+            register_callback()
         for routine in set(SYMBOL.findall(content)):
             _register(routine.decode())
 

@@ -80,6 +80,11 @@ class PythonWrapper:
     batch : callable, optional
         () → function (count, inputs, outputs) of rows of arrays, as :class:`gauss.codegen.batch_code.BatchEntry`; called at
         the first batch. Without it, batches are refused.
+
+    Attributes
+    ----------
+    maker : tuple of callable and tuple, optional
+        What another process makes the function from: a function that pickle takes, and its arguments.
     """
 
     def __init__(
@@ -96,6 +101,7 @@ class PythonWrapper:
         self.n_out, self.shapes = outputs - len(interface.limits), interface.result_shapes(outputs)
         self.batch = batch
         self._rows: Callable | None = None
+        self.maker: tuple[Callable, tuple] | None = None
         self.__name__, self.__doc__, self.__signature__ = name, doc, interface.signature()
 
     def __call__(self, *args, **kwargs):
@@ -202,6 +208,8 @@ class PythonWrapper:
         return out
 
     def __reduce__(self):
+        if self.maker is not None:
+            return self.maker
         raise TypeError(
             f"{self.__name__!r} is machine code of this process and cannot be pickled: "
             "send what it was made from, and make it again there."

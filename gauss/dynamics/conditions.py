@@ -5,6 +5,7 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 
 from collections.abc import Callable
 
+from gauss.codegen import callbacks_are_available
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
@@ -22,7 +23,9 @@ MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per b
 WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
-MOST_CONTACT_OPERATIONS = 3_000  # of the gap functions up to which it is: more take longer to compile than kernels of pairs
+# Operations of the gap functions up to which a step is compiled with them: more take longer to compile than kernels of pairs
+# of shapes, whose steps are as fast.
+MOST_CONTACT_OPERATIONS = 1_000
 CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordinates of the scene, measured
     ("HalfSpace", "Sphere"): 122,
     ("Sphere", "Sphere"): 661,
@@ -96,6 +99,16 @@ def compilable(ask: Question) -> list[str]:
 def traced_laws(ask: Question) -> list[str]:
     """No law is an opaque callback."""
     return [f"the law of {name!r} cannot be traced ({why})" for name, why in ask.laws.reasons.items()]
+
+
+def has_opaque_laws(ask: Question) -> bool:
+    """Whether a law is an opaque callback."""
+    return bool(ask.laws.called)
+
+
+def callbacks(ask: Question) -> list[str]:
+    """All laws are traced, or machine code can call Python here."""
+    return [] if callbacks_are_available() else traced_laws(ask)
 
 
 def few_bodies(ask: Question) -> list[str]:

@@ -15,6 +15,7 @@ COSTS = {  # s, and s per body, of an evaluation by a driver and a kind of dynam
     ("compiled loop", "compiled"): (2e-7, 1e-7),
     ("compiled loop", "tree recursion"): (2e-7, 1e-7),
     ("compiled loop", "call graph"): (1e-6, 1e-7),
+    ("compiled loop", "callbacks"): (1e-5, 1e-7),
     ("Python loop", "compiled"): (1e-4, 4e-6),
     ("Python loop", "tree recursion"): (1e-4, 5e-6),
     ("Python loop", "call graph"): (1e-4, 5e-7),

@@ -8,8 +8,9 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from gauss.codegen import Function, write
+from gauss.codegen import Function, PythonCallback, write
 from gauss.codegen.kernels import RowCode
+from gauss.dynamics.called_program import called_loads
 from gauss.dynamics.energies import energy_sample, least_magnitude, stored_energies
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.load_forces import generalised_forces
@@ -38,6 +39,11 @@ class KernelProgram(Program):
             return generalised_forces(motion, applied), [applied.driven, applied.loaded, applied.dissipated]
 
         return write(forces, 1, self.system.n_q, self.system.n_v, name="forces") if self.loads else None
+
+    @cached_property
+    def _called_loads(self) -> PythonCallback | None:
+        """The same of the loads with opaque laws, which Python evaluates; None without them."""
+        return called_loads(self.system) if self.laws.called else None
 
     @cached_property
     def _stored_energy(self) -> Function:
@@ -81,11 +87,17 @@ class KernelProgram(Program):
 
     def put_load_forces(self, code: RowCode, state, target):
         """Write generalised forces and power of the loads at a state (t, q, v)."""
-        if self._load_forces is not None:
-            code.call(self._load_forces, state, target)
+        size, parts = self.system.n_v + 3, [part for part in (self._load_forces, self._called_loads) if part is not None]
+        if not parts:
+            for k in code.each(size):
+                code.put(target, k, code.motions.constant(0.0))
             return
-        for k in code.each(self.system.n_v + 3):
-            code.put(target, k, code.motions.constant(0.0))
+        code.call(parts[0], state, target)
+        for part in parts[1:]:
+            more = code.room(size)
+            code.call(part, state, more)
+            for k in code.each(size):
+                code.put(target, k, code.b.fadd(code.number(target, k), code.number(more, k)))
 
     def put_ground(self, code: RowCode, target):
         """Write the acceleration of the ground."""

@@ -3,6 +3,7 @@
 R_c = R_p R_parent R(q) R_childᵀ, ω_c = ω_p + E_ω q̇, and ẋ_c = ẋ_p + ω_p × s + E_v q̇ − ω_c × r at the joint point P.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +110,7 @@ class Kinematics(View):
     def of_bodies(cls, system: System, state: State, R, x, W, u) -> "Kinematics":
         """Given poses and velocities of the bodies, without joints."""
         found = cls(system, state)
-        found._take(_Poses(state, [*R, AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints)))
+        found._take(_of_bodies(system, state, R, x, W, u))
         return found
 
     def _take(self, poses: _Poses):
@@ -120,6 +121,34 @@ class Kinematics(View):
         """Return v (6n,): ω in principal axes, velocity of the centre of mass in world, body by body."""
         n = self.system.structure.n_bodies
         return np.concatenate([part for i in range(n) for part in (self.R[i].T @ self.W[i], self.u[i])])
+
+
+class KinematicsOnAccess(Kinematics):
+    """Poses and velocities of all bodies by a function, called on first access; without joints.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    state : State
+        The state.
+    poses : callable
+        () → rotations (n, 3, 3), centres of mass, angular velocities and velocities (n, 3) of the bodies.
+    """
+
+    def __init__(self, system: System, state: State, poses: Callable[[], tuple[np.ndarray, ...]]):
+        self.system, self.state, self._bodies = system, state, poses
+
+    def __getattr__(self, name: str):
+        if name not in FOUND:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        self._take(_of_bodies(self.system, self.state, *self._bodies()))
+        return self.__dict__[name]
+
+
+def _of_bodies(system: System, state: State, R, x, W, u) -> _Poses:
+    """Poses and velocities of the bodies, and those of the ground; without joints."""
+    return _Poses(state, [*R, AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints))
 
 
 def kinematics(system: System, state: State) -> Kinematics:

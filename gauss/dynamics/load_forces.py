@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.inverse_dynamics_residual import along_rates
-from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.kinematics import Kinematics, KinematicsOnAccess, kinematics
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.store import cached_on_disk
@@ -82,11 +82,14 @@ class LoadForces:
         return Q, power
 
     def _placed(self, state: State, inputs: np.ndarray) -> Kinematics:
-        """Kinematics with poses by machine code."""
-        places = self.system.structure.n_bodies
-        R, x, W, u = np.split(self._poses(inputs), np.cumsum([9 * places, 3 * places, 3 * places]))
-        vectors = (part.reshape(places, 3) for part in (x, W, u))
-        return Kinematics.of_bodies(self.system, state, R.reshape(places, 3, 3), *vectors)
+        """Kinematics with poses by machine code, at the first access: many laws need coordinates and rates only."""
+
+        def poses() -> tuple[np.ndarray, ...]:
+            places = self.system.structure.n_bodies
+            R, x, W, u = np.split(self._poses(inputs), np.cumsum([9 * places, 3 * places, 3 * places]))
+            return R.reshape(places, 3, 3), *(part.reshape(places, 3) for part in (x, W, u))
+
+        return KinematicsOnAccess(self.system, state, poses)
 
     @cached_property
     def _poses(self) -> Kernel:

@@ -15,9 +15,10 @@ library             compiled        integrators of other libraries
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
 compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
-Python loop         call graph      many kinematic loops with opaque laws
-Python loop         tree recursion  large trees with opaque laws
-Python loop         compiled        opaque laws, and systems too large for a compiled step
+compiled loop       callbacks       opaque laws, called by machine code, by explicit integrators
+Python loop         call graph      many kinematic loops, by implicit integrators
+Python loop         tree recursion  large trees, by implicit integrators
+Python loop         compiled        opaque laws, and systems too large for a compiled step, by implicit integrators
 library             certified       all other scenes, by integrators of other libraries
 samples             compiled        inputs held between samples of a control law, where no rule of machine code applies
 Python loop         certified       all other scenes
@@ -31,6 +32,7 @@ from collections.abc import Callable, Hashable
 
 from gauss.codegen import IdentityKey, content_key
 from gauss.dynamics.conditions import (
+    callbacks,
     compilable,
     contacts_alone,
     explicit,
@@ -38,6 +40,7 @@ from gauss.dynamics.conditions import (
     few_contact_operations,
     few_loops,
     has_contacts,
+    has_opaque_laws,
     large_loops,
     large_tree,
     named,
@@ -117,7 +120,8 @@ _STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_probl
 _PAIR_KERNELS = own_backend, smooth(traced_laws), takes_pair_kernels
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
-_KERNEL_LOOP = *_CODE, traced_laws, explicit, no_held_inputs
+_KERNEL_LOOP = *_CODE, callbacks, explicit, no_held_inputs
+_CALLING_LOOP = *_KERNEL_LOOP, written_out
 
 MOTIONS = RuleTable(
     (
@@ -132,6 +136,7 @@ MOTIONS = RuleTable(
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _LOOP),
         Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
         Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _KERNEL_LOOP),
+        Rule("compiled loop", "callbacks", "certified", _both(_ALONE, has_opaque_laws), _CALLING_LOOP),
         Rule("samples", "compiled", "certified", _both(_held, _by_accelerations)),
         Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),

@@ -47,9 +47,9 @@ class Plan:
         degrees of freedom; "state" for a single state.
     dynamics : str
         Where accelerations come from: "compiled" (straight-line code of the scene), "call graph" (a kernel for each kind of
-        link and loop), "tree recursion" (a kernel for each kind of link), "unilateral" (compiled, with an active set of
-        contacts), "pair kernels" (kernels of pairs of shapes, shared by all scenes), "certified" (a QP backend solves every
-        state, with a certificate), or "none".
+        link and loop), "tree recursion" (a kernel for each kind of link), "callbacks" (compiled, calling opaque laws),
+        "unilateral" (compiled, with an active set of contacts), "pair kernels" (kernels of pairs of shapes, shared by all
+        scenes), "certified" (a QP backend solves every state, with a certificate), or "none".
     stabilisation : str
         Constraint stabilisation.
     fallback : str

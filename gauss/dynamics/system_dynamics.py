@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
-from gauss.codegen import count, write
+from gauss.codegen import count, made_from, write
 from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.consistent_states import consistent
 from gauss.dynamics.evaluation_cost import evaluation_cost, slowdown
@@ -70,7 +70,7 @@ class SystemDynamics(Store):
         """Compiled function (q, v, load, out=None, t=0.0) → q̈."""
         from gauss.dynamics.accelerations import forward_dynamics
 
-        return forward_dynamics(system)
+        return made_from(forward_dynamics(system), getattr, system, "forward_dynamics")
 
     def function(self, system: System, names, reference: str, independent, device=None) -> Callable:
         """Compiled function of a state, or of several at once."""
@@ -79,7 +79,8 @@ class SystemDynamics(Store):
 
         if names == ("forward_dynamics",):
             return self.forward_dynamics(system) if device is None else forward_dynamics_on_device(system, device)
-        return state_function(system, names, reference, independent, device)
+        found = state_function(system, names, reference, independent, device)
+        return made_from(found, _function_again, system, names, reference, independent) if device is None else found
 
     def evaluate(self, system: System, names, given: dict, t, reference: str, independent) -> dict:
         """Results of several functions of a state, by their names, for arguments by their names."""
@@ -111,3 +112,8 @@ class SystemDynamics(Store):
         from gauss.dynamics.mobility import mobility
 
         return mobility(system)
+
+
+def _function_again(system: System, names: tuple[str, ...], reference: str, independent) -> Callable:
+    """Compiled function of a state, in another process."""
+    return system.function(*names, reference=reference, independent=independent)

@@ -34,6 +34,7 @@ OPERATIONS = {
     "fnma": "GAUSS_FMA(-{}, {}, {})",
 }
 CONDITIONS = ("less", "less_equal")
+LETTERS = {"sin": "s", "cos": "c"}  # of the arrays of sines and cosines
 
 
 def c_number(value: float) -> str:
@@ -112,26 +113,25 @@ class CBody:
 
     def statements(self) -> Iterator[str]:
         """Statements in order."""
-        turned = [x for x in self.schedule.nodes if x.op in ("sin", "cos")]
-        angles = {x.operands[0].index: x.operands[0] for x in turned}
-        inputs = [x for index, x in angles.items() if x.op == "symbol"]
-        yield from self._sines(inputs)
-        known = {x.index for x in inputs}
+        turned = {x.operands[0].index: x.operands[0] for x in self.schedule.nodes if x.op in LETTERS}
+        yield from self._sines([angle for angle in turned.values() if angle.op == "symbol"])
         for node in self.schedule.nodes:
-            if node.op in ("sin", "cos"):
-                angle = node.operands[0]
-                if angle.index not in known:
-                    known.add(angle.index)
-                    yield from self._sines([angle])
-                self.names[node.index] = f"{'s' if node.op == 'sin' else 'c'}{self.angles[angle.index]}"
-            elif node.op not in ("symbol", "constant"):
-                kind = "int" if node.op in CONDITIONS else "double"
-                expression = OPERATIONS[node.op].format(*map(self._value, node.operands))
-                self.names[node.index] = f"x{node.index}"
-                yield f"const {kind} x{node.index} = {expression};"
-            for place in self.stores.get(node.index, ()):
-                yield f"{place} = {self._value(node)};"
+            if node.op not in ("symbol", "constant"):
+                yield from self._operation(node)
+            yield from (f"{place} = {self._value(node)};" for place in self.stores.get(node.index, ()))
         yield from self.constant_stores
+
+    def _operation(self, node: Expression) -> Iterator[str]:
+        """Statements of one operation."""
+        if node.op in LETTERS:
+            (angle,) = node.operands
+            if angle.index not in self.angles:
+                yield from self._sines([angle])
+            self.names[node.index] = f"{LETTERS[node.op]}{self.angles[angle.index]}"
+            return
+        kind = "int" if node.op in CONDITIONS else "double"
+        self.names[node.index] = f"x{node.index}"
+        yield f"const {kind} x{node.index} = {OPERATIONS[node.op].format(*map(self._value, node.operands))};"
 
     def _sines(self, angles: list[Expression]) -> Iterator[str]:
         """Sines and cosines of several angles in one call."""

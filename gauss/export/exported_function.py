@@ -168,10 +168,15 @@ def _copied(graph: Graph, function: Function, given: list) -> list:
     values = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
     for node in function.nodes:
         if node.op == "call":
-            parts = [results[x.index] if x.op == "call" else [values[x.index]] for x in node.operands]
-            results[node.index] = _copied(graph, node.value, [entry for part in parts for entry in part])
+            results[node.index] = _copied(graph, node.value, _passed(node.operands, values, results))
         elif node.op == "item":
             values[node.index] = results[node.operands[0].index][node.value]
         elif node.op != "symbol":
             values[node.index] = graph.copy(node, [values[x.index] for x in node.operands])
     return [values[x.index] if isinstance(x, Expression) else graph.constant(x) for x in function.outputs]
+
+
+def _passed(operands, values: dict, results: dict) -> list:
+    """Arguments of a call; the results of another call may stand for the first of them."""
+    parts = [results[x.index] if x.op == "call" else [values[x.index]] for x in operands]
+    return [entry for part in parts for entry in part]

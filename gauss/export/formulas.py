@@ -196,27 +196,32 @@ def latex_document(system: System | Scene, names: Sequence[str] | None = None) -
         import sympy
     require(system, (System, Scene), "export")
     system = compile_scene(system) if isinstance(system, Scene) else system
-    shown: list = []
-    values: dict = {}
+    shown: list[str] = []
+    values: dict[Any, float] = {}
     for name in names or _equations(system):
         found = to_sympy(system, name)
-        used = set().union(*(one.free_symbols for one in found.results.values()))
-        values |= {symbol: value for symbol, value in found.values.items() if symbol in used}
-        if names is None and name == "inverse_dynamics":
-            still = {symbol: 0 for symbol in found.arguments["acceleration"]}
-            found.results["load"] = found.results["load"].subs(still)
+        still = [] if names is not None else [(symbol, 0) for symbol in found.arguments.get("acceleration", ())]
         for result, formula in found.results.items():
+            formula = formula.subs(still)
+            used = formula.free_symbols
+            values |= {symbol: value for symbol, value in found.values.items() if symbol in used}
             left = SIGNS.get((name, result), rf"\mathrm{{{_plain(f'{name} {result}')}}}")
             shown.append(rf"\[ {left} = {sympy.latex(formula, symbol_names=found.latex_names)} \]")
-    title = _plain(system.scene.name)
-    balance = r"\[ M \ddot q + h = \tau + J^{\mathsf T} \lambda, \quad c = 0 \]"
-    head = [] if names is not None else [balance if system.has_closures else r"\[ M \ddot q + h = \tau \]"]
-    table = [rf"\({sympy.latex(symbol)} = {value:.12g}\)" for symbol, value in values.items()]
-    lines = [rf"\section*{{{title}}}", *head, *shown, *(["Values: " + ", ".join(table) + "."] if table else [])]
-    start = [r"\documentclass{article}", r"\usepackage{amsmath}", r"\begin{document}"]
-    return "\n".join([*start, *lines, r"\end{document}", ""])
+    table = ", ".join(rf"\({sympy.latex(symbol)} = {value:.12g}\)" for symbol, value in values.items())
+    lines = [*([] if names is not None else [_balance(system)]), *shown, *([f"Values: {table}."] if table else [])]
+    return "\n".join([*START, rf"\section*{{{_plain(system.scene.name)}}}", *lines, r"\end{document}", ""])
 
 
+def _balance(system: System) -> str:
+    """Equation of motion."""
+    return (
+        r"\[ M \ddot q + h = \tau + J^{\mathsf T} \lambda, \quad c = 0 \]"
+        if system.has_closures
+        else r"\[ M \ddot q + h = \tau \]"
+    )
+
+
+START = r"\documentclass{article}", r"\usepackage{amsmath}", r"\begin{document}"
 SIGNS = {
     ("mass_matrix", "result"): "M",
     ("inverse_dynamics", "load"): "h",

@@ -1,4 +1,4 @@
-"""Motion, reactions and driving torque of a linkage at many crank angles, and what follows from them."""
+"""Motion, reactions and driving torque of a linkage at many crank angles, and derived curves."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -69,7 +69,7 @@ def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float 
 
 
 def _extended(found: Cycle, at: np.ndarray, speed, acceleration) -> tuple[Cycle, np.ndarray]:
-    """The cycle with what twice the precision finds at some of its angles, and condition numbers (n, m) there."""
+    """The cycle with results of twice the precision at some of its angles, and condition numbers (n, m) there."""
     motion = found.motion
     poses = {triad.ternary.name: _pose(motion.links[triad.ternary.name])[:, at] for triad in motion.chain.triads}
     exact = extended(motion.chain, found.crank_angle[at], speed[at], acceleration[at], poses)

@@ -12,6 +12,9 @@ from gauss.errors import GaussError
 from gauss.rotors.law import LOAD, LOSS, MOTOR, ROLES, Law  # noqa: F401
 from gauss.rotors.load_laws import Constant, Dry, Periodic, Quadratic, TorqueTable, Viscous
 from gauss.rotors.motor_laws import DC, Diesel, Kloss, Linear
+from gauss.scene.stateful_laws import preserved
+
+PROBES = (0.0, 0.7, 0.7, 13.0)  # arguments at which a constant has one value, and in every call
 
 
 @dataclass(frozen=True)
@@ -40,16 +43,29 @@ def called(function: Callable[..., Any], *arguments: Scalar) -> Any:
     Raises
     ------
     TypeError
-        If it is given expressions and cannot be traced.
+        If it is given expressions and cannot be traced: it fails, keeps something from one call for the next, or returns
+        numbers that are not the same in every call.
     """
     if not any(isinstance(argument, Expression) for argument in arguments):
         return function(*arguments)
     try:
-        return branches(lambda: function(*arguments))
+        with preserved(function) as kept:
+            found = branches(lambda: function(*arguments))
+            same = _is_repeated(function, found, arguments)
     except GaussError:
         raise
     except Exception as error:  # a law may fail in any way when it is given symbols
         raise TypeError(f"{type(error).__name__}: {error}") from error
+    if kept.changed or not same:
+        raise TypeError("it keeps something from one call for the next, or is random")
+    return found
+
+
+def _is_repeated(function: Callable, found: Any, arguments: tuple) -> bool:
+    """Whether a function returns a result on expressions again; of a number, whether it is the value at all probes."""
+    if isinstance(found, Expression):  # one graph holds each expression once
+        return branches(lambda: function(*arguments)) is found
+    return all(function(*[probe] * len(arguments)) == found for probe in PROBES)
 
 
 LAWS: dict[str, type[Law]] = {

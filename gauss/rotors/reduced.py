@@ -95,7 +95,7 @@ class ReducedNetwork:
 
     @property
     def largest(self) -> float:
-        """Largest speed that the network knows of [rad/s]."""
+        """Largest speed given in the network [rad/s]."""
         return self.v_0 / REST
 
     @property

@@ -1,12 +1,13 @@
 """Simulation of a network: check the arguments, reduce the network, integrate from event to event, collect the motion."""
 
 import time
+import warnings
 
 import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
-from gauss.errors import SimulationError, did_you_mean
+from gauss.errors import SimulationError, SwitchingWarning, did_you_mean, user_level
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import NetworkEquations
@@ -74,7 +75,8 @@ def simulate(
     Warns
     -----
     SwitchingWarning
-        If an opaque law was evaluated so seldom that it may have switched unseen.
+        If an opaque law was evaluated so seldom that it may have switched unseen, if it has other values in a second call,
+        and if a law has more features than steps resolve.
 
     Raises
     ------
@@ -88,6 +90,8 @@ def simulate(
     samples = _checked(duration, times, rtol, atol, method, max_step)
     known_breaks, reduced = check_breaks(breaks, 0.0, duration), reduce(network)
     resolved = switching(reduced, duration, rtol, known_breaks)
+    for text in resolved.times.limitations:
+        warnings.warn(f"{network.name!r}: {text}.", SwitchingWarning, stacklevel=user_level())
     allowed = (DEFAULT_ATOL, DEFAULT_ATOL * reduced.slow) if atol is None else (atol, atol)
     run = RotorRun(NetworkEquations(reduced, compiled), method, rtol, allowed, max_step, resolved)
     began = time.perf_counter()

@@ -16,6 +16,7 @@ from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable, timetable
 from gauss.rotors.reduced import ReducedNetwork
 from gauss.rotors.surfaces import Surfaces
 from gauss.rotors.traced_laws import TracedLaws
+from gauss.scene.stateful_laws import preserved
 
 if TYPE_CHECKING:
     from gauss.rotors.run import RotorRun
@@ -86,7 +87,8 @@ def _sampled(reduced: ReducedNetwork, term, duration: float) -> Timetable:
     places = (float(angle), float(speed)), (float(angle) + 1.0, float(reduced.largest))
     law = lambda t, _: [float(term.law(t, *place)) for place in places]  # noqa: E731
     begin, end = max(term.begin or 0.0, 0.0), duration if term.until is None else min(term.until, duration)
-    return sampled_times(law, None, begin, end) if begin < end else NO_TIMES
+    with preserved(getattr(term.law, "function", None)):
+        return sampled_times(law, None, begin, end, f"the law of {term.name!r}") if begin < end else NO_TIMES
 
 
 def resolved_share(run: "RotorRun", begin: float, end: float, dense: Callable) -> tuple[float, float | None]:

@@ -1,4 +1,4 @@
-from gauss.scene import profiles
+from gauss.scene import actuators, profiles
 from gauss.scene.body import Body, Frame
 from gauss.scene.clutches import Clutch, Freewheel, JointLink
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
@@ -9,7 +9,7 @@ from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.inputs import Input, Output
 from gauss.scene.joint import Coupling, Joint
-from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
+from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start, StateLaw
 from gauss.scene.losses import IdealCounterpart, JointAtRest, LossyGear
 from gauss.scene.motions import Guided, Prescribed
 from gauss.scene.names import GROUND
@@ -79,8 +79,10 @@ __all__ = [
     "Sphere",
     "Spring",
     "Start",
+    "StateLaw",
     "Stop",
     "Transmission",
     "Unilateral",
+    "actuators",
     "profiles",
 ]

@@ -49,6 +49,24 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class StateLaw(Drive):
+    """Law ẋ = f of a state of one's own: x is the rate of a joint of a body with a moment of inertia of 1 kg m².
+
+    Such a body adds ½ (ẋ − f)² to Gauss's compulsion, the least of which is the law. See :meth:`gauss.Scene.state`.
+
+    Parameters
+    ----------
+    name, joint, effort, limit, breaks
+        As of a drive; the effort is the law of ẋ.
+    """
+
+    @property
+    def what(self) -> str:
+        """Kind and name of the state."""
+        return f"state {self.joint!r}"
+
+
+@dataclass(frozen=True)
 class Force:
     """Force and moment on a body.
 

@@ -48,7 +48,8 @@ class CompiledAdaptiveRun(CompiledRun):
         SimulationError
             If a law chatters; its ``trajectory`` holds the motion so far.
         """
-        control, loop, size = self.control, self.prepared(), self.layout.size
+        self.prepared()
+        control, size = self.control, self.layout.size
         if self.held is not None:
             self.inputs = self.held.at(0, self.start.t, self.start.q.copy(), self.start.v.copy())
         begun = self._started(self.start.t, self.start.q, self.start.v)
@@ -70,29 +71,38 @@ class CompiledAdaptiveRun(CompiledRun):
                 if self.held is not None:
                     self._renew()
                 control.end, self.after = next(stops)
-            loop(control, self.point, self.confirmed, grid, out, self.budget)
+            self._steps(grid, out)
             self._refuse_chatter(grid, out)
             if control.status == LoopStatus.DONE and control.end < self.end:
                 control.status = LoopStatus.PAUSED
 
         self._drive(advance, out)
 
+    def _steps(self, grid: np.ndarray, out: np.ndarray):
+        """Make the steps of one budget."""
+        self.loop(self.control, self.point, self.confirmed, grid, out, self.budget)
+
+    @property
+    def switching_laws(self) -> tuple[str, ...]:
+        """Names of the loads that steps are shortened for."""
+        return self.switching.conditional
+
     def _refuse_chatter(self, grid: np.ndarray, out: np.ndarray):
         """Raise a SimulationError where conditions of laws on the state allow almost no progress."""
         control, t = self.control, self.point[0]
         trials = control.steps + control.rejected - self.trials
-        if not self.switching.conditional or trials < PROGRESS_TRIALS:
+        if not self.switching_laws or trials < PROGRESS_TRIALS:
             return
         if control.status == LoopStatus.PAUSED:
             progress = (t - self.measured_from) / (self.end - self.start.t) * PROGRESS_TRIALS / trials
             if progress < CHATTERING_PROGRESS or (progress < SLIDING_PROGRESS and self._slides(grid, out)):
-                raise SimulationError(endless(self.measured_from, self.switching.conditional), self.trajectory())
+                raise SimulationError(endless(self.measured_from, self.switching_laws), self.trajectory())
         self.trials, self.measured_from = control.steps + control.rejected, t
 
     def _slides(self, grid: np.ndarray, out: np.ndarray) -> bool:
         """Whether the next steps cross switching surfaces again and again."""
         control, crossings = self.control, 0.0
-        for _ in range(SLIDING_STEPS):
+        for _ in range(SLIDING_STEPS if self.switching.conditional else 0):
             self._gather(out)
             begin = self.layout.point(self.point.copy())
             self.loop(control, self.point, self.confirmed, grid, out, 1)

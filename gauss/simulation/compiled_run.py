@@ -19,7 +19,7 @@ from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.store import cached_on_disk, is_noted_on_disk, note_on_disk
 from gauss.dynamics.traced_system import Program
-from gauss.errors import SimulationError
+from gauss.errors import GaussError, SimulationError
 from gauss.integrators import ExplicitPair, FixedStep, Point, Rates, Taylor
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.compiled_steps.taylor_step import compensation_size
@@ -57,7 +57,7 @@ class CompiledRun:
         self.rows: list[np.ndarray] = []
         self.held = problem.held
         self.certified = CertifiedEngine("auto", self.drift.gains)
-        self.key = (self.drift, problem.laws.key, self.held is not None)
+        self.key: tuple[Hashable, ...] = (self.drift, problem.laws.key, self.held is not None)
         self.method_state, size = self._initial_method_state()
         make = lambda: program(self.system, problem.laws, self.drift, size, inputs=self.held is not None)  # noqa: E731
         self.program = self._on_demand((program, size), make)
@@ -173,11 +173,12 @@ class CompiledRun:
             self._gather(out)
             error.trajectory = self.trajectory()  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the motion so far
             raise
-        except SimulationError as error:  # of a control law
-            if error.trajectory is None:
+        except GaussError as error:  # of a law
+            found = getattr(error, "trajectory", None)
+            if found is None:
                 self._gather(out)
-                error.trajectory = self.trajectory()
-            raise
+                found = self.trajectory()
+            raise SimulationError(str(error), found) from error
         finally:
             bar.close()
 

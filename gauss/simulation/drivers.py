@@ -79,10 +79,18 @@ def _program(plan: Plan) -> type[Program]:
         from gauss.dynamics.call_graph_program import CallGraphProgram
 
         return CallGraphProgram
+    if plan.dynamics == "callbacks":
+        from gauss.dynamics.called_program import CalledProgram
+
+        return CalledProgram
     return Program
 
 
 def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledAdaptiveRun | CompiledFixedRun":
+    if problem.laws.called:
+        from gauss.simulation.called_runs import CalledAdaptiveRun, CalledFixedRun
+
+        return (CalledFixedRun if isinstance(problem.method, FixedStep) else CalledAdaptiveRun)(problem, program)
     if isinstance(problem.method, FixedStep):
         from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 

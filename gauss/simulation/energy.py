@@ -64,4 +64,13 @@ def energy(trajectory: Trajectory) -> Energy:
     both = trajectory.sampled(
         "energies", lambda motion: np.array([kinetic_energy_of_bodies(motion), potential_energy(motion)])
     )
-    return Energy(*both.T, *trajectory.work.T)
+    of_states = _energy_of_states(trajectory)
+    kinetic, potential = both.T
+    drives, loads, dissipated = trajectory.work.T
+    return Energy(kinetic - of_states, potential, drives - (of_states - of_states[:1]), loads, dissipated)
+
+
+def _energy_of_states(trajectory: Trajectory) -> np.ndarray:
+    """½ x² (k,) of states of one's own, which bodies stand for: neither energy of the mechanism nor work of its drives."""
+    columns = [trajectory.system.column(name) for name in trajectory.system.scene.states]
+    return 0.5 * (trajectory.v[:, columns] ** 2).sum(axis=1)

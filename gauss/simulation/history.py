@@ -10,10 +10,12 @@ import numpy as np
 
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.errors import SwitchingWarning, user_level
+from gauss.errors import SimulationError, SwitchingWarning, user_level
 from gauss.scene.stateful_laws import PreservedState
 from gauss.simulation.trajectory import Trajectory
+from gauss.system import State, System
 
+REPEATED_CALLS = 3  # with one state, of a law that may be random
 COMPARED_SAMPLES = 5  # of a motion, at which a law is called with both states
 
 
@@ -29,6 +31,23 @@ class History:
     def __init__(self, laws: Laws):
         own = [(str(getattr(bound.load, "name", "")), law) for bound in laws.called for law in bound.laws]
         self.kept = [(name, law, PreservedState(law)) for name, law in own]
+
+    def refuse_random(self, system: System, start: State):
+        """Refuse random laws in adaptive steps: no step is short enough for their error.
+
+        Raises
+        ------
+        SimulationError
+            If a law has other values in a second call with the same state of the mechanism and of its own; with its name.
+        """
+        motion = kinematics(system, start) if self.kept else None
+        for name, law, before in self.kept:
+            if _is_random(law, motion, before):
+                raise SimulationError(
+                    f"the law of {name!r} has other values when it is called again in the same state, as if it were random: "
+                    "adaptive steps cannot meet a tolerance. Hold random values from sample to sample with control= and "
+                    "rate=, or use a fixed step."
+                )
 
     def warn(self, trajectory: Trajectory):
         """Warn of laws whose values depend on what calls during the motion have changed.
@@ -63,6 +82,17 @@ def _depends(law, before: PreservedState, trajectory: Trajectory) -> bool:
         return True
     finally:
         after.restore()
+
+
+def _is_random(law, motion, state: PreservedState) -> bool:
+    """Whether a law has other values in calls with the same state of the mechanism and of its own; its state is left."""
+    try:
+        values = [_value(law, motion, state) for _ in range(REPEATED_CALLS)]
+    except Exception:  # the motion reports a law that fails
+        return False
+    finally:
+        state.restore()
+    return any(not np.array_equal(values[0], other, equal_nan=True) for other in values[1:])
 
 
 def _value(law, motion, state: PreservedState) -> np.ndarray:

@@ -44,7 +44,7 @@ class PreparedMotion:
             )
             self.system, self.duration, plan = problem.system, float(duration), plan_of(problem.question)
             name = self.system.scene.name
-            if plan.driver != "compiled loop" or isinstance(problem.method, FixedStep):
+            if plan.driver != "compiled loop" or problem.laws.called or isinstance(problem.method, FixedStep):
                 fixed = "the integrator has fixed steps, which gauss.Simulator makes"
                 why = fixed if isinstance(problem.method, FixedStep) else f"its driver is {plan.driver!r}"
                 why = "; ".join(map(str, plan.rejected)) or why
@@ -74,6 +74,9 @@ class PreparedMotion:
         arrays = self._point, self._confirmed, self._later, out
         self._arguments = ctypes.byref(self._control), *(ctypes.c_void_p(address(array)) for array in arrays)
         self._loop = loop.entry
+
+    def __reduce__(self):
+        return PreparedMotion, (self.system, self.duration, self.times, self.options)
 
     def __call__(self, q=None, v=None) -> tuple[np.ndarray, np.ndarray]:
         """Coordinates (k, n_q) and rates (k, n_v) at the samples.

@@ -17,7 +17,7 @@ from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Baumgarte
 from gauss.dynamics.store import is_first_use
 from gauss.errors import SimulationError, judged_later, require
-from gauss.integrators import Integrator
+from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, described, held_inputs
 from gauss.simulation.drivers import DRIVERS
@@ -135,8 +135,9 @@ def simulate(
     Raises
     ------
     SimulationError
-        Before the first step, if a prescribed position jumps; later, if the motion cannot continue, or the control law
-        returns a value that is no finite number: its ``trajectory`` holds the motion so far.
+        Before the first step, if a prescribed position jumps, or a law is random and steps are adaptive; later, if the
+        motion cannot continue, or the control law returns a value that is no finite number: its ``trajectory`` holds the
+        motion so far.
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """
@@ -149,6 +150,8 @@ def simulate(
         )
         problem = problem._replace(held=held_inputs(problem, control, rate))
         settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
+        if not isinstance(problem.method, FixedStep):
+            history.refuse_random(problem.system, problem.start)
         found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)

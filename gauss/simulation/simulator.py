@@ -32,7 +32,7 @@ from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.tolerances import check_tolerances
-from gauss.simulation.undetected_switching import warn_of_short_features
+from gauss.simulation.undetected_switching import refuse_jumps, warn_of_short_features, warn_of_undetected
 from gauss.system import State, System, retract
 
 FAILURES = {
@@ -70,7 +70,7 @@ class SimulatorState(NamedTuple):
 class Simulator:
     """Motion of a scene in fixed steps, one call after the other.
 
-    Steps do not end where laws of time switch; prescribed velocities must not jump.
+    Steps do not end where laws switch, and say so where they may have passed over it; prescribed velocities must not jump.
 
     Parameters
     ----------
@@ -96,7 +96,8 @@ class Simulator:
     Raises
     ------
     SimulationError
-        If the method has no fixed step, or the steps are not compiled, with the reasons.
+        If the method has no fixed step, if the steps are not compiled, with the reasons, or if a prescribed motion jumps
+        within the first ten thousand steps.
 
     Examples
     --------
@@ -130,8 +131,7 @@ class Simulator:
             if (plan.driver, plan.dynamics) not in STEPS:
                 why = "; ".join(map(str, plan.rejected)) or "nothing in it can move"
                 raise SimulationError(f"steps of {whole.name!r} are not compiled: {why}.")
-            if problem.switching.jumps:
-                raise SimulationError(f"prescribed velocities of {whole.name!r} jump; use gauss.simulate.")
+            refuse_jumps(self.system, problem.start, self.step_size)
             warn_of_short_features(whole.name, problem.laws, self.step_size)
             problem = problem._replace(switching=Switching())
             self._run = run = _run_of(problem, plan.dynamics)
@@ -142,10 +142,14 @@ class Simulator:
         self._u = self._point[run.layout.size - n_u :]
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
-        self._begun, self._steps = 0.0, 0
+        self._begun, self._steps, self._methods = 0.0, 0, (integrator, stabilisation)
+        self._switches, self._warned = bool(run.program.watch), False
         self._measure: Kernel | None = None
         self._bind()
         self.reset()
+
+    def __reduce__(self):
+        return _again, ((self.system, self.step_size, *self._methods), self.snapshot())
 
     def _bind(self):
         """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
@@ -189,7 +193,8 @@ class Simulator:
         self._point[:] = run.begun(start)
         self._confirmed[:] = self._point
         self._begun, self._steps = float(self._point[0]), 0
-        run.control.steps = run.control.status = 0.0
+        run.control.steps = run.control.status = run.control.unseen = 0.0
+        self._warned = False
         return self.state
 
     def step(self, u=None, n: int = 1):
@@ -202,6 +207,11 @@ class Simulator:
             given.
         n : int
             Number of steps.
+
+        Warns
+        -----
+        SwitchingWarning
+            Once for each motion, if a law of the state may have switched undetected within a step.
 
         Raises
         ------
@@ -219,6 +229,15 @@ class Simulator:
         self._loop.call(*self._given, n)
         if self._run.control.status:
             self._recover(n)
+        if self._switches and self._run.control.unseen:
+            self._warn_of_switching()
+
+    def _warn_of_switching(self):
+        """Warn of a law of the state that may have switched undetected within a step, once for each motion."""
+        self._run.control.unseen = 0.0
+        if not self._warned:
+            self._warned = True
+            warn_of_undetected(self.system.scene.name, f"before t = {self.t:.6g} s, within a step of {self.step_size:g} s,")
 
     def _set(self, u):
         given = u if isinstance(u, np.ndarray) and u.dtype == float else _floats(u)
@@ -308,6 +327,13 @@ class Simulator:
         ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
         self._begun, self._steps = snapshot.begun, snapshot.steps
         self._run.take(snapshot.contacts)
+
+
+def _again(given: tuple, snapshot: SimulatorState) -> Simulator:
+    """Simulator of the same arguments in the same state, in another process."""
+    simulator = Simulator(*given)
+    simulator.restore(snapshot)
+    return simulator
 
 
 def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSteps:

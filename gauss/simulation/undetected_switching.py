@@ -10,21 +10,28 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.dynamics.laws.prescribed_jumps import prescribed_jumps
+from gauss.dynamics.laws.switching import prescribed_times
 from gauss.dynamics.laws.switching_times import Timetable, timetable
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.errors import SwitchingWarning, user_level
+from gauss.errors import SimulationError, SwitchingWarning, user_level
 from gauss.integrators import FixedStep, Integrator, Library, Rates
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
 
 PLACES = (0.187, 0.431, 0.569, 0.813)  # of the samples, relative to the step
-INCREMENT = 1e-4  # of the differences for y', relative to the step
+SHIFTS = -1e-4, 0.0, 1e-4  # of the samples of a difference for y', relative to the step
 LARGEST_DEFECT = 1e5  # over the tolerance
 REJECTED_SHARE = 0.5  # of a step with a larger defect that is tried next
 RESOLVED_STEP = 1e-6  # relative to the duration: the defect of shorter steps is not sampled
 HORIZON = 10_000  # steps of a stepping object, which has no end, in which features of laws of time are looked for
 RESOLVING_STEPS = 2.0  # steps that a feature of a law of time must last
 SPARSE_STEP = 0.01  # relative to the duration: longer steps with opaque laws may miss short features
+
+
+def defect_times(begin: float, h: float) -> np.ndarray:
+    """Times (12,) at which :func:`defect_is_large` asks for dense output [s]."""
+    return np.array([begin + (place + shift) * h for place in PLACES for shift in SHIFTS])
 
 
 def defect_is_large(
@@ -47,8 +54,8 @@ def defect_is_large(
     allowed : ndarray, shape (n_v,)
         Tolerance of the rates.
     """
-    for place in PLACES:
-        before, at, after = (dense(begin + (place + shift) * h)[0] for shift in (-INCREMENT, 0.0, INCREMENT))
+    for times in defect_times(begin, h).reshape(-1, len(SHIFTS)).tolist():
+        before, at, after = (dense(t)[0] for t in times)
         defect = (after.v - before.v) / (after.t - before.t) - evaluate(at).acceleration
         if (h * np.abs(defect) > LARGEST_DEFECT * allowed).any():
             return True
@@ -75,10 +82,23 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator):
         text = f"integrator {method.name!r} does not locate switching events of loads whose laws depend on the state"
         warnings.warn(f"{name!r}: {text}; use 'dop853', which does.", SwitchingWarning, stacklevel=user_level())
     elif stats.unseen and isinstance(method, FixedStep):
-        text = f"in {stats.unseen} of the steps of {method.name!r} a law may have switched undetected"
-        warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=user_level())
+        warn_of_undetected(name, f"in {stats.unseen} of the steps of {method.name!r}")
     if stats.opaque:
         warn_of_opaque(name, stats.opaque, "step=")
+
+
+def warn_of_undetected(scene: str, where: str):
+    """Warn of laws that may have switched undetected within fixed steps.
+
+    Parameters
+    ----------
+    scene, where : str
+        Name of the scene, and the steps.
+    """
+    remedy = "shorten the step, or use 'dop853'"
+    warnings.warn(
+        f"{scene!r}: {where} a law may have switched undetected; {remedy}.", SwitchingWarning, stacklevel=user_level()
+    )
 
 
 def warn_of_opaque(scene: str, laws: str, option: str):
@@ -138,6 +158,24 @@ def warn_of_short_features(scene: str, laws: Laws, step: float):
         )
 
 
+def refuse_jumps(system: System, start: State, step: float):
+    """Refuse prescribed motions that jump within the first steps of a stepping object, whose steps do not end there.
+
+    Raises
+    ------
+    SimulationError
+        If a prescribed position or velocity jumps.
+    """
+    end = HORIZON * step
+    prescribed = prescribed_times(system.relations, start.t, end)
+    last = prescribed.last_end(start.t, end)
+    jumps = prescribed_jumps(system, start, end, [*prescribed.stops(start.t, end), (last, end)])
+    if jumps:
+        raise SimulationError(
+            f"prescribed velocities of {system.scene.name!r} jump at t = {jumps.times[0]:.6g} s; use gauss.simulate."
+        )
+
+
 def warn_of_passages(system: System, unseen: np.ndarray, method: str):
     """Warn where motions of a fixed-step batch (batch,) may hold undetected switching events.
 
@@ -149,7 +187,4 @@ def warn_of_passages(system: System, unseen: np.ndarray, method: str):
     which = np.flatnonzero(unseen > 0.0)
     if which.size:
         some = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
-        text = f"in motions {some} a law may have switched undetected within a step of {method!r}"
-        warnings.warn(
-            f"{system.scene.name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=user_level()
-        )
+        warn_of_undetected(system.scene.name, f"in motions {some}, within a step of {method!r},")

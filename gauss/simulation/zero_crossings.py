@@ -7,6 +7,7 @@ import numpy as np
 
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.errors import SimulationError
+from gauss.simulation.brent import brent
 from gauss.simulation.simulate import simulate
 from gauss.simulation.tolerances import shares_of_scale
 from gauss.simulation.trajectory import Trajectory
@@ -60,8 +61,6 @@ def crossings(trajectory: Trajectory, function: Callable[[Kinematics], float], *
 
 
 def _between(system, function, begin: State, end: State) -> State:
-    from scipy.optimize import brentq  # a slow import
-
     reached = {begin.t: begin, end.t: end}
     atol = shares_of_scale(system, FINEST)
 
@@ -72,7 +71,7 @@ def _between(system, function, begin: State, end: State) -> State:
             reached[t] = motion.state(-1)
         return _value(function, kinematics(system, reached[t]))
 
-    t = brentq(value, begin.t, end.t, xtol=FINEST * (system.scale.time + abs(end.t)), rtol=9e-16)
+    t = brent(value, begin.t, end.t, xtol=FINEST * (system.scale.time + abs(end.t)), rtol=9e-16)
     value(t)
     return reached[t]
 

@@ -171,6 +171,10 @@ class System(StateFunctions):
         """Whether integration can drift off constraints: some subsystem has loops, couplings or relations."""
         return any(subsystem.loop_joints or subsystem.couplings or subsystem.relations for subsystem in self.subsystems)
 
+    @cached_property
+    def _joints_by_name(self) -> dict[str, PlacedJoint]:
+        return {joint.name: joint for joint in reversed(self.joints)}
+
     def joint(self, name: str) -> PlacedJoint:
         """Return the joint of this name.
 
@@ -179,7 +183,7 @@ class System(StateFunctions):
         StateError
             If there is none.
         """
-        found = next((joint for joint in self.joints if joint.name == name), None)
+        found = self._joints_by_name.get(name)
         if found is None:
             raise StateError(f"no joint {name!r}. {did_you_mean(name, [joint.name for joint in self.joints])}")
         return found
@@ -193,8 +197,8 @@ class System(StateFunctions):
             If there is neither.
         """
         owner, _, rate = name.rpartition(".")
-        found = next((joint for joint in self.joints if joint.name == owner), None)
-        if found is None or rate not in found.pair.rates or any(joint.name == name for joint in self.joints):
+        found = self._joints_by_name.get(owner)
+        if found is None or rate not in found.pair.rates or name in self._joints_by_name:
             return self.joint(name), None
         return found, found.pair.rates.index(rate)
 

@@ -1,4 +1,4 @@
-"""Figure of a motion under servos: what they exert, what they hold, and how firmly."""
+"""Figure of a motion under servos: efforts, work, residuals, and the distance from singular configurations."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,7 +11,7 @@ FLOOR = 1e-17  # a residual of exactly zero has no place on a logarithmic axis
 
 
 def plot_tracking(tracking: Tracking, path=None):
-    """Figure of coordinates, servo forces, their work, what is left of each relation, and the hold on them, against time.
+    """Figure of coordinates, efforts and their work, residuals, and the smallest singular value of S, against time.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def plot_tracking(tracking: Tracking, path=None):
     errors = {n: np.abs(r) + FLOOR for n, r in zip(servo.held, tracking.residuals.T, strict=True)}
     curves(gaps, motion.t, errors, _left(tracking))
     gaps.set_yscale("log")
-    curves(hold, motion.t, {"hold": tracking.smallest}, "hold: smallest singular value [1]")
+    curves(hold, motion.t, {"S": tracking.smallest}, "smallest singular value of S [1]")
     hold.set_ylim(0.0, 1.1 * tracking.smallest.max())
     for axes in (coordinates, forces, work, gaps):
         if 0 < len(axes.lines) <= NAMED:

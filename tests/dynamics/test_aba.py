@@ -194,7 +194,7 @@ def test_laws_that_cannot_are_called_and_explained():
     system = gauss.compile_scene(scene)
     assert list(system.dynamics.called(system)) == ["drive of J1"]
     fast, slow = (gauss.simulate(system, 0.3, integrator="rk4", step=0.01, backend=b) for b in ("auto", "recursion"))
-    assert (fast.stats.plan.driver, fast.stats.plan.dynamics) == ("Python loop", "compiled")
+    assert (fast.stats.plan.driver, fast.stats.plan.dynamics) == ("compiled loop", "callbacks")
     assert [rejected.driver for rejected in fast.stats.plan.rejected] == ["compiled loop"]
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
 

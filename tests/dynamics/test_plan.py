@@ -17,6 +17,7 @@ from tests.support import mechanisms
 
 SAME = 1e-9  # of motions by two plans
 RUN = {"integrator": "rk4", "step": 1e-3, "progress": False}
+IMPLICIT = {"integrator": "radau5", "rtol": 1e-6}
 FINE = RUN | {"step": 2.5e-4}  # where a loop is cut is felt as much as the method errs: less than SAME
 
 
@@ -89,10 +90,12 @@ CASES = {
         ("Python loop", "certified"),
         ["compiled loop", "Python loop"],
     ),
-    "an opaque law": (_opaque, {}, ("Python loop", "compiled"), ["compiled loop"]),
-    "a law that asks": (_asking, {}, ("Python loop", "compiled"), ["compiled loop"]),
+    "an opaque law": (_opaque, {}, ("compiled loop", "callbacks"), ["compiled loop"]),
+    "a law that asks": (_asking, {}, ("compiled loop", "callbacks"), ["compiled loop"]),
+    "an opaque law, an implicit method": (_opaque, IMPLICIT, ("Python loop", "compiled"), ["compiled loop"] * 2),
     "a large tree": (_long, {}, ("compiled loop", "tree recursion"), ["compiled loop"]),
-    "a large tree, an opaque law": (_driven, {}, ("Python loop", "tree recursion"), ["compiled loop"] * 2),
+    "a large tree, an opaque law": (_driven, {}, ("compiled loop", "tree recursion"), ["compiled loop"]),
+    "a large tree, an implicit method": (_driven, IMPLICIT, ("Python loop", "tree recursion"), ["compiled loop"] * 3),
     "held inputs, friction": (
         _controlled,
         {"control": lambda t, q, v: 0.5, "rate": 1000.0},
@@ -100,7 +103,8 @@ CASES = {
         ["events", "events"],
     ),
     "many loops": (_mesh, {}, ("compiled loop", "call graph"), ["compiled loop"]),
-    "many loops, an opaque law": (_driven_mesh, {}, ("Python loop", "call graph"), ["compiled loop"] * 2),
+    "many loops, an opaque law": (_driven_mesh, {}, ("compiled loop", "call graph"), ["compiled loop"]),
+    "many loops, an implicit method": (_driven_mesh, IMPLICIT, ("Python loop", "call graph"), ["compiled loop"] * 3),
     "a library": (lambda: mechanisms.rods(2), {"integrator": "scipy_dop853"}, ("library", "compiled"), []),
     "a library, a law": (_opaque, {"integrator": "scipy_dop853"}, ("library", "certified"), ["library"]),
     "contacts": (lambda: gauss.load("newtons_cradle"), {}, ("events", "compiled"), []),

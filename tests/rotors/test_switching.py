@@ -169,6 +169,40 @@ def test_a_law_that_cannot_be_traced_is_warned_of_on_every_call():
             simulate(network, DURATION)
 
 
+def _counted():
+    """A law that counts its calls."""
+    calls = [0.0]
+
+    def law(t, a, w):
+        calls[0] += 1.0
+        return calls[0]
+
+    return law
+
+
+RNG = np.random.default_rng(1)
+CHANGING = {
+    "random": lambda: lambda t, a, w: float(RNG.normal()),
+    "random part": lambda: lambda t, a, w: 5.0 * RNG.uniform() - w,
+    "count": _counted,
+}
+
+
+@pytest.mark.parametrize("kind", CHANGING)
+def test_a_law_with_other_values_in_a_second_call_is_no_constant(kind):
+    network = shaft(CHANGING[kind](), 3.0)
+    for _ in range(2):
+        with pytest.warns(SwitchingWarning, match="'torque on a' gives other values"):
+            simulate(network, 1.0)
+
+
+def test_a_function_of_nothing_is_a_constant():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SwitchingWarning)
+        motion = simulate(shaft(lambda t, a, w: 3.0), DURATION, **TIGHT)
+    assert motion.speed("a")[-1] == pytest.approx(3.0 * DURATION / INERTIA, rel=EXACT)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_friction_written_as_a_sign_is_refused(method):

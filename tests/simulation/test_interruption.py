@@ -46,9 +46,9 @@ def _scene(name: str, **options):
 
 
 def _called_law():
-    """Pendulum under a law that cannot be traced: the steps are put together by Python."""
+    """Pendulum under a law of the state that cannot be traced: machine code calls it."""
     scene = gauss.load("pendulum")
-    scene.drive(next(iter(scene.joints)), torque=lambda t: 0.01 * float(np.sin(float(t))))
+    scene.drive(next(iter(scene.joints)), torque=lambda t, at: -0.01 * float(at.state.v[0]))
     return gauss.compile_scene(scene)
 
 
@@ -59,7 +59,9 @@ SIMULATED = {
     "fixed step": (lambda: _scene("four_bar"), {"integrator": "gauss6", "step": 1e-2}),
     "taylor": (lambda: _scene("double_pendulum"), {"integrator": "taylor", "step": 1e-4}),
     "implicit": (lambda: _scene("pendulum"), {"integrator": "radau5", "rtol": 1e-8}),
-    "Python": (_called_law, {}),
+    "callbacks": (_called_law, {}),
+    "callbacks, fixed step": (_called_law, {"integrator": "rk4", "step": 1e-1}),
+    "Python": (_called_law, {"integrator": "radau5", "rtol": 1e-8}),
     "certified": (lambda: _scene("double_pendulum"), {"backend": "recursion"}),
     "SciPy": (lambda: _scene("double_pendulum"), {"integrator": "scipy_dop853", "rtol": 1e-8}),
     "CVODE": (lambda: _scene("double_pendulum"), {"integrator": "cvode_adams", "rtol": 1e-8}),

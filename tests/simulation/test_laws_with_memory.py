@@ -1,12 +1,13 @@
 """Laws that keep something from one call for the next: said where the motion depends on it, and only there."""
 
+import itertools
 import warnings
 
 import numpy as np
 import pytest
 
 import gauss
-from gauss.errors import SwitchingWarning
+from gauss.errors import SimulationError, SwitchingWarning
 from tests.support.switching import slider
 
 
@@ -120,3 +121,26 @@ def test_a_law_that_asks_for_the_time_and_never_changes_is_said(width):
         warnings.simplefilter("always")
         rate = gauss.simulate(system, 10.0, progress=False).v[-1, 0]
     assert np.isclose(rate, 1.0, rtol=1e-8) != bool(heard)
+
+
+RNG, COUNT = np.random.default_rng(1), itertools.count()
+RANDOM = {
+    "of time": lambda t: float(RNG.normal()),
+    "of the state": lambda t, motion: float(RNG.normal()) - motion.rate("x"),
+    "an iterator": lambda t: float(next(COUNT)),
+}
+
+
+@pytest.mark.parametrize("name", RANDOM)
+@pytest.mark.parametrize("integrator", ["dop853", "radau5", "scipy_dop853"])
+def test_a_random_law_is_refused_by_adaptive_steps(name, integrator):
+    scene = slider(RANDOM[name])
+    with warnings.catch_warnings(), pytest.raises(SimulationError, match="as if it were random"):
+        warnings.simplefilter("ignore", SwitchingWarning)
+        gauss.simulate(scene, 1.0, integrator=integrator, progress=False)
+
+
+@pytest.mark.parametrize("name", RANDOM)
+def test_a_random_law_is_warned_of_by_fixed_steps(name):
+    with pytest.warns(SwitchingWarning, match="gives other values when it is called again"):
+        gauss.simulate(slider(RANDOM[name]), 0.1, integrator="rk4", step=0.05, progress=False)

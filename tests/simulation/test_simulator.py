@@ -1,6 +1,7 @@
 """The simulator: its steps are those of simulate, bit for bit; snapshots, outputs, refusals."""
 
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -132,9 +133,26 @@ LASTING = {
 
 @pytest.mark.parametrize("name", SHORT)
 def test_features_of_laws_that_are_shorter_than_the_steps_are_warned_of(name):
-    for _ in range(2):
-        with pytest.warns(SwitchingWarning, match="'cart': steps of 0.03 s pass over a feature of a law of time"):
-            gauss.Simulator(_pushed(SHORT[name]), step=0.03)
+    for make in (gauss.Simulator, partial(gauss.SimulatorBatch, batch=2)):
+        for _ in range(2):
+            with pytest.warns(SwitchingWarning, match="'cart': steps of 0.03 s pass over a feature of a law of time"):
+                make(_pushed(SHORT[name]), step=0.03)
+
+
+JUMPING = {  # prescribed motions that jump at 100 s [m/s], [m]
+    "speed": lambda t: gauss.math.where(t < 100.0, 0.5, 0.0),
+    "displacement": lambda t: gauss.math.where(t < 100.0, 0.0, 1.0),
+    "a kink": lambda t: abs(t - 100.0),
+}
+
+
+@pytest.mark.parametrize("name", JUMPING)
+def test_prescribed_motions_that_jump_are_refused(name):
+    scene = _pushed(0.0)
+    scene.drive("x", **{"speed" if name == "speed" else "displacement": JUMPING[name]})
+    for make in (gauss.Simulator, partial(gauss.SimulatorBatch, batch=2)):
+        with pytest.raises(SimulationError, match="jump.* at t = 100 s"):
+            make(scene, step=0.03)
 
 
 @pytest.mark.parametrize("name", LASTING)
@@ -142,6 +160,28 @@ def test_laws_that_the_steps_resolve_are_not_warned_of(name):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         gauss.Simulator(_pushed(LASTING[name]), step=0.03)
+
+
+NARROW = {  # a force from x = 1 m to a place [m], start [m] and speed [m/s], and whether steps of 0.03 s may pass over it
+    "narrow": (1.001, 0.5, 3.0, True),
+    "wide": (2.0, 0.95, 0.2, False),
+}
+
+
+@pytest.mark.parametrize("name", NARROW)
+def test_a_place_that_a_step_passes_over_is_warned_of_once_for_each_motion(name):
+    far, begin, speed, told = NARROW[name]
+    inside = lambda x: gauss.math.where((x > 1.0) & (x < far), 1.0, 0.0)  # noqa: E731
+    scene = _pushed(lambda t, motion: inside(motion.coordinate("x")))
+    scene.start("x", begin, speed)
+    for sim in (gauss.Simulator(scene, step=0.03), gauss.SimulatorBatch(scene, step=0.03, batch=3)):
+        for _ in range(2):
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                for _ in range(20):
+                    sim.step()
+            assert [one.category for one in caught] == [SwitchingWarning] * told
+            sim.reset()
 
 
 def test_a_scene_in_which_nothing_moves_has_no_steps():

@@ -19,6 +19,10 @@ def _again(thing):
     return pickle.loads(pickle.dumps(thing))
 
 
+def _parts(found) -> tuple:
+    return found if isinstance(found, tuple) else (found,)
+
+
 def named_law(t):
     """A law with a name in a module."""
     return 0.1 * np.sin(t)
@@ -82,6 +86,38 @@ def test_other_processes_simulate_a_system():
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         found = pool.submit(_swing, system, 1.0).result()
     np.testing.assert_array_equal(found.q, _swing(system, 1.0).q)
+
+
+FUNCTIONS = {
+    "a matrix": lambda s: (s.mass_matrix, "q"),
+    "accelerations": lambda s: (s.forward_dynamics, "qvv"),
+    "of a frame": lambda s: (s.jacobian, "qf"),
+    "several": lambda s: (s.function("mass_matrix", "bias_forces"), "qv"),
+    "of independent coordinates": lambda s: (s.function("mass_matrix", independent=("A",)), "q"),
+}
+
+
+@pytest.mark.parametrize("kind", FUNCTIONS)
+def test_functions_of_a_state_are_made_again(kind):
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    start, (function, letters) = system.initial_state(), FUNCTIONS[kind](system)
+    given = [{"q": start.q, "v": start.v, "f": "coupler"}[letter] for letter in letters]
+    for one, other in zip(_parts(function(*given)), _parts(_again(function)(*given)), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_simulators_and_prepared_motions_go_on_where_they_were():
+    scene = gauss.load("cart_pole")
+    scene.input("push", "rail", limits=10.0)
+    one = gauss.Simulator(scene, step=1e-3)
+    one.step([3.0], n=7)
+    other = _again(one)
+    for simulator in (one, other):
+        simulator.step(n=5)
+    assert one.snapshot() == other.snapshot()
+    swing = gauss.prepare(gauss.load("pendulum"), 0.3, times=[0.1, 0.3])
+    expected = swing([0.2], [1.0])[0].copy()
+    np.testing.assert_array_equal(_again(swing)([0.2], [1.0])[0], expected)
 
 
 @pytest.mark.parametrize("kind", ["drive", "relation", "displacement"])

@@ -1,4 +1,4 @@
-"""A case of the atlas, and what becomes of a method in it."""
+"""A case of the atlas, and the verdict on a method in it."""
 
 import warnings
 from collections.abc import Callable

@@ -23,7 +23,7 @@ GROUND = "ground"
 
 @dataclass(frozen=True)
 class MovedScene:
-    """A random scene, and how it is to be moved.
+    """A random scene, and the settings of its motion.
 
     Parameters
     ----------

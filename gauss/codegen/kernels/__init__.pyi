@@ -1,14 +1,14 @@
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
 from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, AdaptiveBatchLoop, MotionQueue
-from gauss.codegen.kernels.block_contacts import BlockContactLaws, BlockContactSolver, ContactGraph, Round
+from gauss.codegen.kernels.block_contacts import BlockContactLaws, BlockContactSolver, ContactGraph
 from gauss.codegen.kernels.block_ldlt import BlockLDLT
 from gauss.codegen.kernels.call_recorder import CallRecorder, Operand, RecordedCalls, Slot, Vector
 from gauss.codegen.kernels.call_table import CallTable
 from gauss.codegen.kernels.checked_recursion import CorrectedRecursion, Correction
 from gauss.codegen.kernels.checked_switch import CheckedSwitch
 from gauss.codegen.kernels.column_pivoting import Pivots
-from gauss.codegen.kernels.compiled_loop import Loop, address
-from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
+from gauss.codegen.kernels.compiled_loop import CallingLoop, Loop, address
+from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver, Round
 from gauss.codegen.kernels.contact_step import ContactForces
 from gauss.codegen.kernels.energy_record import (
     ENERGY_RECORD,
@@ -40,6 +40,7 @@ __all__ = [
     "Operand",
     "BlockLDLT",
     "CallTable",
+    "CallingLoop",
     "CallRecorder",
     "ContactForces",
     "Control",

@@ -13,15 +13,14 @@ exact laws. Where Newton's method fails, projected Gauss–Seidel sweeps over si
 
 import ctypes
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, constant_array, machine
+from gauss.codegen import INTEGER, POINTER, Function, machine
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 from gauss.codegen.kernels.block_lu import INTEGERS, write_order, write_solve
-from gauss.codegen.kernels.contact_solver import LARGEST_RESIDUAL_SUM
+from gauss.codegen.kernels.contact_solver import LARGEST_RESIDUAL_SUM, Round, table_of
 from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH, TwistRows
 
 SIDE = 3 * WIDTH  # doubles of the rows of one contact for one body: normal, two tangents
@@ -31,25 +30,6 @@ LEAST_NUMBER = 1e-60  # forces and velocities that are set to zero: their square
 ELIMINATED = 12  # K (3, 3) and g (3,) of a contact
 ORDER = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 7)
 SOLVE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 14)
-
-
-class Round(NamedTuple):
-    """Round of Newton steps.
-
-    Attributes
-    ----------
-    sweeps : int
-        Gauss–Seidel sweeps before it.
-    regularisation : float
-        ε, relative to the diagonal of the Delassus matrix: large values change the forces less by a step, and converge
-        linearly where small ones may cycle.
-    steps : int
-        Newton steps.
-    """
-
-    sweeps: int
-    regularisation: float
-    steps: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +73,7 @@ class _BlockContactWriter:
             self.best[i] = f[i]
         least, done, round_, total = r.variable(np.inf), r.variable(0, INTEGER), r.variable(0, INTEGER), r.variable(0.0)
         columns = zip(Round._fields, zip(*laws.rounds, strict=True), strict=True)
-        sweeps, regularisation, steps = (self._table(name, values) for name, values in columns)
+        sweeps, regularisation, steps = (table_of(r, name, values) for name, values in columns)
         with r.loop() as leave_if:
             leave_if((round_[0] >= len(laws.rounds)) | (done[0] > 0))
             with r.each(self.m * 3) as i:
@@ -125,10 +105,6 @@ class _BlockContactWriter:
         self.result[0], self.result[1] = least[0], total[0]
         self.result[2] = r.as_double(round_[0])
         r.done()
-
-    def _table(self, name: str, values: tuple) -> Array:
-        array = np.array(values)
-        return Array(self.r.b, self.r.b.gep(constant_array(self.r.module, name, array), [INTEGER(0), INTEGER(0)]))
 
     def _sides(self, c: Value):
         """Body and rows of both sides of a contact."""

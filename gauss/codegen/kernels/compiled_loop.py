@@ -1,12 +1,13 @@
 """Python interface of a compiled loop."""
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from gauss.codegen import Function, NativeFunction, Writer, machine
 from gauss.codegen.kernels.loop_control import Control, Numbers
+from gauss.codegen.python_callback import HOLDING
 from gauss.codegen.tiers import EntryPoint
 
 FLOAT = np.dtype(float)
@@ -27,6 +28,8 @@ class Loop:
         Functions of the loop that can also be called by name, see :meth:`evaluate`.
     """
 
+    prototype: Callable = staticmethod(ctypes.CFUNCTYPE)
+
     def __init__(self, writer: Writer, name: str, functions: Sequence[Function | NativeFunction]):
         for function in functions:
             writer.export(function, function.name)
@@ -37,10 +40,10 @@ class Loop:
 
     def __setstate__(self, state: tuple):
         self.code, self.name, self.arities = state
-        single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+        single = self.prototype(None, ctypes.c_void_p, ctypes.c_void_p)
         self._single = {name: (self.code.entry(name, single), *arity) for name, arity in self.arities.items()}
         pointers = [ctypes.c_void_p] * len(POINTERS)
-        self._run = self.code.entry(self.name, ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64))
+        self._run = self.code.entry(self.name, self.prototype(None, *pointers, ctypes.c_int64))
 
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
         """Run to the end, or until the budget is used up; it changes ``control`` and all arrays except ``grid``.
@@ -79,6 +82,21 @@ class Loop:
             raise ValueError(f"{name}: expected ({n_in},) inputs, got shape {given.shape}.")
         function.call(address(given), address(found))
         return found
+
+
+class CallingLoop(Loop):
+    """Compiled loop whose functions call Python, see :mod:`gauss.codegen.python_callback`.
+
+    Parameters
+    ----------
+    loop : Loop
+        Machine code of the loop.
+    """
+
+    prototype = staticmethod(HOLDING)
+
+    def __init__(self, loop: Loop):
+        self.__setstate__(loop.__getstate__())
 
 
 class BatchLoop:

@@ -1,12 +1,14 @@
-"""Contact problem W f + b = u under contact laws: semismooth Newton method, projected Gauss–Seidel sweeps where it fails.
+"""Contact problem W f + b = u under contact laws: semismooth Newton method, regularised where it fails.
 
 W is the Delassus matrix, f the forces, u the relative velocities. Rows: normals, then two tangential ones per frictional
 contact, then limited elements (dry friction of joints, brakes). Residual and derivatives of each law are traced functions
-(Alart and Curnier, CMAME 92, 1991).
+(Alart and Curnier, CMAME 92, 1991). Steps with the Jacobian r' + ε 1 change the forces less; projected Gauss–Seidel sweeps
+come last.
 """
 
 import ctypes
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -17,6 +19,25 @@ from gauss.codegen.kernels.small_linear_systems import space, write_equations
 
 SMALLEST_DIAGONAL = 1e-300  # lower bound of the largest diagonal entry of W, against a division by zero
 LARGEST_RESIDUAL_SUM = 1e300  # sum of the residuals above which they count as infinite
+
+
+class Round(NamedTuple):
+    """Round of Newton steps.
+
+    Attributes
+    ----------
+    sweeps : int
+        Gauss–Seidel sweeps before it.
+    regularisation : float
+        ε, relative to the diagonal of the Delassus matrix: large values change the forces less by a step, and converge
+        linearly where small ones may cycle.
+    steps : int
+        Newton steps.
+    """
+
+    sweeps: int
+    regularisation: float
+    steps: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +54,8 @@ class ContactSolver:
     project_normal, project_friction, project_limited : Function
         Projections onto the admissible forces: f → normal force; (two forces, radius) → two tangential forces;
         (f, limit) → force of a limited element.
-    sweeps : tuple of int
-        Gauss–Seidel sweeps before each round of Newton steps.
-    steps : int
-        Newton steps per round.
+    rounds : tuple of Round
+        Rounds of Newton steps, until one succeeds.
     target, accepted : float
         Target and acceptance limit of the residual, relative to 1 + the largest velocity.
     least_diagonal : float
@@ -49,8 +68,7 @@ class ContactSolver:
     project_normal: Function
     project_friction: Function
     project_limited: Function
-    sweeps: tuple[int, ...]
-    steps: int
+    rounds: tuple[Round, ...]
     target: float
     accepted: float
     least_diagonal: float
@@ -64,6 +82,11 @@ class ContactSolver:
         """
         kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGER.as_pointer()] + [POINTER] * 5
         return _ContactSolverWriter(self, subroutine(module, "solve_contacts", kinds)).write()
+
+
+def table_of(r: Routine, name: str, values: tuple) -> Array:
+    """Constant table of a module."""
+    return Array(r.b, r.b.gep(constant_array(r.module, name, np.array(values)), [INTEGER(0), INTEGER(0)]))
 
 
 def room_of(rows: int) -> int:
@@ -80,6 +103,7 @@ class _ContactSolverWriter:
         self.n = n = self.limited_rows + self.limited
         self.w, self.u, self.error, self.best, self.step = (room.after(n * k) for k in range(5))
         self.slope, self.work = room.after(n * 5), room.after(n * 5 + n * n)
+        self.eps = r.variable(0.0)
         self.equations = write_equations(r.module)
 
     def write(self) -> ir.Function:
@@ -91,16 +115,18 @@ class _ContactSolverWriter:
             self.best[i] = self.f[i]
         scale[0] = scale[0] + 1.0
         least, done, round_ = r.variable(np.inf), r.variable(0, INTEGER), r.variable(0, INTEGER)
-        times = Array(r.b, r.b.gep(constant_array(r.module, "sweeps", np.array(laws.sweeps)), [INTEGER(0), INTEGER(0)]))
+        columns = zip(Round._fields, zip(*laws.rounds, strict=True), strict=True)
+        sweeps, regularisation, steps = (table_of(r, f"dense_{name}", values) for name, values in columns)
         with r.loop() as leave_if:
-            leave_if((round_[0] >= len(laws.sweeps)) | (done[0] > 0))
+            leave_if((round_[0] >= len(laws.rounds)) | (done[0] > 0))
             with r.each(self.n) as i:
                 self.f[i] = self.best[i]
-            with r.each(times[round_[0]]):
+            self.eps[0] = regularisation[round_[0]]
+            with r.each(sweeps[round_[0]]):
                 self._sweep()
             tries = r.variable(0, INTEGER)
             with r.loop() as leave_round_if:
-                leave_round_if((tries[0] >= laws.steps) | (done[0] > 0))
+                leave_round_if((tries[0] >= steps[round_[0]]) | (done[0] > 0))
                 residual = self._residuals()
                 with r.when(residual < least[0]):
                     least[0] = residual
@@ -112,7 +138,7 @@ class _ContactSolverWriter:
                     self._newton()
                 tries[0] = tries[0] + 1
                 with r.when(residual >= LARGEST_RESIDUAL_SUM):
-                    tries[0] = laws.steps
+                    tries[0] = steps[round_[0]]
             round_[0] = round_[0] + 1
         with r.each(self.n) as i:
             self.f[i] = self.best[i]
@@ -191,6 +217,7 @@ class _ContactSolverWriter:
         r, step = self.r, self.step
         with r.each(self.n) as i:
             step[i] = -self.error[i]
+            self.slope[i * self.n + i] = self.slope[i * self.n + i] + self.eps[0]
         r.call(self.equations, self.n, self.slope, step, self.work)
         with r.each(self.n) as i:
             self.f[i] = self.f[i] + step[i]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import from_disk, write
-from gauss.codegen.kernels import CompiledMechanismStep, StepFunctions
+from gauss.codegen.kernels import CompiledMechanismStep, StepFunctions, address
 from gauss.codegen.kernels.step_memory import (
     ADDRESSES,
     CHANGE,
@@ -111,14 +111,18 @@ class CompiledStepMemory:
             "status": np.zeros(1, dtype=np.int64),
             "column": column.astype(np.int64),
         }
-        self.loop_settings = self._loop_settings()
+        self.first_settings, self.loop_settings = self._first_settings()
         at["own"][:] = 1.0 / stepper.system.scale.coordinates
         self.pair_keys = first * len(table.parts) + second
 
-    def _loop_settings(self) -> dict[str, float]:
-        scale = self.stepper.system.scale
+    def _first_settings(self) -> tuple[np.ndarray, np.ndarray]:
+        """Settings of a step, and of the loop, before its first step."""
+        scale, stepper = self.stepper.system.scale, self.stepper
         rates = {"pace": 1.0 / scale.time, "resting": scale.time * RESTING, "sliding": scale.time * SLIDING_SPEED}
-        return rates | {"shares": self.stepper.shares[0], "recorded": 0.0, "largest": 0.0}
+        loop = rates | {"shares": stepper.shares[0], "recorded": 1.0, "largest": 0.0}
+        given = [(STEP_SETTINGS, stepper.constants), (LOOP_SETTINGS, loop)]
+        step, loops = (np.array([values.get(name, 0.0) for name in names]) for names, values in given)
+        return step, loops
 
     def connect(self):
         """Take all addresses anew: a new motion may run in another tier."""
@@ -145,12 +149,10 @@ class CompiledStepMemory:
             self.connect()
         at, record = self.at, self.stepper.record
         self._begin(state)
-        settings = {"t": state.t, "h": 0.0, "rest": 0.0, "slow": 0.0, "share": 0.0} | self.stepper.constants
-        at["settings"][:] = [settings[name] for name in STEP_SETTINGS]
-        loop = self.loop_settings | {"recorded": 1.0}
-        at["loop"][:], at["work"][:] = [loop[name] for name in LOOP_SETTINGS], work
+        at["settings"][:], at["settings"][STEP_SETTINGS.index("t")] = self.first_settings, state.t
+        at["loop"][:], at["work"][:] = self.loop_settings, work
         before = record.kept()
-        self.code.advance(*self.given, ends.size, ends.ctypes.data, rows.ctypes.data)
+        self.code.advance(*self.given, ends.size, address(ends), address(rows))
         _, _, changed, count = record.counts.tolist()
         changes = record.recorded(at["changes"][: CHANGE * changed], before)
         ended = int(self.integers["status"][0]) == FINISHED

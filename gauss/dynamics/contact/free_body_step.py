@@ -353,7 +353,8 @@ class FreeBodyStepper:
         if near.gap.size and near.gap[worst] < -START_OVERLAP * self.system.scale.length:
             name = self.table.contacts[near.law[worst]].name
             raise StateError(
-                f"t = {state.t:.6g} s: {-near.gap[worst]:.3g} [m, rad] inside of {name!r}; move it out with scene.start."
+                f"t = {state.t:.6g} s: {-near.gap[worst]:.3g} [m, rad] inside of {name!r}; move it out with scene.start, "
+                "or begin at gauss.resolve_overlaps(system)."
             )
 
 

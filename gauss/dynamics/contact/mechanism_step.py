@@ -369,5 +369,5 @@ class MechanismStepper:
             inside = -np.concatenate([near.gap, begun.terms.gap])[worst]
             raise StateError(
                 f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.rows.name(near, worst)!r}; "
-                "move it out with scene.start."
+                "move it out with scene.start, or begin at gauss.resolve_overlaps(system)."
             )

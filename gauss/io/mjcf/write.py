@@ -136,6 +136,8 @@ def to_mjcf(scene: Scene) -> str:
     A moment of inertia that is zero, or that a planar motion never uses, is replaced by one that MuJoCo accepts; a comment
     in the file says so.
     """
+    if scene.states:
+        raise FileError(f"state {next(iter(scene.states))!r}: MuJoCo has no counterpart of states with laws of their own.")
     system = compile_scene(scene)
     tree, cut = spanning_tree(scene)
     document = MjcfDocument(scene, system, [limb(system, *edge) for edge in tree])

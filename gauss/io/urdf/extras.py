@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -69,7 +70,7 @@ def with_extras(
     if not resistance:
         left += _named("damping and friction of {} (resistance=True or --read resistance reads them)", resisting)
     if collisions:
-        unlike = [what for link in source.root.findall("link") for what in _shapes(scene, source, link)]
+        unlike = chain.from_iterable(_shapes(scene, source, link) for link in source.root.findall("link"))
         left += _named("collision shapes that are not modelled: {}", unlike)
     if motors:
         left += _named("transmissions that are not modelled: {}", add_motors(scene, source))

@@ -14,6 +14,8 @@ from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.plan import plan_of
+from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
@@ -57,7 +59,8 @@ def rollout(
 
     With "rk4", "semi_implicit_euler" and "time_stepping" all motions make ``steps`` steps of one length; with "dop853" and
     "dopri5" each has step-size control of its own, by ``rtol`` and ``atol``, and samples at the same ``times`` by dense
-    output. Contacts, stops and friction take "time_stepping", whose motions follow one another in scalar code. The
+    output. Contacts, stops and friction take "time_stepping", whose motions follow one another in scalar code; with many
+    contacts of shapes each of them is made by :func:`gauss.simulate`. The
     accelerations are checked on the way by inverse dynamics, and loops by their constraint residuals. A motion that fails a
     check, or with a contact problem that machine code does not solve, is repeated by :func:`gauss.simulate`.
 
@@ -153,10 +156,13 @@ def _fixed(
     control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
-    batch = _begun(system, starts, method, control is not None, device)
-    times, t = _switching(system, starts, steps * step).times, step * every * np.arange(steps // every + 1)
+    t = step * every * np.arange(steps // every + 1)
     run = {"integrator": method.name, "step": step, "times": t}
     settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
+    if device is None and _has_pair_kernels(system, method, control is not None):
+        return _singly(system, starts, steps, run, settings, control)
+    batch = _begun(system, starts, method, control is not None, device)
+    times = _switching(system, starts, steps * step).times
     if times.switches.size:  # steps of a batch cannot end there
         return _singly(system, starts, steps, run, settings, control)
     samples = batch.run(steps, step, every, threads, control)
@@ -176,6 +182,13 @@ def _fixed(
     lost, repeated = tuple(map(int, np.flatnonzero(~finite))), tuple(map(int, doubtful))
     marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again}
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
+
+
+def _has_pair_kernels(system: System, method: FixedStep, held: bool) -> bool:
+    """Whether a motion is made by kernels of pairs of shapes, one after the other."""
+    if not method.nonsmooth:
+        return False
+    return plan_of(Question(system, Laws(system), method=method, held=held)).dynamics == "pair kernels"
 
 
 def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[int, float]:

@@ -21,6 +21,7 @@ from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fix
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.simulator import Simulator, SimulatorState, checked_count
 from gauss.simulation.tolerances import check_tolerances
+from gauss.simulation.undetected_switching import refuse_jumps, warn_of_passages, warn_of_short_features
 from gauss.system import State, System, retract
 
 
@@ -57,7 +58,8 @@ class SimulatorBatch:
     Raises
     ------
     SimulationError
-        If there is no such method, or the scene cannot be compiled, with the reasons.
+        If there is no such method, if the scene cannot be compiled, with the reasons, or if a prescribed motion jumps within
+        the first ten thousand steps.
 
     Examples
     --------
@@ -86,6 +88,8 @@ class SimulatorBatch:
             self._loop = fixed_step_code(system, method, bool(self.inputs))
             self._measure = _outputs(system, bool(self.inputs), method.nonsmooth)
         self._start, self._size = system.initial_state(), checked_count("batch", batch)
+        refuse_jumps(system, self._start, self.step_size)
+        warn_of_short_features(whole.name, Laws(system), self.step_size)
         self._u = np.zeros((self._size, 1, len(self.inputs)))
         self._alone: Simulator | None = None
         self.reset()
@@ -121,7 +125,7 @@ class SimulatorBatch:
         if seed is not None:
             rng = np.random.default_rng(seed)
             starts = np.array([self._changed(start, rng, spread) for start in starts.T]).T
-        self._batch, self._steps = FixedStepBatch(self._loop, starts), 0
+        self._batch, self._steps, self._warned = FixedStepBatch(self._loop, starts), 0, False
         refuse_inconsistent(self.system, starts, self._batch.residual)
         self._u[:] = 0.0
         self.diverged, self.unconfirmed = np.zeros((2, self._size), dtype=bool)
@@ -161,6 +165,11 @@ class SimulatorBatch:
         n : int
             Number of steps.
 
+        Warns
+        -----
+        SwitchingWarning
+            Once between resets, if a law of the state may have switched undetected within a step.
+
         Raises
         ------
         SimulationError
@@ -173,6 +182,9 @@ class SimulatorBatch:
         batch.worst[:] = 0.0
         batch.advance(self._steps, n, self.step_size, self.threads, self._u if self.inputs else None)
         self._steps += n
+        if not self._warned and (batch.unseen > 0.0).any():
+            warn_of_passages(self.system, batch.unseen, self.integrator)
+            self._warned = True
         finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
         confirmed = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
         if before is None:

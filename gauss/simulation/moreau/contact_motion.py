@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gauss.codegen.kernels.step_memory import CHANGES_ROOM
 from gauss.dynamics.contact.contact_changes import ModeChange
 from gauss.dynamics.contact.contact_stepper import contact_stepper, new_contact_stepper
 from gauss.errors import GaussError
@@ -62,7 +63,7 @@ class ContactMotion:
     def __init__(self, system: System, held: bool = False, own: bool = False):
         self.system, self.stepper = system, (new_contact_stepper if own else contact_stepper)(system, held)
         self.row = 4 + system.n_q + system.n_v
-        self.paradoxes = ParadoxWarnings()
+        self.paradoxes, self.warned = ParadoxWarnings(), set[bytes]()
 
     def begin(self, start: State):
         """Begin at a state."""
@@ -83,11 +84,13 @@ class ContactMotion:
         GaussError
             If the first step fails. If another one fails, the rows end before it.
         """
-        rows, done = np.empty((ends.size, self.row)), 0
+        ends, done = np.ascontiguousarray(ends), 0  # machine code reads them
+        rows = np.empty((ends.size, self.row))
         while done < ends.size:
-            done += self._by_machine_code(ends[done:], rows[done:])
-            if done == ends.size:
-                break
+            count, goes_on = self._by_machine_code(ends[done:], rows[done:])
+            done += count
+            if done == ends.size or goes_on:
+                continue
             try:
                 rows[done] = self._by_python(float(ends[done]))
             except GaussError:
@@ -97,19 +100,27 @@ class ContactMotion:
             done += 1
         return rows
 
-    def _by_machine_code(self, ends: np.ndarray, rows: np.ndarray) -> int:
-        """Number of steps that machine code finishes."""
+    def _by_machine_code(self, ends: np.ndarray, rows: np.ndarray) -> tuple[int, bool]:
+        """Number of steps that machine code finishes, and whether it may continue."""
         begin, loop = self.state, self.stepper.run(self.state, self.work, ends, rows)
         if not loop.count:
-            return 0
+            return 0, False
         self._note([begin.t, *ends], loop.changes)
         self.steps, self.largest = self.steps + loop.count, max(self.largest, loop.largest)
         if loop.doubtful:
             before = begin if loop.count == 1 else self._state_of(rows[loop.count - 2])
-            self.paradoxes.warn(self.stepper.examined(before, float(ends[loop.count - 1]) - before.t), before.t)
+            self._examine(before, float(ends[loop.count - 1]))
         last = rows[loop.count - 1]
         self.state, self.work = self._state_of(last), last[-3:].copy()
-        return loop.count
+        return loop.count, loop.doubtful or len(loop.changes) >= CHANGES_ROOM
+
+    def _examine(self, before: State, t: float):
+        """Warn of Painlevé's paradoxes of a step, unless the same contacts were warned of."""
+        key = self.stepper.record.modes.tobytes()
+        if key not in self.warned:
+            found = self.stepper.examined(before, t - before.t)
+            self.paradoxes.warn(found, before.t)
+            self.warned |= {key} if found else set()
 
     def _state_of(self, row: np.ndarray) -> State:
         n_q = self.system.n_q

@@ -4,6 +4,8 @@ import numpy as np
 
 from gauss.codegen.kernels import Control, LoopStatus
 from gauss.dynamics.conditions import smooth_question
+from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.resolve_overlaps import resolved
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
@@ -60,7 +62,10 @@ class PairKernelSteps:
 
     def separated(self, state: State) -> State:
         """State whose shapes do not overlap."""
-        return resolved(self.motion.stepper, state)
+        stepper = self.motion.stepper
+        if not isinstance(stepper, MechanismStepper):
+            stepper = contact_stepper(self.motion.system, True)
+        return resolved(stepper, state)
 
     def begun(self, start: State) -> np.ndarray:
         """Point (layout.size,) of a new motion."""
@@ -71,10 +76,9 @@ class PairKernelSteps:
     def call(self, point: np.ndarray, grid: np.ndarray, n: int):
         """Make n steps from a point to the times of a grid."""
         motion, layout, n_v = self.motion, self.layout, self.layout.n_v
-        before = layout.point(point)
-        motion.state, motion.work = State(float(point[0]), before.state.q.copy(), before.state.v.copy()), before.work.copy()
+        row, end = point[: layout.row].copy(), 1 + layout.n_q
+        motion.state, motion.work = State(float(row[0]), row[1:end], row[end : end + n_v]), row[-3:]
         motion.hold(point[layout.size - self.inputs.size :])
-        row = point[: layout.row].copy()
         try:
             rows = motion.advance(grid[:n, 0])
         except GaussError:

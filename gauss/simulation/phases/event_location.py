@@ -5,6 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from gauss.simulation.brent import brent
+
 SUBINTERVALS = 8  # subintervals of a step: the sign of the gap rate shows a gap that closes and opens again within one
 GRAZING = 1e-11  # relative to the size of a gap: one whose minimum is negative by no more than this is not hit
 TIME_TOLERANCE = 1e-15  # relative
@@ -53,9 +55,7 @@ def _hit(at, times, width, rate) -> float | None:
 
 def _brent(function, begin: float, end: float) -> float:
     """Root of a function between two points of different sign, to rounding (Brent)."""
-    from scipy.optimize import brentq  # a slow import, for contacts only
-
-    return brentq(function, begin, end, xtol=TIME_TOLERANCE * max(abs(begin), abs(end)), rtol=TIME_TOLERANCE)
+    return brent(function, begin, end, xtol=TIME_TOLERANCE * max(abs(begin), abs(end)), rtol=TIME_TOLERANCE)
 
 
 def _root(width, begin: float, end: float) -> float:

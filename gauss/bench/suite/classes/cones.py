@@ -17,7 +17,7 @@ SLIDING = ("block tilt 0.5 friction 0.25", "block tilt 1", "balls 1")  # no more
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for name, heap, friction in heaps():
         yield f"cones {name}", partial(forces, "cones", f"cones {name}", heap, friction)
     for name, heap, friction in heaps():

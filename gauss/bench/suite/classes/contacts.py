@@ -17,7 +17,7 @@ from gauss.scene import Scene
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for n in (4, 8, 16, 32, 64):
         for form in ("F2", "F3"):
             yield f"contacts stops {n} {form}", partial(_stops, n, form)

@@ -10,7 +10,7 @@ from gauss.bench.suite.classes.cones import forces, heaps
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for name, heap, friction in heaps():
         yield f"coulomb {name}", partial(forces, "coulomb", f"coulomb {name}", heap, friction)
     for legs in (3, 6, 8, 12):

@@ -17,7 +17,7 @@ WEIGHT = 40.0  # [N], of a table
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for legs in (4, 8, 12):
         for share, where in (
             (0.0, "at rest"),

@@ -18,7 +18,7 @@ LOOPS: dict[str, dict] = {
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for robot, options in ROBOTS.items():
         yield f"equality {robot}", partial(_robot, robot, options)
     for n in CHAINS:

@@ -19,7 +19,7 @@ GRID = 2.0**8
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for power in MARGINS:
         yield f"infeasible clamp 2^-{power}", partial(_clamp, power)
         yield f"infeasible sums 2^-{power}", partial(_sums, power)

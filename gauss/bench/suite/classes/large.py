@@ -17,7 +17,7 @@ from gauss.dynamics.assemble import assemble
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for n in (1700, 2500):
         yield f"large chain {n}", partial(_chain, n)
     for steps in (1000, 5000):

@@ -54,7 +54,7 @@ class Plant(NamedTuple):
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for steps in (10, 30, 100):
         yield f"mpc cart and pole {steps}", partial(_horizon, "cart and pole", steps)
         yield f"mpc masses {steps}", partial(_horizon, "masses", steps)

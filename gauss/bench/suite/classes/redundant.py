@@ -26,7 +26,7 @@ GRID = 2.0**10  # entries are multiples of its inverse, so that sums of rows are
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for name in LOOPS:
         yield f"redundant {name}", partial(_loop, name, name, {})
     for n in (2, 5, 10, 20):

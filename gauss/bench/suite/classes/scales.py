@@ -21,7 +21,7 @@ LINKS = 8
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for units in UNITS:
         yield f"scales {units}", partial(_units, units)
     for digits in (3, 6, 9, 12):

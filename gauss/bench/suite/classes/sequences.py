@@ -28,7 +28,7 @@ LOSS = (
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     motions = {
         "falling chain": partial(_falling_chain, 5),
         "dropped box": _dropped_box,

@@ -12,7 +12,7 @@ from gauss.bench.suite.instance import UNBOUNDED, SuiteInstance, SuiteReference,
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for power in (0, 10, 20):
         yield f"unbounded slider 2^-{power}", partial(_slider, power)
     for n in (4, 16):

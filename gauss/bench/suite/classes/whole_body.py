@@ -33,7 +33,7 @@ WEIGHTS = {"base": 1.0, "posture": 1e-2, "force": 1e-6, "torque": 1e-5}
 
 
 def recipes() -> Iterator:
-    """Names, and how instances are made."""
+    """Names and constructors of the instances."""
     for name in FEET:
         for seed in (0, 1):
             yield f"whole body {name} {seed}", partial(control, name, seed)

@@ -1,0 +1,245 @@
+"""Ready actuators with states of their own: motors with inductance, PI controllers, filters, muscles, bristle friction.
+
+Each function adds states (:meth:`gauss.Scene.state`) and loads to a scene, and returns the load. Laws are traced.
+"""
+
+from collections.abc import Callable
+
+from gauss import math
+from gauss.scene.builder import name_of
+from gauss.scene.loads import Drive, StateLaw
+from gauss.scene.scene import Scene
+from gauss.scene.values import arguments, number, text
+
+WIDTH = 0.45  # of the force–length curve of a muscle, in optimal lengths (Zajac 1989)
+ECCENTRIC = 1.4  # largest force of a lengthening muscle, in isometric ones
+CURVATURE = 0.25  # of Hill's force–velocity curve, a/F₀
+
+
+def _signal(signal) -> Callable:
+    """Law (t, motion) of a number, or of a law of one or two arguments."""
+    if not callable(signal):
+        return lambda t, motion: signal
+    return signal if arguments(signal) > 1 else lambda t, motion: signal(t)
+
+
+def _positive(what: str, **given: float):
+    for name, value in given.items():
+        number(value, f"{what}: {name}", "SI units", positive=True)
+
+
+def dc_motor(
+    scene: Scene, name: str, joint, voltage=0.0, *, resistance: float, inductance: float, constant: float, ratio: float = 1.0
+) -> Drive:
+    """Direct-current motor on a joint: L i̇ = u − R i − k n q̇, torque k n i; the current i is the state ``"name current"``.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the joint.
+    name : str
+        Name of the motor.
+    joint : str or Joint
+        Joint of one freedom.
+    voltage : float or callable
+        Voltage u [V]: a constant, law(t) or law(t, motion).
+    resistance, inductance : float
+        Of the winding, R [Ω], L [H].
+    constant : float
+        Torque constant k [N m/A], and the same of the back-electromotive force [V s/rad].
+    ratio : float
+        Turns of the motor per turn of the joint, n.
+
+    Returns
+    -------
+    Drive
+        Drive of the joint.
+    """
+    what = f"motor {text(name, 'name of a motor')!r}"
+    _positive(what, resistance=resistance, inductance=inductance, constant=constant)
+    joint, current, law = name_of(joint), f"{name} current", _signal(voltage)
+
+    def rate(t, motion):
+        back = constant * ratio * motion.rate(joint)
+        return (law(t, motion) - resistance * motion.rate(current) - back) / inductance
+
+    scene.require_joint(joint, what)
+    scene.state(current, rate)
+    return scene.drive(joint, torque=lambda t, motion: constant * ratio * motion.rate(current), name=name)
+
+
+def pi_controller(
+    scene: Scene, name: str, joint, target, *, proportional: float, integral: float, derivative: float = 0.0, limit=None
+) -> Drive:
+    """Controller of a coordinate: effort P e + I ∫ e dt − D q̇, e = target − q; ∫ e dt is the state ``"name integral"``.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the joint.
+    name : str
+        Name of the controller.
+    joint : str or Joint
+        Joint of one freedom.
+    target : float or callable
+        Coordinate that is asked for [rad, m]: a constant, law(t) or law(t, motion).
+    proportional, integral, derivative : float
+        Gains P [N m/rad, N/m], I [N m/(rad s), N/(m s)] and D [N m s/rad, N s/m].
+    limit : float, optional
+        Largest effort [N m, N].
+
+    Returns
+    -------
+    Drive
+        Drive of the joint.
+    """
+    joint, stored, law = name_of(joint), f"{name} integral", _signal(target)
+
+    def effort(t, motion):
+        error = law(t, motion) - motion.coordinate(joint)
+        return proportional * error + integral * motion.rate(stored) - derivative * motion.rate(joint)
+
+    scene.require_joint(joint, f"controller {text(name, 'name of a controller')!r}")
+    scene.state(stored, lambda t, motion: law(t, motion) - motion.coordinate(joint))
+    return scene.drive(joint, torque=effort, limit=limit, name=name)
+
+
+def low_pass(scene: Scene, name: str, signal, time: float, start: float = 0.0) -> StateLaw:
+    """Filter of first order: ẋ = (signal − x) / time; its output is the state of its name.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene.
+    name : str
+        Name of the filter, and of its state.
+    signal : callable
+        law(t) or law(t, motion).
+    time : float
+        Time constant [s].
+    start : float
+        Output at the start.
+
+    Returns
+    -------
+    StateLaw
+        Law of the state.
+    """
+    _positive(f"filter {text(name, 'name of a filter')!r}", time=time)
+    law = _signal(signal)
+    return scene.state(name, lambda t, motion: (law(t, motion) - motion.rate(name)) / time, start)
+
+
+def muscle(
+    scene: Scene,
+    name: str,
+    joint,
+    excitation,
+    *,
+    force: float,
+    arm: float,
+    optimal_length: float,
+    fastest: float = 10.0,
+    activation_time: float = 0.015,
+) -> Drive:
+    """Muscle of Hill's type on a joint, without a tendon; its activation a is the state ``"name activation"``.
+
+    ȧ = (u − a) / τ, effort −r F₀ a f(l) g(l̇) with l = l₀ − r q: f is a Gauss curve about l₀, g Hill's hyperbola with a limit
+    where the muscle lengthens (Zajac, Muscle and tendon, 1989).
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the joint.
+    name : str
+        Name of the muscle.
+    joint : str or Joint
+        Joint of one freedom.
+    excitation : float or callable
+        Excitation u from 0 to 1: a constant, law(t) or law(t, motion).
+    force, arm, optimal_length : float
+        Largest isometric force F₀ [N], constant moment arm r [m], positive where the muscle turns the joint forward, and
+        length l₀ of the largest force, at q = 0 [m].
+    fastest : float
+        Largest shortening velocity, in optimal lengths per second.
+    activation_time : float
+        Time constant τ of the activation [s].
+
+    Returns
+    -------
+    Drive
+        Drive of the joint.
+    """
+    what = f"muscle {text(name, 'name of a muscle')!r}"
+    _positive(what, force=force, optimal_length=optimal_length, fastest=fastest, activation_time=activation_time)
+    joint, active = name_of(joint), f"{name} activation"
+
+    def effort(t, motion):
+        stretch = arm * motion.coordinate(joint) / optimal_length
+        shortening = arm * motion.rate(joint) / (optimal_length * fastest)  # share of the largest velocity
+        slow = math.clip(shortening, 0.0, 1.0)
+        concentric = (1.0 - slow) / (1.0 + slow / CURVATURE)
+        lengthening = math.clip(-shortening, 0.0, 1.0)
+        slope = (1.0 + 1.0 / CURVATURE) / (ECCENTRIC - 1.0)  # of both branches at rest the same
+        eccentric = ECCENTRIC - (ECCENTRIC - 1.0) / (1.0 + slope * lengthening)
+        velocity = math.where(shortening > 0.0, concentric, eccentric)
+        return arm * force * motion.rate(active) * math.exp(-((stretch / WIDTH) ** 2)) * velocity
+
+    scene.require_joint(joint, what)
+    low_pass(scene, active, excitation, activation_time)
+    return scene.drive(joint, torque=effort, name=name)
+
+
+def lugre_friction(
+    scene: Scene,
+    name: str,
+    joint,
+    *,
+    coulomb: float,
+    static: float,
+    stribeck: float,
+    stiffness: float,
+    damping: float = 0.0,
+    viscous: float = 0.0,
+) -> Drive:
+    """Bristle friction of a joint: ż = v − σ₀ |v| z / g(v), effort −(σ₀ z + σ₁ ż + σ₂ v); z is the state ``"name bristle"``.
+
+    g(v) = F_c + (F_s − F_c) exp(−(v / v_s)²) (Canudas de Wit, Olsson, Åström, Lischinsky, A new model for control of systems
+    with friction, IEEE Transactions on Automatic Control 40, 1995).
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with the joint.
+    name : str
+        Name of the friction.
+    joint : str or Joint
+        Joint of one freedom.
+    coulomb, static : float
+        Friction when it slips fast, F_c, and at breakaway, F_s [N m, N].
+    stribeck : float
+        Stribeck velocity v_s [rad/s, m/s].
+    stiffness, damping, viscous : float
+        Of the bristles σ₀ [N m/rad, N/m] and σ₁ [N m s/rad, N s/m], and viscous friction σ₂.
+
+    Returns
+    -------
+    Drive
+        Drive of the joint.
+    """
+    what = f"friction {text(name, 'name of a friction')!r}"
+    _positive(what, coulomb=coulomb, static=static, stribeck=stribeck, stiffness=stiffness)
+    joint, bristle = name_of(joint), f"{name} bristle"
+
+    def rate(t, motion):
+        v = motion.rate(joint)
+        g = coulomb + (static - coulomb) * math.exp(-((v / stribeck) ** 2))
+        return v - stiffness * math.abs(v) * motion.rate(bristle) / g
+
+    def effort(t, motion):
+        v = motion.rate(joint)
+        return -(stiffness * motion.rate(bristle) + damping * rate(t, motion) + viscous * v)
+
+    scene.require_joint(joint, what)
+    scene.state(bristle, rate)
+    return scene.drive(joint, torque=effort, name=name)

@@ -1,0 +1,74 @@
+"""Root of a function between two points of different sign (Brent, *Algorithms for Minimization without Derivatives*, ch. 4).
+
+Inverse quadratic interpolation, the secant, or bisection where these converge slowly; operation by operation that of
+``scipy.optimize.brentq``, whose import takes longer than a motion.
+"""
+
+from collections.abc import Callable
+from math import isnan
+
+MOST_ITERATIONS = 100
+NO_STEP = float("inf")  # of an interpolation without a result: bisection is taken
+
+
+def brent(function: Callable[[float], float], begin: float, end: float, xtol: float, rtol: float) -> float:
+    """Root between two points, within xtol + rtol |root|.
+
+    Parameters
+    ----------
+    function : callable
+        Continuous function of a number.
+    begin, end : float
+        Points at which it has different signs, or is zero.
+    xtol, rtol : float
+        Absolute and relative tolerance of the root.
+
+    Raises
+    ------
+    ValueError
+        If the signs are equal, or a value is NaN.
+    """
+
+    def value(x: float) -> float:
+        found = float(function(x))
+        if isnan(found):
+            raise ValueError(f"the function is NaN at {x!r}; a root cannot be found.")
+        return found
+
+    before, x = float(begin), float(end)
+    f_before, f = value(before), value(x)
+    if f_before == 0.0 or f == 0.0:
+        return before if f_before == 0.0 else x
+    if (f_before < 0.0) == (f < 0.0):
+        raise ValueError(f"the function has one sign at {begin!r} and at {end!r}.")
+    other = f_other = last = step = 0.0
+    for _ in range(MOST_ITERATIONS):
+        if f_before != 0.0 and f != 0.0 and (f_before < 0.0) != (f < 0.0):
+            other, f_other, last = before, f_before, x - before
+            step = last
+        if abs(f_other) < abs(f):
+            before, x, other = x, other, x
+            f_before, f, f_other = f, f_other, f
+        least, half = (xtol + rtol * abs(x)) / 2.0, (other - x) / 2.0
+        if f == 0.0 or abs(half) < least:
+            return x
+        tried = NO_STEP
+        if abs(last) > least and abs(f) < abs(f_before):
+            tried = _interpolated((before, f_before), (x, f), (other, f_other))
+        last, step = (step, tried) if 2.0 * abs(tried) < min(abs(last), 3.0 * abs(half) - least) else (half, half)
+        before, f_before = x, f
+        x += step if abs(step) > least else (least if half > 0.0 else -least)
+        f = value(x)
+    raise ValueError(f"no root was found within {MOST_ITERATIONS} iterations.")
+
+
+def _interpolated(before: tuple[float, float], now: tuple[float, float], other: tuple[float, float]) -> float:
+    """Step to the root of the secant, or of the inverse quadratic through three points; :data:`NO_STEP` if it has none."""
+    (x_before, f_before), (x, f), (x_other, f_other) = before, now, other
+    try:
+        if x_before == x_other:
+            return -f * (x - x_before) / (f - f_before)
+        slope, slope_other = (f_before - f) / (x_before - x), (f_other - f) / (x_other - x)
+        return -f * (f_other * slope_other - f_before * slope) / (slope_other * slope * (f_other - f_before))
+    except ZeroDivisionError:
+        return NO_STEP

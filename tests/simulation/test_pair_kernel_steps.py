@@ -1,0 +1,123 @@
+"""Steps by kernels of pairs of shapes one after the other: held inputs, simulators, batches, events, initial overlaps."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import Plan
+from gauss.errors import StateError
+from tests.simulation.test_mechanism_contacts import GAIN, SAME_STEPS, STEP, arm, driven
+
+KERNELS, WRITTEN_OUT = Plan("time stepping", "pair kernels"), Plan("time stepping", "compiled")
+TIERS = 1e-11  # of the same steps in quick and in optimised code, over 100 steps
+CLEARANCE = 1e-6  # of the length of the scene: overlap that counts as none
+RATE = 130.0  # Hz: samples of the control law beside the ends of steps
+
+
+def with_motor(make=driven) -> gauss.Scene:
+    """The arm of two links with a motor in its outer hinge, and a box beside a wall far away: many contact operations."""
+    scene = make() if make is driven else make("arm")
+    scene.input("motor", "hinge 1", limits=(-1.0, 0.5))
+    scene.box("plate", "link 0", (0.1, 0.1, 0.1))
+    scene.box("wall", "ground", (0.1, 0.1, 0.1), at=(5.0, 0.0, 0.0))
+    scene.contact("far", "plate", "wall", friction=0.2)
+    return scene
+
+
+def law(t, q, v):
+    return [2.0 * np.sin(9.0 * t) - 0.1 * v[0]]
+
+
+@pytest.mark.parametrize("make", [driven, arm])
+@pytest.mark.parametrize("times", [None, np.linspace(0.0, 0.15, 17)])
+def test_inputs_are_held_as_by_the_machine_code_of_the_scene(make, times):
+    scene = make() if make is driven else make("arm")
+    scene.input("motor", "hinge 1", limits=(-1.0, 0.5))
+    system, run = gauss.compile_scene(scene), {"integrator": "time_stepping", "step": STEP, "progress": False}
+    one, other = (
+        gauss.simulate(system, 0.15, control=law, rate=RATE, times=times, plan=plan, **run)
+        for plan in (WRITTEN_OUT, KERNELS)
+    )
+    np.testing.assert_array_equal(one.t, other.t)
+    np.testing.assert_allclose(one.q, other.q, atol=SAME_STEPS)
+    np.testing.assert_allclose(one.work, other.work, atol=1e2 * SAME_STEPS)
+    assert len(other.events) > 0
+
+
+def test_a_simulator_makes_the_steps_of_simulate_and_continues_from_a_snapshot():
+    scene = with_motor()
+    scene.output("push", "contact_force", "touch")
+    scene.output("felt", "accelerometer", "link 1")
+    simulator, values = gauss.Simulator(scene, STEP), np.sin(np.arange(20.0))
+    kept, ends = None, []
+    for k, value in enumerate(values):
+        kept = simulator.snapshot() if k == 10 else kept
+        simulator.step([value], n=5)
+    motion = gauss.simulate(simulator.system, 0.1, control=values, rate=200.0, integrator="time_stepping", step=STEP)
+    assert motion.stats.plan.dynamics == "pair kernels"
+    np.testing.assert_allclose(simulator.state.q, motion.q[-1], atol=TIERS)
+    np.testing.assert_allclose(simulator.work, motion.work[-1], atol=TIERS)
+    for _ in range(2):
+        simulator.restore(kept)
+        for value in values[10:]:
+            simulator.step([value], n=5)
+        ends.append((*simulator.state.q, *simulator.state.v, *simulator.work, *simulator.output_vector()))
+    assert ends[0] == ends[1]
+    assert simulator.outputs["push"].max() > 0.0
+
+
+def test_batches_are_motions_one_after_the_other():
+    system = gauss.compile_scene(with_motor())
+    start, run = system.initial_state(), {"integrator": "time_stepping", "step": STEP}
+    control = np.array([np.sin(np.arange(4.0)), np.cos(np.arange(4.0))])[:, :, None]
+    found = gauss.rollout(system, [start.q] * 2, [start.v] * 2, steps=40, every=10, control=control, **run)
+    alone = gauss.simulate(system, 0.04, control=control[1], rate=100.0, times=found.t, **run)
+    np.testing.assert_allclose(found.q[1], alone.q, atol=TIERS)
+
+
+def ball(restitution: float, friction: float, height: float, speed: float) -> gauss.Scene:
+    """A ball of 1 kg and 0.1 m above a floor, in two dimensions without spin."""
+    scene = gauss.Scene("ball")
+    scene.half_space("floor")
+    scene.body("slide", mass=0.0, position=(0.0, 0.0, 0.1 + height))
+    scene.body("ball", mass=1.0, inertia=(0.004,) * 3, position=(0.0, 0.0, 0.1 + height))
+    scene.prismatic("x", "ground", "slide", at=(0.0, 0.0, 0.1 + height), axis=(1, 0, 0))
+    scene.prismatic("z", "slide", "ball", at=(0.0, 0.0, 0.1 + height), axis=(0, 0, 1))
+    scene.sphere("sphere", "ball", 0.1)
+    scene.contact("touch", "sphere", "floor", friction=friction, restitution=restitution)
+    scene.start("x", rate=speed)
+    return scene
+
+
+def test_impacts_are_events_with_the_energy_that_they_lose():
+    motion = gauss.simulate(
+        ball(0.5, 0.0, 0.2, 0.0), 0.7, integrator="time_stepping", step=STEP, progress=False, plan=KERNELS
+    )
+    impacts = [event for event in motion.events if event.kind == "impact"]
+    fall = np.sqrt(2.0 * 0.2 / 9.81)
+    times = fall * np.array([1.0, 2.0, 2.5])
+    assert np.abs([event.t for event in impacts[:3]] - times).max() <= 3.0 * STEP
+    energies = 9.81 * 0.2 * 0.75 * 0.25 ** np.arange(2)
+    np.testing.assert_allclose([event.loss for event in impacts[:2]], energies, rtol=0.02)
+    assert {event.gaps for event in motion.events} == {("touch",)}
+
+
+def test_a_sliding_ball_that_cannot_turn_stops_when_friction_has_its_momentum():
+    motion = gauss.simulate(
+        ball(0.0, 0.4, 0.0, 1.0), 0.5, integrator="time_stepping", step=STEP, progress=False, plan=KERNELS
+    )
+    assert [event.kind for event in motion.events] == ["holds"]
+    assert motion.events[0].t == pytest.approx(1.0 / (0.4 * 9.81), abs=STEP)
+
+
+def test_overlaps_at_the_start_are_named_and_resolved():
+    system = gauss.compile_scene(arm("deep arm", height=0.3))
+    run = {"integrator": "time_stepping", "step": STEP, "progress": False, "plan": KERNELS}
+    with pytest.raises(StateError, match="resolve_overlaps"):
+        gauss.simulate(system, 0.01, **run)
+    state = gauss.resolve_overlaps(system)
+    motion = gauss.simulate(system, 0.01, state=state, **run)
+    energy = gauss.energy(motion)
+    assert np.diff(energy.kinetic + energy.potential).max() <= GAIN * energy.scale
+    again = gauss.resolve_overlaps(system, state)
+    assert np.abs(again.q - state.q).max() <= CLEARANCE
