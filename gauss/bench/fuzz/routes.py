@@ -64,6 +64,16 @@ def examine_motion(seed: int, number: int, without: tuple = ()) -> dict:
         empty = {"base": "", "elements": "", "integrator": ""}
         return _row(seed, number, empty, "refused", begin, why=f"{type(error).__name__}: {error}")
     words = {"base": given.base, "elements": "+".join(sorted(given.elements)), "integrator": given.integrator}
+    routes = _routes(given, number)
+    verdict, off, why = _verdict(given, routes)
+    reached = (moved_until(given, route) for route in routes if route.outcome in ("moved", "cut"))
+    more = {"claim": max(routes[0].claim), "compared": min(reached, default=0.0) if np.isfinite(off) else np.nan}
+    warned = "+".join(sorted({kind for route in routes for kind in route.warned}))
+    return _row(seed, number, words, verdict, begin, off=off, warned=warned, why=why, **more)
+
+
+def _routes(given: MovedScene, number: int) -> list[Route]:
+    """All routes of a scene: the compiled one, the certified one, and of some a batch of one method."""
     with nullcontext() if number % AS_USERS_GET_IT == 0 else compiled_at_once():
         routes = [_route(given, given.integrator, "auto", RTOL, verify=True)]
     if routes[0].outcome not in ("timed out", "raised"):  # the verdict is clear then
@@ -71,11 +81,7 @@ def examine_motion(seed: int, number: int, without: tuple = ()) -> dict:
         routes.append(_second(given, RTOL, ROUTE_TIME) if second.outcome == "timed out" else second)  # not one sample
     if len(routes) > 1 and given.integrator == "dop853" and number % 3 == 0 and not given.scene.nonsmooth:
         routes.append(_caught(lambda: _rolled_out(given)))
-    verdict, off, why = _verdict(given, routes)
-    reached = (moved_until(given, route) for route in routes if route.outcome in ("moved", "cut"))
-    more = {"claim": max(routes[0].claim), "compared": min(reached, default=0.0) if np.isfinite(off) else np.nan}
-    warned = "+".join(sorted({kind for route in routes for kind in route.warned}))
-    return _row(seed, number, words, verdict, begin, off=off, warned=warned, why=why, **more)
+    return routes
 
 
 def moved_until(given: MovedScene, route: Route) -> float:
@@ -110,18 +116,22 @@ def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
     if failed is not None:
         return failed[0], np.nan, failed[1]
     moved = [route for route in routes if route.outcome in ("moved", "cut")]
-    far = max(_far(given, moved[0], other) for other in moved[1:])
+    far = _farthest(given, moved)
     if far > 1.0 and not _has_friction(given):
         again = _second(given, TIGHT, ROUTE_TIME)
-        if again.outcome in ("moved", "cut"):
-            moved[1] = again
-            far = max(_far(given, moved[0], other) for other in moved[1:])
+        moved[1] = again if again.outcome in ("moved", "cut") else moved[1]
+        far = _farthest(given, moved)
     if far <= 1.0:
         return "agree", far, ""
     said = {kind for route in moved for kind in route.warned} & {kind.__name__ for kind in SAYING}
     if said or not np.isfinite(moved[0].claim).all():
         return "told", far, "+".join(sorted(said)) or "infinite claim"
     return _third_route(given, moved, far)
+
+
+def _farthest(given: MovedScene, moved: list[Route]) -> float:
+    """How far the first route is from any other, over what they may be apart."""
+    return max(_far(given, moved[0], other) for other in moved[1:])
 
 
 def _failed(routes: list[Route]) -> tuple[str, str] | None:
