@@ -116,11 +116,7 @@ def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
     if failed is not None:
         return failed[0], np.nan, failed[1]
     moved = [route for route in routes if route.outcome in ("moved", "cut")]
-    far = _farthest(given, moved)
-    if far > 1.0 and not _has_friction(given):
-        again = _second(given, TIGHT, ROUTE_TIME)
-        moved[1] = again if again.outcome in ("moved", "cut") else moved[1]
-        far = _farthest(given, moved)
+    far = _apart(given, moved)
     if far <= 1.0:
         return "agree", far, ""
     said = {kind for route in moved for kind in route.warned} & {kind.__name__ for kind in SAYING}
@@ -129,8 +125,15 @@ def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
     return _third_route(given, moved, far)
 
 
-def _farthest(given: MovedScene, moved: list[Route]) -> float:
-    """How far the first route is from any other, over what they may be apart."""
+def _apart(given: MovedScene, moved: list[Route]) -> float:
+    """How far the first route is from any other, over what they may be; the second is repeated if need be."""
+    far = max(_far(given, moved[0], other) for other in moved[1:])
+    if far <= 1.0 or _has_friction(given):
+        return far
+    again = _second(given, TIGHT, ROUTE_TIME)
+    if again.outcome not in ("moved", "cut"):
+        return far
+    moved[1] = again
     return max(_far(given, moved[0], other) for other in moved[1:])
 
 
