@@ -18,6 +18,7 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from unittest.mock import patch
 
 import gauss
@@ -83,7 +84,14 @@ class Assembling(LaneByLane):
             with TemporaryDirectory() as folder:
                 source = Path(folder) / "code.ptx"
                 source.write_text(text)
-                arguments = [ptxas, f"-arch=sm_{CAPABILITY}", "-v", source, "-o", source.with_suffix(".cubin")]
+                arguments = [
+                    str(ptxas),
+                    f"-arch=sm_{CAPABILITY}",
+                    "-v",
+                    str(source),
+                    "-o",
+                    str(source.with_suffix(".cubin")),
+                ]
                 said = subprocess.run(arguments, capture_output=True, text=True, check=True).stderr
             parts = {name: [float(number) for number in re.findall(pattern, said)] for name, pattern in FOUND.items()}
             self.found |= {"registers": max(parts["registers"]), "frame": max(parts["frame"], default=0.0)}
@@ -102,7 +110,7 @@ def measure() -> tuple[list[dict], list[str]]:
     with patch.object(devices, "_device", lambda number: recorder), patch.dict("os.environ", {"GAUSS_CACHE": ""}):
         for name, make in SCENES.items():
             system = gauss.compile_scene(make())
-            function = system.function("forward_dynamics", device="lanes")
+            function: Any = system.function("forward_dynamics", device="lanes")
             one = {"operations": flops(function.rows.operations), "bytes": function.rows.bytes}
             rows.append({"scene": name, "work": "forward dynamics"} | one | recorder.found)
             method = STEPPED["rk4"]

@@ -37,13 +37,13 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
 
     before, x = float(begin), float(end)
     f_before, f = value(before), value(x)
-    if f_before == 0.0 or f == 0.0:
-        return before if f_before == 0.0 else x
-    if (f_before < 0.0) == (f < 0.0):
+    if f_before == 0.0:
+        return before
+    if f != 0.0 and (f_before < 0.0) == (f < 0.0):
         raise ValueError(f"the function has one sign at {begin!r} and at {end!r}.")
     other = f_other = last = step = 0.0
     for _ in range(MOST_ITERATIONS):
-        if f_before != 0.0 and f != 0.0 and (f_before < 0.0) != (f < 0.0):
+        if _differ(f_before, f):
             other, f_other, last = before, f_before, x - before
             step = last
         if abs(f_other) < abs(f):
@@ -57,9 +57,19 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
             tried = _interpolated((before, f_before), (x, f), (other, f_other))
         last, step = (step, tried) if 2.0 * abs(tried) < min(abs(last), 3.0 * abs(half) - least) else (half, half)
         before, f_before = x, f
-        x += step if abs(step) > least else (least if half > 0.0 else -least)
+        x += _at_least(least, step, half)
         f = value(x)
     raise ValueError(f"no root was found within {MOST_ITERATIONS} iterations.")
+
+
+def _differ(one: float, other: float) -> bool:
+    """Whether values have different signs, and neither is zero."""
+    return one != 0.0 and other != 0.0 and (one < 0.0) != (other < 0.0)
+
+
+def _at_least(least: float, step: float, half: float) -> float:
+    """Step, or the least one towards the middle of the bracket."""
+    return step if abs(step) > least else (least if half > 0.0 else -least)
 
 
 def _interpolated(before: tuple[float, float], now: tuple[float, float], other: tuple[float, float]) -> float:

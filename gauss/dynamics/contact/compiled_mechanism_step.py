@@ -45,7 +45,7 @@ class LoopOfSteps(NamedTuple):
         Whether the last of them has sliding contacts that are to be examined for Painlevé's paradox.
     """
 
-    count: int
+    count: int  # type: ignore[assignment]  # the method of tuples of that name is not called
     largest: float
     changes: list[ModeChange]
     doubtful: bool
