@@ -46,7 +46,7 @@ SCENES: dict[str, Callable[[], gauss.Scene]] = {
 WEIGHTS = {"sin": 25, "cos": 25, "div": 10, "sqrt": 10, "exp": 30, "log": 30, "atan2": 60, "call": 0, "item": 0}
 PEAK, BANDWIDTH, CAPABILITY = 34e12, 3.35e12, 90
 TITLES = (
-    *("scene", "work", "operations", "bytes", "registers", "frame", "spills", "PTX", "seconds of ptxas"),
+    *("scene", "work", "operations", "bytes", "registers", "frame", "spills", "lines of PTX", "seconds of ptxas"),
     *("bound by operations", "bound by bandwidth"),
 )
 FOUND = {
@@ -132,9 +132,18 @@ def page(rows: list[dict], conditions) -> list[str]:
         seconds = f"{float(row['seconds']):.1f}" if row.get("seconds") not in (None, "") else "–"
         bounds = f"{PEAK / count:.1e}/s", f"{BANDWIDTH / size:.1e}/s" if size else "–"
         lines.append(
-            [row["scene"], row["work"], f"{count:.0f}", f"{size:.0f}", *resources, f"{row['lines']}", seconds, *bounds]
+            [
+                row["scene"],
+                row["work"],
+                f"{count:.0f}",
+                f"{size:.0f}",
+                *resources,
+                f"{float(row['lines']):.0f}",
+                seconds,
+                *bounds,
+            ]
         )
-    about = __doc__.split("\n\n")[2].replace("\n", " ")
+    about = __doc__.split("\n\n")[3].replace("\n", " ")
     return [*head("What a GPU needs: an estimate", conditions), about, "", *table(TITLES, lines)]
 
 

@@ -23,7 +23,7 @@ import warnings  # noqa: E402
 from collections.abc import Callable, Iterator  # noqa: E402
 from pathlib import Path  # noqa: E402
 from statistics import median  # noqa: E402
-from typing import Any
+from typing import Any  # noqa: E402
 
 import gymnasium  # noqa: E402
 import mujoco  # noqa: E402
@@ -115,9 +115,8 @@ def environments(rounds: int) -> Iterator[dict]:
     """Environments of one motion and of many."""
     task = gauss.gym.cart_pole_swing_up()
     one, many = gauss.gym.MechanismEnv(task), gauss.gym.MechanismVectorEnv(task, MANY)
-    pendulum = lambda: gymnasium.make("InvertedPendulum-v5").unwrapped  # noqa: E731
-    peer: Any = pendulum()
-    peers = gymnasium.vector.SyncVectorEnv([pendulum] * FEW)
+    pendulum: Callable[[], Any] = lambda: gymnasium.make("InvertedPendulum-v5").unwrapped  # noqa: E731
+    peer, peers = pendulum(), gymnasium.vector.SyncVectorEnv([pendulum] * FEW)
     asked: dict[str, tuple[Any, int, int]] = {
         "cart-pole of gauss": (one, 1, task.hold),
         f"{MANY} cart-poles of gauss": (many, MANY, task.hold),

@@ -14,8 +14,8 @@ from gauss.analysis.derivatives import derivatives
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
+from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import checked_load
-from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.energies import potential_energy
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import fixed_columns, project_positions

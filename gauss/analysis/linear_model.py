@@ -15,7 +15,7 @@ from gauss.analysis.derivatives import derivatives
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, write
-from gauss.dynamics.compile_scene import compile_scene
+from gauss.dynamics import compile_scene
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.outputs import FORCES, measured
@@ -53,7 +53,7 @@ class LinearModes:
 
     @property
     def damping(self) -> np.ndarray:
-        """Damping ratios −Re λ / |λ|; NaN where λ = 0."""
+        """Damping ratios ``−Re λ / |λ|``; NaN where λ = 0."""
         with np.errstate(invalid="ignore"):
             return -self.eigenvalues.real / np.abs(self.eigenvalues)
 

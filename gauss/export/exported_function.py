@@ -12,8 +12,8 @@ from math import prod
 import numpy as np
 
 from gauss.codegen import Expression, Function, Graph, write
+from gauss.dynamics import compile_scene
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism, acceleration_derivatives
-from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import EXPORTS

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gauss.codegen import Expression
-from gauss.dynamics.compile_scene import compile_scene
+from gauss.dynamics import compile_scene
 from gauss.errors import SimulationError, extra, require
 from gauss.export.exported_function import ExportedFunction, exported_functions
 from gauss.export.symbolic_system import has_symbols, in_symbols

@@ -6,7 +6,7 @@ from importlib import import_module
 
 import numpy as np
 
-from gauss.dynamics.compile_scene import compile_scene
+from gauss.dynamics import compile_scene
 from gauss.errors import SimulationError, StateError, require
 from gauss.scene import Scene
 from gauss.system import State, System, phase_scene, random_state, retract
