@@ -65,6 +65,7 @@ from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
 from gauss.analysis.recommendation import advise
+from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
@@ -111,8 +112,10 @@ __all__ = [
     "LinearModel",
     "LinearModes",
     "Linkage",
+    "MotionGradient",
     "Plan",
     "Scene",
+    "Sensitivities",
     "Simulator",
     "SimulatorBatch",
     "Solution",
@@ -149,12 +152,14 @@ __all__ = [
     "load_sweep",
     "mobility",
     "paradoxes",
+    "motion_gradient",
     "resolve_overlaps",
     "prepare",
     "reactions",
     "rollout",
     "save",
     "save_rotors",
+    "sensitivities",
     "set_valued_forces",
     "show",
     "simulate",
