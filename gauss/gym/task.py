@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 
 import gymnasium
 import numpy as np
@@ -56,13 +57,15 @@ class Task:
 
     def __post_init__(self):
         """Check the inputs and the step."""
+        if not (isinstance(self.scene, Scene) and callable(self.reward) and callable(self.terminated)):
+            raise ArgumentError("task: expected a gauss.Scene and functions (q, v, u, y) for reward and end.")
         if not self.scene.inputs:
             raise ArgumentError(f"task: scene {self.scene.name!r} has no inputs; declare some with scene.input.")
         for given in self.scene.inputs.values():
             if given.limits is None:
                 raise ArgumentError(f"task: input {given.name!r} has no limits; actions need them.")
         for name in ("rate", "duration", "step"):
-            if not 0.0 < getattr(self, name) < np.inf:
+            if not isinstance(getattr(self, name), Real) or not 0.0 < getattr(self, name) < np.inf:
                 raise ArgumentError(f"task: {name}: expected a positive number, got {getattr(self, name)!r}.")
         if self.hold < 1 or abs(self.hold * self.step * self.rate - 1.0) > 1e-9:
             raise ArgumentError(f"task: the step of {self.step} s does not divide the time of an action, {1 / self.rate} s.")

@@ -58,8 +58,9 @@ class MechanismVectorEnv(VectorEnv):
 
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
         """Hold the actions (num_envs, n_u): (observations, rewards, terminated, truncated, info)."""
-        u, began, many = np.asarray(actions, dtype=float), self._ended.copy(), self.simulators
-        many.step(u, n=self.task.hold)
+        began, many = self._ended.copy(), self.simulators
+        many.step(actions, n=self.task.hold)
+        u = np.asarray(actions, dtype=float)
         diverged = many.diverged & ~began
         self._begin(began | diverged)  # nothing of a diverged motion is kept
         self._actions[~began] += 1

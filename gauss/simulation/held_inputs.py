@@ -61,7 +61,7 @@ class HeldInputs:
 
     def _tabulated(self, control) -> Callable:
         """Law of a table."""
-        table = _numbers(control)
+        table = real_numbers(control)
         if table is not None and table.ndim == 1 and len(self.names) == 1:
             table = table[:, None]
         count, n = len(self.times), len(self.names)
@@ -136,7 +136,7 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     """
     if type(value) is np.ndarray and value.dtype == float and value.shape == (len(names),) and isfinite(value @ value):
         return value.copy()  # the usual case, quickly
-    found = _numbers(value)
+    found = real_numbers(value)
     if found is None or found.size != len(names):
         expected = f"expected {len(names)} number(s) ({', '.join(names)})" if names else "the scene declares none"
         raise SimulationError(f"t = {t:.6g} s: the values of the inputs are {value!r}; {expected}.")
@@ -147,7 +147,7 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     return found
 
 
-def _numbers(value) -> np.ndarray | None:
+def real_numbers(value) -> np.ndarray | None:
     """Array of numbers; None of anything else."""
     try:
         found = np.asarray(value)

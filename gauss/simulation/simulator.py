@@ -7,7 +7,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -185,7 +185,7 @@ class Simulator:
             require(state, (State,), "reset: state")
             start = self.system.projected(state)
         if seed is not None:
-            change = np.random.default_rng(seed).uniform(-spread, spread, (2, self.system.n_v))
+            change = random_changes(seed, spread, (2, self.system.n_v))
             start = State(start.t, retract(self.system, start.q, change[0]), start.v + change[1])
             start = run.separated(self.system.projected(start))
         self._u[:] = 0.0
@@ -320,6 +320,7 @@ class Simulator:
         SimulationError
             If it is of another system.
         """
+        require(snapshot, (SimulatorState,), "restore")
         point = np.frombuffer(snapshot.point)
         if point.shape != self._point.shape:
             raise SimulationError("restore: the snapshot is of another system.")
@@ -349,6 +350,22 @@ def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSte
 def _unchecked(n: int) -> np.ndarray:
     """Grid (n, 2) of steps that are checked every few steps, not where a call ends."""
     return np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
+
+
+def random_changes(seed, spread: float, shape: tuple[int, ...]) -> np.ndarray:
+    """Changes of initial states, uniform up to ``spread``.
+
+    Raises
+    ------
+    SimulationError
+        If the seed or the spread is none.
+    """
+    if not isinstance(spread, Real) or not 0.0 <= spread < np.inf:
+        raise SimulationError(f"spread: expected a number ≥ 0, got {spread!r}.")
+    try:
+        return np.random.default_rng(seed).uniform(-spread, spread, shape)
+    except (TypeError, ValueError) as error:
+        raise SimulationError(f"seed: expected a whole number ≥ 0, got {seed!r}.") from error
 
 
 def checked_count(name: str, value) -> int:

@@ -71,3 +71,26 @@ def test_what_does_not_fit_is_refused():
     many = gauss.SimulatorBatch(scene, STEP, batch=2)
     with pytest.raises(StateError, match="2 motions"):
         many.reset(q=np.zeros((3, 2)), v=np.zeros((3, 2)))
+
+
+WRONG = {
+    "u, words": (lambda many: many.step("abc"), SimulationError, "u: expected"),
+    "u, ragged": (lambda many: many.step([[1.0], [1.0, 2.0], []]), SimulationError, "u: expected"),
+    "u, complex": (lambda many: many.step(np.zeros((3, 1), complex)), SimulationError, "u: expected"),
+    "q, words": (lambda many: many.reset("a"), StateError, "q0: expected"),
+    "seed": (lambda many: many.reset(seed="x"), SimulationError, "seed: expected"),
+    "spread": (lambda many: many.reset(seed=1, spread=-1.0), SimulationError, "spread: expected"),
+    "no such motion": (lambda many: many.restart([5], np.zeros((1, 2)), np.zeros((1, 2))), StateError, "no such motions"),
+    "too few": (lambda many: many.restart([0, 1], np.zeros((1, 2)), np.zeros((1, 2))), StateError, "of 2 motions, got 1"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_arguments_are_named_and_change_nothing(case):
+    scene = gauss.load("cart_pole")
+    scene.input("push", "rail", limits=20.0)
+    many, (call, kind, words) = gauss.SimulatorBatch(scene, step=1e-3, batch=3), WRONG[case]
+    before = many.q, many.v
+    with pytest.raises(kind, match=words):
+        call(many)
+    np.testing.assert_array_equal((many.q, many.v), before)

@@ -29,6 +29,7 @@ from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, machin
 from gauss.simulation.batch.repeated_motions import repeat
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
+from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
 from gauss.system import State, System, refuse_changed
@@ -193,8 +194,8 @@ def _has_pair_kernels(system: System, method: FixedStep, held: bool) -> bool:
 
 def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[int, float]:
     """Number and length [s] of fixed steps."""
-    if step is None or not np.isfinite(step) or step <= 0:
-        raise SimulationError(f"step: expected a positive number, got {step!r}.")
+    check_tolerances(step=step)
+    assert step is not None  # it is a positive number
     if steps is None:
         raise SimulationError("steps: expected a positive whole number, got None.")
     _check_counts({"steps": steps, "every": every})
@@ -238,11 +239,11 @@ def _checked_control(system: System, control, batch: int, steps: int) -> np.ndar
     names = tuple(system.scene.inputs)
     if not names:
         raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
-    try:
-        found = np.require(control, dtype=float, requirements=("C", "W"))
-    except (TypeError, ValueError) as error:
+    found = control if isinstance(control, np.ndarray) and control.dtype == float else real_numbers(control)
+    if found is None:
         what = f"numbers of shape ({batch} motions, k rows, {len(names)} inputs)"
-        raise SimulationError(f"control: expected {what}, got {control!r}; simulate(control=) takes laws.") from error
+        raise SimulationError(f"control: expected {what}, got {control!r}; simulate(control=) takes laws.")
+    found = np.require(found, requirements=("C", "W"))
     if found.ndim != 3 or found.shape[::2] != (batch, len(names)) or not found.shape[1] or steps % found.shape[1]:
         raise SimulationError(
             f"control: expected shape ({batch} motions, k rows, {len(names)} inputs) with k a divisor of {steps} steps, "

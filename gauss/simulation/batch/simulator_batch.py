@@ -18,8 +18,9 @@ from gauss.scene import Scene
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code
+from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.integrators import usual_fixed_step
-from gauss.simulation.simulator import Simulator, SimulatorState, checked_count
+from gauss.simulation.simulator import Simulator, SimulatorState, checked_count, random_changes
 from gauss.simulation.tolerances import check_tolerances
 from gauss.simulation.undetected_switching import refuse_jumps, warn_of_passages, warn_of_short_features
 from gauss.system import State, System, retract
@@ -123,8 +124,8 @@ class SimulatorBatch:
         if starts.shape[1] != self._size:
             raise StateError(f"reset: expected the states of {self._size} motions, got {starts.shape[1]}.")
         if seed is not None:
-            rng = np.random.default_rng(seed)
-            starts = np.array([self._changed(start, rng, spread) for start in starts.T]).T
+            changes = random_changes(seed, spread, (self._size, 2, self.system.n_v))
+            starts = np.array([self._changed(*pair) for pair in zip(starts.T, changes, strict=True)]).T
         self._batch, self._steps, self._warned = FixedStepBatch(self._loop, starts), 0, False
         refuse_inconsistent(self.system, starts, self._batch.residual)
         self._u[:] = 0.0
@@ -145,7 +146,7 @@ class SimulatorBatch:
         SimulationError
             If the scene has laws of time or state.
         StateError
-            If there are no such motions, or the states do not fit.
+            If there are no such motions, or the states have wrong shapes, or violate the constraints.
         """
         if self.has_time_laws:
             raise SimulationError(f"scene {self.system.scene.name!r} has laws of time or state; reset all motions.")
@@ -158,9 +159,9 @@ class SimulatorBatch:
         self._batch.points[:, chosen] = fresh.points[:, : starts.shape[1]]
         self.diverged[chosen] = self.unconfirmed[chosen] = False
 
-    def _changed(self, start: np.ndarray, rng: np.random.Generator, spread: float) -> np.ndarray:
-        """Random neighbour (n_q + n_v,) of a state that meets the constraints."""
-        (q, v), change = np.split(start, [self.system.n_q]), rng.uniform(-spread, spread, (2, self.system.n_v))
+    def _changed(self, start: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """Neighbour (n_q + n_v,) of a state by a displacement and a change of rates, which meets the constraints."""
+        q, v = np.split(start, [self.system.n_q])
         state = self.system.projected(State(0.0, retract(self.system, q, change[0]), v + change[1]))
         return np.concatenate([state.q, state.v])
 
@@ -204,11 +205,10 @@ class SimulatorBatch:
         self.diverged |= ~finite
 
     def _set(self, u):
-        given = np.asarray(u, dtype=float)
-        if given.shape != (self._size, len(self.inputs)) or not np.isfinite(given).all():
-            raise SimulationError(
-                f"u: expected finite numbers of shape ({self._size} motions, {len(self.inputs)} inputs), got {given.shape}."
-            )
+        given, shape = real_numbers(u), (self._size, len(self.inputs))
+        if given is None or given.shape != shape or not np.isfinite(given).all():
+            got = "others" if given is None else f"shape {given.shape}"
+            raise SimulationError(f"u: expected finite numbers of shape ({shape[0]} motions, {shape[1]} inputs), got {got}.")
         self._u[:, 0] = given
 
     def _repeated(self, k: int, before: np.ndarray, n: int) -> bool:
