@@ -70,7 +70,11 @@ GROUPS = (
         "Analyse a mechanism",
         "Freedoms, ways of assembly, states of rest, linear models and their modes, derivatives, and the check against "
         "Pinocchio.",
-        _of("gauss", "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes")
+        _of(
+            "gauss",
+            "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes sensitivities "
+            "Sensitivities motion_gradient MotionGradient",
+        )
         + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps"),
     ),
     Group(
