@@ -11,6 +11,7 @@ import numpy as np
 from gauss.codegen import Kernel, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, on_boundary
+from gauss.dynamics.laws.law_kinks import kinked_laws
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.rules import Question
@@ -61,8 +62,8 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     Raises
     ------
     SimulationError
-        If the system cannot be compiled, with the reasons; if friction is between sticking and slipping; or if accelerations
-        or derivatives are not determined.
+        If the system cannot be compiled, with the reasons; if friction is between sticking and slipping, or a law has a kink
+        or a jump; or if accelerations or derivatives are not determined.
     """
     require(system, (System,), "derivatives")
     require(state, (State,), "derivatives: state")
@@ -80,6 +81,11 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
         return derivatives(held.system, state, load)
     laws = Laws(system)
     DERIVATIVES.plan(Question(system, laws))
+    if kinked := kinked_laws(system, laws, state):
+        raise SimulationError(
+            f"t = {state.t:.6g} s: the law of {', '.join(map(repr, kinked))} has a kink or a jump in this state, and "
+            "accelerations have no derivatives; take a state beside it, or a smooth law, as with gauss.math.tanh."
+        )
     solve, slope = cached_on_disk(system, (_kernels, laws.key), lambda: _kernels(system, laws.traced))
     given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
     directions = np.eye(3 * system.n_v)

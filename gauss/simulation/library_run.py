@@ -99,7 +99,7 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
     if switching.watch is not None:
         stats = stats._replace(unseen=found.steps or 1)  # libraries do not locate switching events
-    q, v = (np.array([getattr(state, part) for state in states]).reshape(len(states), -1) for part in "qv")
+    q, v = (np.reshape([getattr(state, part) for state in states], (len(states), n)) for part, n in (("q", n_q), ("v", n_v)))
     whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
     if found.interruption is not None:
         found.interruption.trajectory = whole  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the motion so far

@@ -109,6 +109,22 @@ def test_an_interrupted_law_keeps_the_steps_before(integrator, samples):
     np.testing.assert_allclose(again.q, found.q, atol=1e-2)  # a hundred times the tolerance
 
 
+@pytest.mark.parametrize("integrator", ["scipy_dop853", "cvode_bdf", "dop853"])
+def test_an_interruption_before_the_first_sample_leaves_none(integrator):
+    scene = gauss.load("pendulum")
+    joint = next(iter(scene.joints))
+
+    def law(t, motion):
+        if float(t) > 0.05 and float(motion.rate(joint)) != 0.0:  # not where it is sampled, at the start
+            raise KeyboardInterrupt
+        return 0.1
+
+    scene.drive(joint, torque=law)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gauss.simulate(scene, 0.2, integrator=integrator, times=[0.1, 0.2], progress=False)
+    assert caught.value.trajectory.q.shape == (0, 1)
+
+
 @pytest.mark.slow
 def test_phases_between_events_are_kept():
     scene = gauss.Scene("ball")

@@ -101,6 +101,19 @@ class SwitchingFunctions:
         share, _ = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
         return math.where(share < 1.0, 1.0, 0.0)
 
+    def is_between(self, state: State) -> bool:
+        """Whether some switching function has a switching value in a state, but for rounding."""
+        given = {
+            x.index: Interval.point(float(y)) for x, y in zip(self._symbols, [state.t, *state.q, *state.v], strict=True)
+        }
+        sides = enclose(list(chain(*self.pairs)), given)
+        with np.errstate(all="ignore"):
+            size = [abs(one.low) + abs(other.low) for one, other in zip(sides[::2], sides[1::2], strict=True)]
+            apart = [abs(one.low - other.low) for one, other in zip(sides[::2], sides[1::2], strict=True)]
+            steps = [float(value.low) for value in enclose(self.steps, given)]
+        met = (np.array(apart) <= SIGN_ROUNDING * np.array(size) + self.noise).any()
+        return bool(met) or any(abs(x - round(x)) <= SIGN_ROUNDING * abs(x) for x in steps if np.isfinite(x))
+
     def share(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> tuple[Scalar, Scalar]:
         """Share of a step without undetected crossings, 1 for all of it; and the number of detected crossings.
 

@@ -4,13 +4,13 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, one_tier
-from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.outputs import output_function, shape_of, split
 from gauss.dynamics.rules import Question
+from gauss.dynamics.scene_compilation import compile_scene
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean, require
@@ -139,10 +139,19 @@ class SimulatorBatch:
             Motions.
         q, v : array_like, shape (k, n_q), (k, n_v)
             Their initial states, consistent.
+
+        Raises
+        ------
+        SimulationError
+            If the scene has laws of time or state.
+        StateError
+            If there are no such motions, or the states do not fit.
         """
         if self.has_time_laws:
             raise SimulationError(f"scene {self.system.scene.name!r} has laws of time or state; reset all motions.")
-        starts, chosen = columns(self.system, q, v), np.arange(self._size)[which]
+        starts, chosen = columns(self.system, q, v), _chosen(which, self._size)
+        if starts.shape[1] != chosen.size:
+            raise StateError(f"restart: expected the states of {chosen.size} motions, got {starts.shape[1]}.")
         fresh = FixedStepBatch(self._loop, starts)
         refuse_inconsistent(self.system, starts, fresh.residual)
         fresh.points[0] = self.t
@@ -243,6 +252,22 @@ class SimulatorBatch:
         points = self._batch.points.copy()
         points[len(points) - len(self.inputs) :, : self._size] = self._u[:, 0].T
         return self._measure(points)[:, : self._size].T
+
+
+def _chosen(which, batch: int) -> np.ndarray:
+    """Numbers of some motions.
+
+    Raises
+    ------
+    StateError
+        If there are no such motions.
+    """
+    try:
+        return np.ravel(np.arange(batch)[which])
+    except IndexError as error:
+        raise StateError(
+            f"which: expected numbers of motions below {batch}, or {batch} truths, got {which!r:.80}."
+        ) from error
 
 
 def _tiled(own: np.ndarray, given, batch: int):
