@@ -68,10 +68,9 @@ def test_machine_code_and_python_take_the_same_steps(case):
     make, h, end = CASES[case]
     system = gauss.compile_scene(make())
     times = np.array([0.5 * end + 0.3 * h, end])  # one beside the grid
-    plan = gauss.Plan("time stepping", "compiled")
-    fast = gauss.simulate(system, end, integrator="time_stepping", step=h, times=times, progress=False, plan=plan)
+    fast = gauss.simulate(system, end, integrator="time_stepping", step=h, times=times, progress=False)
     slow = MoreauRun(system, "auto", h, end).collect(system.initial_state(), times, False)
-    assert fast.stats.plan.dynamics == "compiled"
+    assert fast.stats.plan.dynamics == ("pair kernels" if case == "cradle" else "compiled")
     assert fast.t == pytest.approx(slow.t, abs=0)
     assert fast.stats.steps == slow.stats.steps
     for name in ("q", "v", "work"):

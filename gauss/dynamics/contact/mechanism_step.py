@@ -172,8 +172,9 @@ class MechanismStepper:
             )
 
     def forget(self):
-        """Forget the forces of the last step: a new motion begins."""
+        """Forget the forces and inputs of the last step: a new motion begins."""
         self.detection.connect()
+        self.inputs[:] = 0.0
         count = len(self.rows.others) + self.rows.limit.size
         self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(count)
         self.record.forget()
