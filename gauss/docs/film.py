@@ -33,7 +33,7 @@ def main(path: Path = Path(__file__).parent / "pages" / "pictures" / "walker.gif
 
 def _drawn(shapes: dict[str, np.ndarray], foot: np.ndarray, sample: int) -> Image.Image:
     """One picture: bars, pins, the path of the foot."""
-    figure = Figure(figsize=(4.8, 4.2), facecolor="white")
+    figure = Figure(figsize=(4.4, 4.4), facecolor="white")
     axes = figure.add_axes((0, 0, 1, 1))
     axes.plot(*foot.T, color="#c0392b", linewidth=1.5, zorder=1)
     for k, points in enumerate(shapes.values()):
@@ -43,7 +43,7 @@ def _drawn(shapes: dict[str, np.ndarray], foot: np.ndarray, sample: int) -> Imag
             )
         axes.plot(*points[sample].T, "o", color="white", markeredgecolor="#333333", markersize=5, zorder=3)
     axes.plot(*foot[sample], "o", color="#c0392b", markersize=8, zorder=4)
-    axes.set(xlim=(-0.9, 0.3), ylim=(-0.98, 0.42), aspect="equal")
+    axes.set(xlim=(-1.1, 0.3), ylim=(-0.98, 0.42), aspect="equal")
     axes.set_axis_off()
     stream = BytesIO()
     figure.savefig(stream, dpi=100, format="png")

@@ -33,7 +33,9 @@ def texts(program) -> dict[str, str]:
         "concepts/plan_tables.txt": plan_tables(),
         "glossary.md": (PACKAGE / "glossary.md").read_text(encoding="utf-8"),
         "changelog.md": original("CHANGELOG.md").read_text(encoding="utf-8"),
-        "formats.md": _linked((folder() / "README.md").read_text(encoding="utf-8"), set()),
+        "formats.md": _linked((folder() / "README.md").read_text(encoding="utf-8"), set()).replace(
+            "# Models", "# File formats", 1
+        ),
         "models.md": _models(),
         "guides/command_line.md": commands(program),
     }

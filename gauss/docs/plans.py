@@ -1,8 +1,11 @@
 """The table of plans as the code has it: rules in order, and the conditions that each has, by their docstrings."""
 
+import re
+
 from gauss.dynamics import plan
 from gauss.dynamics.rules import Rule, RuleTable
 
+JOINED = re.compile(r" and (?=[A-Z])")  # of two conditions
 TABLES = {
     "Motions, by `gauss.simulate`": plan.MOTIONS,
     "Batches, by `gauss.rollout`": plan.BATCHES,
@@ -28,6 +31,7 @@ def _row(rule: Rule) -> str:
 
 
 def _said(condition) -> str:
-    """First sentence of the docstring of a condition, as part of a sentence."""
-    sentence = (condition.__doc__ or "").strip().partition("\n")[0].rstrip(".").removeprefix("Whether ")
-    return sentence[:1].lower() + sentence[1:] if sentence else "all"
+    """First sentences of the docstrings of a condition, or of two that are joined, as part of a sentence."""
+    sentence = (condition.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+    parts = [part.removeprefix("Whether ") for part in JOINED.split(sentence)]
+    return " and ".join(part[:1].lower() + part[1:] for part in parts) or "all"

@@ -4,6 +4,7 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 """
 
 from collections.abc import Callable
+from functools import wraps
 
 from gauss.codegen import callbacks_are_available
 from gauss.dynamics.laws.traced_laws import Laws
@@ -241,7 +242,12 @@ def smooth_system(system: System) -> System:
 
 def smooth(condition: Callable[[Question], list[str]]) -> Callable[[Question], list[str]]:
     """Condition on the system without unilateral and set-valued elements."""
-    return lambda ask: condition(smooth_question(ask))
+
+    @wraps(condition)
+    def of_smooth(ask: Question) -> list[str]:
+        return condition(smooth_question(ask))
+
+    return of_smooth
 
 
 def smooth_question(ask: Question) -> Question:

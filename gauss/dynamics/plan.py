@@ -72,14 +72,17 @@ def is_time_stepping(ask) -> bool:
 
 
 def _is_nonsmooth(ask: Question) -> bool:
+    """Unilateral or set-valued elements, without time stepping."""
     return bool(ask.system.nonsmooth) and not is_time_stepping(ask)
 
 
 def _smooth(ask: Question) -> bool:
+    """Smooth scenes, by integrators of gauss."""
     return not (is_time_stepping(ask) or _is_nonsmooth(ask) or isinstance(ask.method, Library))
 
 
 def _library(ask: Question) -> bool:
+    """Integrators of other libraries."""
     return isinstance(ask.method, Library)
 
 
@@ -89,6 +92,7 @@ def no_inputs_of_series(ask: Question) -> list[str]:
 
 
 def _held(ask: Question) -> bool:
+    """Inputs held between samples of a control law."""
     return ask.held
 
 
@@ -111,7 +115,26 @@ def _refused(ask: Question, why: str) -> str:
 
 
 def _both(one: Callable[[Question], bool], other: Callable[[Question], bool]) -> Callable[[Question], bool]:
-    return lambda ask: one(ask) and other(ask)
+    def both(ask: Question) -> bool:
+        return one(ask) and other(ask)
+
+    both.__doc__ = " and ".join((condition.__doc__ or "").rstrip(".") for condition in (one, other))
+    return both
+
+
+def _motionless(ask: Question) -> bool:
+    """Scenes without degrees of freedom."""
+    return not ask.system.n_v
+
+
+def _with_feedback(ask: Question) -> bool:
+    """Baumgarte feedback on the constraints."""
+    return ask.drift.gains is not None
+
+
+def _without_feedback(ask: Question) -> bool:
+    """No Baumgarte feedback on the constraints."""
+    return ask.drift.gains is None
 
 
 _CODE = own_backend, compilable
@@ -125,15 +148,15 @@ _CALLING_LOOP = *_KERNEL_LOOP, written_out
 
 MOTIONS = RuleTable(
     (
-        Rule("constant", "none", when=lambda ask: not ask.system.n_v),
+        Rule("constant", "none", when=_motionless),
         Rule("time stepping", "compiled", "certified", is_time_stepping, (*_STEP, few_contact_operations)),
         Rule("time stepping", "pair kernels", "", _both(is_time_stepping, shapes_in_contact), _PAIR_KERNELS),
         Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs,)),
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs,)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
-        Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _LOOP),
-        Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _LOOP),
+        Rule("compiled loop", "compiled", "refined", _both(_smooth, _without_feedback), _LOOP),
+        Rule("compiled loop", "compiled", "certified", _both(_smooth, _with_feedback), _LOOP),
         Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
         Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _KERNEL_LOOP),
         Rule("compiled loop", "callbacks", "certified", _both(_ALONE, has_opaque_laws), _CALLING_LOOP),
