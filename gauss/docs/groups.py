@@ -72,8 +72,8 @@ GROUPS = (
         "Pinocchio.",
         _of(
             "gauss",
-            "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes sensitivities "
-            "Sensitivities motion_gradient MotionGradient",
+            "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes "
+            "sensitivities Sensitivities motion_gradient MotionGradient",
         )
         + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps"),
     ),
