@@ -108,10 +108,9 @@ def page(rows: list[dict], conditions) -> list[str]:
         if not row.get("time"):
             beside.append([row["scene"], row["work"], row["peer"], "–", "–", "–"])
             continue
-        times = f"{1e9 * row['time']:.3g} ns", f"{1.0 / row['time']:.2e}"
-        beside.append(
-            [row["scene"], row["work"], row["peer"], *times, f"{row['time'] / ours[row['scene'], row['work']]:.3g}"]
-        )
+        ratio = row["time"] / ours[row["scene"], row["work"]]
+        found = f"{1e9 * row['time']:.3g} ns", f"{1.0 / row['time']:.2e}", f"{ratio:.3g}"
+        beside.append([row["scene"], row["work"], row["peer"], *found])
     there = head("A GPU beside one core of a CPU", conditions)
     return [*there, *table(TITLES, lines), "", "## Other engines on the same device", "", *table(PEERS, beside)]
 

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from unittest.mock import patch
 
 import gauss
@@ -45,7 +46,7 @@ SCENES: dict[str, Callable[[], gauss.Scene]] = {
 WEIGHTS = {"sin": 25, "cos": 25, "div": 10, "sqrt": 10, "exp": 30, "log": 30, "atan2": 60, "call": 0, "item": 0}
 PEAK, BANDWIDTH, CAPABILITY = 34e12, 3.35e12, 90
 TITLES = (
-    *("scene", "work", "operations", "bytes", "registers", "frame", "spills", "PTX", "seconds of ptxas"),
+    *("scene", "work", "operations", "bytes", "registers", "frame", "spills", "lines of PTX", "seconds of ptxas"),
     *("bound by operations", "bound by bandwidth"),
 )
 FOUND = {
@@ -83,7 +84,14 @@ class Assembling(LaneByLane):
             with TemporaryDirectory() as folder:
                 source = Path(folder) / "code.ptx"
                 source.write_text(text)
-                arguments = [ptxas, f"-arch=sm_{CAPABILITY}", "-v", source, "-o", source.with_suffix(".cubin")]
+                arguments = [
+                    str(ptxas),
+                    f"-arch=sm_{CAPABILITY}",
+                    "-v",
+                    str(source),
+                    "-o",
+                    str(source.with_suffix(".cubin")),
+                ]
                 said = subprocess.run(arguments, capture_output=True, text=True, check=True).stderr
             parts = {name: [float(number) for number in re.findall(pattern, said)] for name, pattern in FOUND.items()}
             self.found |= {"registers": max(parts["registers"]), "frame": max(parts["frame"], default=0.0)}
@@ -102,7 +110,7 @@ def measure() -> tuple[list[dict], list[str]]:
     with patch.object(devices, "_device", lambda number: recorder), patch.dict("os.environ", {"GAUSS_CACHE": ""}):
         for name, make in SCENES.items():
             system = gauss.compile_scene(make())
-            function = system.function("forward_dynamics", device="lanes")
+            function: Any = system.function("forward_dynamics", device="lanes")
             one = {"operations": flops(function.rows.operations), "bytes": function.rows.bytes}
             rows.append({"scene": name, "work": "forward dynamics"} | one | recorder.found)
             method = STEPPED["rk4"]
@@ -124,9 +132,18 @@ def page(rows: list[dict], conditions) -> list[str]:
         seconds = f"{float(row['seconds']):.1f}" if row.get("seconds") not in (None, "") else "–"
         bounds = f"{PEAK / count:.1e}/s", f"{BANDWIDTH / size:.1e}/s" if size else "–"
         lines.append(
-            [row["scene"], row["work"], f"{count:.0f}", f"{size:.0f}", *resources, f"{row['lines']}", seconds, *bounds]
+            [
+                row["scene"],
+                row["work"],
+                f"{count:.0f}",
+                f"{size:.0f}",
+                *resources,
+                f"{float(row['lines']):.0f}",
+                seconds,
+                *bounds,
+            ]
         )
-    about = __doc__.split("\n\n")[2].replace("\n", " ")
+    about = __doc__.split("\n\n")[3].replace("\n", " ")
     return [*head("What a GPU needs: an estimate", conditions), about, "", *table(TITLES, lines)]
 
 

@@ -23,6 +23,7 @@ import warnings  # noqa: E402
 from collections.abc import Callable, Iterator  # noqa: E402
 from pathlib import Path  # noqa: E402
 from statistics import median  # noqa: E402
+from typing import Any  # noqa: E402
 
 import gymnasium  # noqa: E402
 import mujoco  # noqa: E402
@@ -114,9 +115,12 @@ def environments(rounds: int) -> Iterator[dict]:
     """Environments of one motion and of many."""
     task = gauss.gym.cart_pole_swing_up()
     one, many = gauss.gym.MechanismEnv(task), gauss.gym.MechanismVectorEnv(task, MANY)
-    pendulum = lambda: gymnasium.make("InvertedPendulum-v5").unwrapped  # noqa: E731
+    pendulum: Callable[[], Any] = lambda: gymnasium.make("InvertedPendulum-v5").unwrapped  # noqa: E731
     peer, peers = pendulum(), gymnasium.vector.SyncVectorEnv([pendulum] * FEW)
-    asked = {"cart-pole of gauss": (one, 1, task.hold), f"{MANY} cart-poles of gauss": (many, MANY, task.hold)}
+    asked: dict[str, tuple[Any, int, int]] = {
+        "cart-pole of gauss": (one, 1, task.hold),
+        f"{MANY} cart-poles of gauss": (many, MANY, task.hold),
+    }
     asked |= {"InvertedPendulum-v5": (peer, 1, peer.frame_skip)}
     asked |= {f"{FEW} of InvertedPendulum-v5": (peers, FEW, peer.frame_skip)}
     for environment, *_ in asked.values():

@@ -7,8 +7,6 @@ and reactions; a simulation follows them to a trajectory::
     Scene --simulate--> Trajectory --reactions, energy--> numbers
 
 Planar linkages are also solved by Assur groups, a whole cycle in one call: :class:`gauss.Linkage`.
-
-.. include:: glossary.md
 """
 
 from importlib import import_module

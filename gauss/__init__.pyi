@@ -65,10 +65,11 @@ from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
 from gauss.analysis.recommendation import advise
+from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
-from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes, resolve_overlaps
+from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import GaussError
@@ -79,7 +80,16 @@ from gauss.io.linkage import load_linkage
 from gauss.io.rotors import load_rotors, save_rotors
 from gauss.linkages import Linkage
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Simulator, SimulatorBatch, Trajectory, crossings, prepare, rollout, simulate
+from gauss.simulation import (
+    Simulator,
+    SimulatorBatch,
+    Trajectory,
+    crossings,
+    prepare,
+    resolve_overlaps,
+    rollout,
+    simulate,
+)
 from gauss.simulation.sweeps import load_sweep, sweep
 from gauss.system import State, System
 from gauss.view.viewer import show
@@ -102,8 +112,10 @@ __all__ = [
     "LinearModel",
     "LinearModes",
     "Linkage",
+    "MotionGradient",
     "Plan",
     "Scene",
+    "Sensitivities",
     "Simulator",
     "SimulatorBatch",
     "Solution",
@@ -140,12 +152,14 @@ __all__ = [
     "load_sweep",
     "mobility",
     "paradoxes",
+    "motion_gradient",
     "resolve_overlaps",
     "prepare",
     "reactions",
     "rollout",
     "save",
     "save_rotors",
+    "sensitivities",
     "set_valued_forces",
     "show",
     "simulate",

@@ -31,7 +31,7 @@ EXTRAS = {
     "results": ("xarray", "h5netcdf", "h5py", "pandas"),
     "sweep": ("zarr", "loky"),
     "cluster": ("distributed",),
-    "docs": ("pdoc",),
+    "docs": ("sphinx", "myst-parser", "furo", "sphinx-gallery"),
     "cuda": ("cuda-bindings",),
     "control": ("control",),
     "robots": ("example-robot-data",),

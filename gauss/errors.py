@@ -86,7 +86,7 @@ class UnpicklableError(GaussError, PicklingError):
 
 
 class MissingPackageError(GaussError, ImportError):
-    """A package that comes with an extra of gauss is not installed."""
+    """A package that comes with gauss, or with an extra of it, is not installed."""
 
 
 class NearSingularWarning(UserWarning):
@@ -157,8 +157,8 @@ DISTRIBUTIONS = {  # of imports
 
 
 @contextmanager
-def extra(name: str):
-    """Imports of packages that come with an extra of gauss, for a ``with`` statement.
+def extra(name: str = ""):
+    """Imports of packages that come with an extra of gauss, or with gauss itself, for a ``with`` statement.
 
     Raises
     ------
@@ -170,7 +170,8 @@ def extra(name: str):
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         remedy = f"pip install {DISTRIBUTIONS.get(package, package)}"
-        raise MissingPackageError(f"{package} is not installed: {remedy} (extra {name!r}).", name=package) from error
+        source = f"extra {name!r}" if name else "part of the default installation, needed for this alone"
+        raise MissingPackageError(f"{package} is not installed: {remedy} ({source}).", name=package) from error
 
 
 @cache

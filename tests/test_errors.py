@@ -1,6 +1,7 @@
 """Bad input gets one clear error at once: it names the thing, what was expected, and what to do."""
 
 import re
+import subprocess
 import sys
 import tomllib
 from importlib import import_module
@@ -256,3 +257,28 @@ def test_a_missing_package_is_named_as_it_is_installed(module, package, monkeypa
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingPackageError, match=f"pip install {package}"), extra("film"):
         import_module(module)
+
+
+BLOCKED = """
+import sys
+sys.modules.update(dict.fromkeys(("pinocchio", "osqp", "qpsolvers")))
+import gauss
+scene = gauss.load("four_bar")
+motion = gauss.simulate(scene, 0.05)
+compulsion = gauss.assemble(motion.system, motion.state(0))
+for ask in (lambda: gauss.solve(compulsion, backend="osqp"), lambda: gauss.crosscheck(scene)):
+    try:
+        ask()
+    except gauss.errors.MissingPackageError as error:
+        print(error)
+"""
+
+
+@pytest.mark.slow
+def test_what_needs_a_missing_package_says_so_and_the_rest_works():
+    found = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, cwd=Path(__file__).parents[1])
+    assert found.returncode == 0, found.stderr
+    assert [line.split(" (")[0] for line in found.stdout.splitlines()] == [
+        "qpsolvers is not installed: pip install qpsolvers",
+        "pinocchio is not installed: pip install pin",
+    ]

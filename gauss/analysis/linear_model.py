@@ -53,7 +53,7 @@ class LinearModes:
 
     @property
     def damping(self) -> np.ndarray:
-        """Damping ratios −Re λ / |λ|; NaN where λ = 0."""
+        """Damping ratios ``−Re λ / |λ|``; NaN where λ = 0."""
         with np.errstate(invalid="ignore"):
             return -self.eigenvalues.real / np.abs(self.eigenvalues)
 

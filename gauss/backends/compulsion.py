@@ -226,7 +226,7 @@ class Compulsion:
         return r1, r2, r3
 
     def magnitudes(self, a, qdd, multipliers):
-        """Sums of the absolute values of the terms of :meth:`residuals`, with |a − a_free| in place of a in Φ a − f."""
+        """Sums of the absolute values of the terms of :meth:`residuals`, with ``|a − a_free|`` in place of a in Φ a − f."""
         lift, a_free = np.abs(a - self.a_free), np.abs(self.a_free)
         multipliers, qdd = np.abs(multipliers), np.abs(qdd)
         r1, r2, r3 = self.Phi * lift, np.abs(self.D), np.abs(self.P)

@@ -4,10 +4,13 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-import osqp
 
 from gauss.backends.programme import Outcome, Programme
 from gauss.backends.workspace import SparsityLayout
+from gauss.errors import extra
+
+with extra():
+    import osqp
 
 
 class OSQP:

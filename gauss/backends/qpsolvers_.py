@@ -4,10 +4,12 @@ import warnings
 from contextlib import contextmanager, nullcontext
 
 import numpy as np
-import qpsolvers
 
 from gauss.backends.programme import Outcome, Programme
-from gauss.errors import BackendError, did_you_mean
+from gauss.errors import BackendError, did_you_mean, extra
+
+with extra():
+    import qpsolvers
 
 # Solvers that qpsolvers lets factorise H in its place, unless that is stored by rows: the next call would have the factor.
 FACTORISING = ("pyqpmad",)

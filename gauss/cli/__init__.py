@@ -12,7 +12,6 @@ from gauss.versions import VERSION
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",  # the default would swallow units in [brackets]
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 

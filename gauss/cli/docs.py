@@ -1,47 +1,18 @@
 """Command ``gauss docs``."""
 
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gauss.errors import FileError, extra
 
-MODULES = (
-    "gauss",
-    "gauss.math",
-    "gauss.errors",
-    "gauss.linkages",
-    "gauss.rotors",
-    "gauss.servo",
-    "gauss.view",
-    "gauss.view.viewer",
-    "gauss.scene",
-    "gauss.system",
-    "gauss.backends",
-    "gauss.dynamics",
-    "gauss.integrators",
-    "gauss.simulation",
-    "gauss.simulation.sweeps",
-    "gauss.analysis",
-    "gauss.io",
-    "gauss.rotations",
-    "gauss.codegen",
-    "gauss.codegen.kernels",
-)
+def docs(
+    context: typer.Context,
+    output: Annotated[Path, typer.Option(help="Folder for the pages.")] = Path("gauss-docs"),
+    gallery: Annotated[bool, typer.Option(help="Run and draw the examples of the gallery.")] = True,
+    strict: Annotated[bool, typer.Option("--strict", help="Take warnings for errors.")] = False,
+):
+    """Write the documentation as web pages: guides, gallery, reference of all public names, benchmarks."""
+    from gauss.docs.build import build  # imports what no other command needs
 
-
-def docs(output: Annotated[Path, typer.Option(help="Folder for the pages.")] = Path("gauss-docs")):
-    """Write the reference of all public names as web pages, from their docstrings; needs pdoc."""
-    with extra("docs"):
-        pdoc = import_module("pdoc")
-    for module in map(import_module, MODULES):
-        for name in getattr(module, "__all__", ()):  # pdoc looks at what is there already
-            setattr(module, name, getattr(module, name))
-    pdoc.render.configure(docformat="numpy")
-    try:
-        pdoc.pdoc(*MODULES, output_directory=output)
-    except OSError as error:
-        raise FileError(f"{output}: cannot be written: {error.strerror}.") from error
-    typer.echo(f"reference written to {output / 'index.html'}")
+    typer.echo(f"documentation written to {build(output, context.find_root().command, gallery, strict)}")

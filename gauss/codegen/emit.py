@@ -11,7 +11,7 @@ from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides, strip_mined_loop
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.native_function import NativeFunction
-from gauss.codegen.outlined_pieces import LONGEST_UNCUT, write_pieces
+from gauss.codegen.outlined_pieces import lengths, write_pieces
 from gauss.codegen.schedule import Schedule, schedule
 from gauss.codegen.straight_line import calling, result_rooms, straight_line
 
@@ -86,7 +86,7 @@ class Writer:
         callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
         name = f"{function.name}_{len(self._bodies)}_{width}"
         scheduled = self._scheduled(function)
-        if len(nodes) > LONGEST_UNCUT:
+        if len(nodes) > lengths(self.module)[0]:
             return write_pieces(self.module, name, scheduled, callees, width, strided)
         body, lanes = begin_function(self.module, name, width)
         source, in_stride, target, out_stride = strides(body, width, strided)

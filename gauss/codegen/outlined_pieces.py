@@ -22,9 +22,14 @@ LONGEST_UNCUT = 2_000  # operations above which a function is outlined into piec
 PIECE_LENGTH = (
     800  # operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones
 )
-# the same on a GPU, whose threads have 255 registers of 32 bits: in the RK4 step of a biped with loops, loads and stores of
-# its frame and of spilled registers fall from 35 to 14 thousand, and the time of the assembler to a half
-DEVICE_PIECE_LENGTH = 400
+# the same two on a GPU, whose threads have 255 registers of 32 bits: in the RK4 step of a biped with loops, loads and stores
+# of its frame and of spilled registers fall from 35 to 14 thousand, and the time of the assembler to a half
+DEVICE_LENGTHS = 1_000, 400
+
+
+def lengths(module: ir.Module) -> tuple[int, int]:
+    """Operations above which a function is outlined into pieces, and of a piece."""
+    return DEVICE_LENGTHS if isinstance(module, DeviceModule) else (LONGEST_UNCUT, PIECE_LENGTH)
 
 
 def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: int, strided: bool = False) -> ir.Function:
@@ -45,7 +50,7 @@ def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: 
     strided : bool
         Whether its inputs and outputs may be apart.
     """
-    pieces = cut(whole, DEVICE_PIECE_LENGTH if isinstance(module, DeviceModule) else PIECE_LENGTH)
+    pieces = cut(whole, lengths(module)[1])
     place, size = _frame(whole, pieces)
     codes = [
         _piece_code(module, f"{name}_{k}", whole, piece, place, callees, width, strided) for k, piece in enumerate(pieces)

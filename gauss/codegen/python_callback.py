@@ -124,9 +124,17 @@ def callbacks_are_available() -> bool:
     return sys.implementation.name == "cpython"
 
 
-@cache
-def register_callback() -> object:
+def register_callback():
     """Let machine code that is linked from now on call Python."""
+    with _lock:
+        _registered()
+
+
+_lock = threading.Lock()  # threads may link at the same time, and code that is linked needs the function for ever
+
+
+@cache
+def _registered() -> object:
     address = {name: ctypes.cast(getattr(ctypes.pythonapi, name), ctypes.c_void_p).value for name in NEEDED}
     form = ctypes.create_string_buffer(ARGUMENTS)
     text = CODE.format(**address, receiver=id(_receive), format=ctypes.addressof(form))

@@ -5,14 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
-from gauss.errors import FileError, NotImportedWarning
+from gauss.errors import FileError, NotImportedWarning, extra
 from gauss.io.urdf.guard import guarded, require_own_meshes
 from gauss.io.urdf.numbers import for_parser
 from gauss.io.urdf.read import ROOTS, base_of, body_names
 from gauss.io.urdf.robots import robot
 from gauss.scene import GROUND, Scene
+
+with extra():
+    import pinocchio as pin
 
 ABOVE = 6  # folders above a file in which its package:// paths are looked for
 

@@ -61,7 +61,7 @@ class Viscous(Law):
 
 @dataclass(frozen=True)
 class Quadratic(Law):
-    """Quadratic torque −value · ω |ω|, of fans and beaters.
+    """Quadratic torque ``−value · ω |ω|``, of fans and beaters.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ class SetValued(Relation):
     """Set-valued element on a rate u of joint coordinates: it sticks as long as its force stays within bounds.
 
     While it sticks the force is a multiplier between the bounds: the compulsion has the further term that is their support
-    function of u̇, limit · |u̇| for ±limit. While it slips the force is a load against u.
+    function of u̇, ``limit · |u̇|`` for ±limit. While it slips the force is a load against u.
 
     A kind gives ``acts_on``, ``rate``, ``bounds`` and ``effort``.
 

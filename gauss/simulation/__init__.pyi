@@ -1,6 +1,7 @@
 from gauss.simulation.batch.batch_result import Rollout
 from gauss.simulation.batch.rollout import rollout
 from gauss.simulation.batch.simulator_batch import SimulatorBatch
+from gauss.simulation.initial_overlaps import resolve_overlaps
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.prepared_motion import PreparedMotion, prepare
 from gauss.simulation.simulate import simulate
@@ -19,6 +20,7 @@ __all__ = [
     "Trajectory",
     "crossings",
     "prepare",
+    "resolve_overlaps",
     "rollout",
     "simulate",
 ]

@@ -4,11 +4,11 @@ import numpy as np
 
 from gauss import integrators
 from gauss.backends import Backend, ready
-from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.scene_compilation import compile_scene
 from gauss.dynamics.stabilisation import Baumgarte, drift
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, did_you_mean, require

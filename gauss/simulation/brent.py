@@ -5,7 +5,7 @@ Inverse quadratic interpolation, the secant, or bisection where these converge s
 """
 
 from collections.abc import Callable
-from math import isnan
+from math import copysign, isnan
 
 MOST_ITERATIONS = 100
 NO_STEP = float("inf")  # of an interpolation without a result: bisection is taken
@@ -39,11 +39,11 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
     f_before, f = value(before), value(x)
     if f_before == 0.0 or f == 0.0:
         return before if f_before == 0.0 else x
-    if (f_before < 0.0) == (f < 0.0):
+    if not _differ(f_before, f):
         raise ValueError(f"the function has one sign at {begin!r} and at {end!r}.")
     other = f_other = last = step = 0.0
     for _ in range(MOST_ITERATIONS):
-        if f_before != 0.0 and f != 0.0 and (f_before < 0.0) != (f < 0.0):
+        if _differ(f_before, f):
             other, f_other, last = before, f_before, x - before
             step = last
         if abs(f_other) < abs(f):
@@ -52,14 +52,18 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
         least, half = (xtol + rtol * abs(x)) / 2.0, (other - x) / 2.0
         if f == 0.0 or abs(half) < least:
             return x
-        tried = NO_STEP
-        if abs(last) > least and abs(f) < abs(f_before):
-            tried = _interpolated((before, f_before), (x, f), (other, f_other))
+        interpolates = abs(last) > least and abs(f) < abs(f_before)
+        tried = _interpolated((before, f_before), (x, f), (other, f_other)) if interpolates else NO_STEP
         last, step = (step, tried) if 2.0 * abs(tried) < min(abs(last), 3.0 * abs(half) - least) else (half, half)
         before, f_before = x, f
-        x += step if abs(step) > least else (least if half > 0.0 else -least)
+        x += step if abs(step) > least else copysign(least, half)
         f = value(x)
     raise ValueError(f"no root was found within {MOST_ITERATIONS} iterations.")
+
+
+def _differ(one: float, other: float) -> bool:
+    """Whether two numbers have different signs."""
+    return one < 0.0 < other or other < 0.0 < one
 
 
 def _interpolated(before: tuple[float, float], now: tuple[float, float], other: tuple[float, float]) -> float:

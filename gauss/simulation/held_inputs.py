@@ -7,8 +7,8 @@ from math import isfinite
 import numpy as np
 
 from gauss.codegen import Scalar
-from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.inputs import driven_scene
+from gauss.dynamics.scene_compilation import compile_scene
 from gauss.errors import GaussError, SimulationError
 from gauss.system import System
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from importlib import import_module
 from numbers import Integral
 from typing import NamedTuple
 
@@ -235,6 +236,31 @@ class Trajectory:
     def __repr__(self):
         span = f"{self.t[0]:.6g} … {self.t[-1]:.6g} s" if len(self) else "empty"
         return f"Trajectory({self.system.scene.name!r}, {len(self)} samples, {span})"
+
+    def _repr_html_(self) -> str:
+        from gauss.simulation.notebook import html_table  # notebooks alone need it
+
+        return html_table(self.system, self.t, self.q, repr(self))
+
+    def plot(self, path=None):
+        """Figure of coordinates, rates, energies and energy balance; see :func:`gauss.view.plot_motion`.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            Where to save it: .png, .svg or .pdf.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure.
+
+        Raises
+        ------
+        MissingPackageError
+            If matplotlib is not installed.
+        """
+        return import_module("gauss.view").plot_motion(self, path)
 
     def recorded(self, system: System, settings: dict, plan: Plan) -> "Trajectory":
         """Trajectory with the arguments of the simulation and its plan, of a system."""

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gauss
-from gauss.codegen import Kernel, as_number, emit, schedule, trace, write
+from gauss.codegen import Kernel, as_number, schedule, trace, write
 from gauss.codegen import outlined_pieces as pieces
 from gauss.codegen.outlined_pieces import cut, places
 from gauss.dynamics.engines.certified import CertifiedEngine
@@ -17,7 +17,7 @@ WIDTHS = [1, 7, 33]  # states: one, less than a vector register, vectors and sin
 @pytest.fixture
 def short(monkeypatch):
     """Every function is cut, into pieces of a few operations."""
-    monkeypatch.setattr(emit, "LONGEST_UNCUT", 0)
+    monkeypatch.setattr(pieces, "LONGEST_UNCUT", 0)
     monkeypatch.setattr(pieces, "PIECE_LENGTH", 4)
 
 

@@ -41,7 +41,7 @@ def in_stages():
 @pytest.mark.parametrize("inlined", [False, True])
 def test_stages_compute_what_one_piece_computes(name, length, inlined, in_stages, monkeypatch):
     """By calls in straight-line code and in pieces, and inlined; for one state and for a batch."""
-    monkeypatch.setattr("gauss.codegen.emit.LONGEST_UNCUT", length)
+    monkeypatch.setattr(outlined_pieces, "LONGEST_UNCUT", length)
     monkeypatch.setattr(outlined_pieces, "PIECE_LENGTH", length)
     early, later = in_stages
     apply = (lambda f: f.inlined) if inlined else (lambda f: f)

@@ -38,6 +38,10 @@ def _of_poses(t, at, hinge):
 
 LAWS = (_damping, _relay, _of_time, _of_poses)
 SCENES = ("double_pendulum", "four_bar", "spatial_tree")
+LARGE = (  # more bodies and loops than straight-line code takes
+    ("n_four_bar", {"n": 50}, "call graph"),
+    ("random_tree", {"n": 45, "seed": 1, "kinds": ("revolute", "prismatic")}, "tree recursion"),
+)
 
 
 def _system(name: str, law) -> gauss.System:
@@ -62,6 +66,22 @@ def test_motions_are_those_of_the_loop_in_python(name, law):
             assert np.abs(mine - other).max() <= same * max(1.0, np.abs(other).max())
         assert found.stats.opaque == expected.stats.opaque
         assert found.stats.handed_over is None
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::gauss.errors.SwitchingWarning")
+@pytest.mark.parametrize("name, options, dynamics", LARGE)
+def test_large_scenes_call_their_laws_in_the_compiled_loop(name, options, dynamics):
+    scene = gauss.load(name, **options)
+    hinge, last = next(joint for joint, given in scene.joints.items() if given.pair.n_v == 1), list(scene.bodies)[-1]
+    scene.drive(hinge, torque=lambda t, at: -0.1 * float(at.rate(hinge)))
+    scene.force("jet", last, force=lambda t: (float(np.cos(float(t))), 0.0, 0.3))
+    system, run = gauss.compile_scene(scene), {"integrator": "rk4", "step": 2e-3, "progress": False}
+    found, expected = (gauss.simulate(system, 0.01, plan=plan, **run) for plan in (None, Plan("Python loop", dynamics)))
+    assert (found.stats.plan.driver, found.stats.plan.dynamics) == ("compiled loop", dynamics)
+    for part in ("q", "v", "work"):
+        mine, other = getattr(found, part), getattr(expected, part)
+        assert np.abs(mine - other).max() <= SAME_STEPS * max(1.0, np.abs(other).max())
 
 
 @pytest.mark.parametrize("how", [ADAPTIVE, FIXED])

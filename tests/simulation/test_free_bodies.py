@@ -58,7 +58,7 @@ def test_kernels_of_pairs_are_the_gap_functions_of_the_scene(one, other):
         motion = kinematics(system, State(0.0, q, v))
         found, across = gaps(motion), slips(motion)
         begun = stepper._begin(motion.state, 0.0, 0.0)
-        near, _ = stepper.detection.find(stepper.table.poses(begun.bodies), begun.bodies[9:12], 10.0)
+        near, _ = stepper.detection.find(begun.bodies, 10.0)
         places = stepper.table.gap_places(near.key)
         missing = np.setdiff1d(np.arange(found.width.size), places)
         assert (found.width[missing] > 10.0).all()
@@ -142,7 +142,7 @@ def test_forces_of_a_stack_carry_its_weight():
         assert np.abs(gauss.friction_forces(found, name).sum(axis=1)).max() <= 1e-6
 
 
-def test_near_pairs_are_all_that_overlap():
+def test_near_contacts_are_all_that_are_nearer():
     scene, rng = gauss.Scene("cloud"), np.random.default_rng(5)
     for k in range(40):
         free_body(scene, f"body {k}", 0.01, rng.uniform(-0.5, 0.5, 3))
@@ -153,11 +153,13 @@ def test_near_pairs_are_all_that_overlap():
     scene.contacts_all()
     system = gauss.compile_scene(scene)
     stepper = FreeBodyStepper(system)
-    poses = stepper.table.poses(stepper._begin(system.initial_state(), 0.0, 0.0).bodies)
-    half = (np.abs(poses[:9].reshape(3, 3, -1)) * stepper.table.sizes[:3]).sum(axis=1) + stepper.table.sizes[3]
-    apart = np.abs(poses[9:12, :, None] - poses[9:12, None]) - half[:, :, None] - half[:, None]
-    expected = {(i, j) for i, j in zip(*np.nonzero((apart <= 0.0).all(axis=0)), strict=True) if i < j}
-    assert expected and set(zip(*stepper.table.near(poses, 0.0), strict=True)) == expected
+    bodies = stepper._begin(system.initial_state(), 0.0, 0.0).bodies
+    every = stepper.detection.find(bodies, 10.0)[0]
+    for reach in (0.0, 0.05, 0.2):
+        near = stepper.detection.find(bodies, reach)[0]
+        expected = every.key[every.gap <= reach]
+        assert expected.size < every.key.size
+        np.testing.assert_array_equal(near.key, expected)
 
 
 def test_contacts_all_leaves_out_what_cannot_touch():

@@ -128,7 +128,7 @@ def test_machine_code_and_python_take_the_same_steps(name):
         by_python = stepper.python_step(state, STEP)
         stepper.known = known
         loop = stepper.run(state, np.zeros(3), ends, rows)
-        if loop.count:
+        if loop.steps:
             finished += 1
             q, v, work = np.split(rows[0, 1:], [system.n_q, system.n_q + system.n_v])
             np.testing.assert_allclose(v, by_python.v, atol=SAME_STEPS)

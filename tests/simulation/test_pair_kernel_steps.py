@@ -121,3 +121,27 @@ def test_overlaps_at_the_start_are_named_and_resolved():
     assert np.diff(energy.kinetic + energy.potential).max() <= GAIN * energy.scale
     again = gauss.resolve_overlaps(system, state)
     assert np.abs(again.q - state.q).max() <= CLEARANCE
+
+
+def gripper() -> gauss.Scene:
+    """Two balls that press a box of 1 kg between them with a force; friction 0.5."""
+    scene = gauss.Scene("gripper")
+    scene.body("box", mass=1.0, inertia=(0.01,) * 3)
+    scene.prismatic("lift", "ground", "box", axis=(0, 0, 1))
+    scene.box("block", "box", (0.2, 0.2, 0.2))
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        scene.body(name, mass=0.1, inertia=(1e-4,) * 3, position=(0.12 * side, 0.0, 0.0))
+        scene.prismatic(f"{name} slides", "ground", name, at=(0.12 * side, 0.0, 0.0), axis=(-side, 0, 0))
+        scene.sphere(f"{name} tip", name, 0.02)
+        scene.input(f"{name} force", f"{name} slides", limits=20.0)
+        scene.contact(f"{name} touch", f"{name} tip", "block", friction=0.5)
+    return scene
+
+
+@pytest.mark.parametrize("squeeze", [9.6, 9.7, 9.82, 12.0])
+def test_a_gripper_holds_up_to_the_limit_of_friction(squeeze):
+    simulator = gauss.Simulator(gripper(), STEP)
+    simulator.step([squeeze, squeeze], n=100)
+    slides = max(0.0, 9.81 - 2.0 * 0.5 * squeeze)
+    assert simulator.state.v[0] == pytest.approx(-0.1 * slides, abs=1e-8)
+    assert simulator.state.q[0] == pytest.approx(-0.5 * slides * 0.1**2, abs=1e-6)

@@ -56,7 +56,7 @@ def test_a_motion_that_diverges_is_marked_and_the_others_are_not_affected():
 
 
 def test_sampled_control_swings_a_pole_up():
-    place = Path(gauss.__file__).parents[1] / "models" / "examples" / "mppi.py"
+    place = Path(gauss.__file__).parents[1] / "models" / "examples" / "control" / "mppi.py"
     example = run_path(str(place))
     scene, cost, duration = example["cart_pole"]()
     law = example["Mppi"](scene, cost, samples=200)

@@ -1,7 +1,6 @@
 """Comparison of a system in gauss and in Pinocchio over states: largest relative differences of each quantity."""
 
 import numpy as np
-import pinocchio as pin
 
 from gauss.analysis.crosscheck.pinocchio_ import twin
 from gauss.analysis.crosscheck.pinocchio_dynamics import (
@@ -18,7 +17,11 @@ from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.energies import kinetic_energy_of_bodies
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
+from gauss.errors import extra
 from gauss.system import State, System
+
+with extra():
+    import pinocchio as pin
 
 # Moments are compared relative to no less than the largest force times a thousandth of the length of the scene, and forces
 # relative to no less than the largest moment over a thousand lengths: where all moments vanish, they are rounding of forces.

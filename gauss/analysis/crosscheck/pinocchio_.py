@@ -3,11 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from gauss.analysis.crosscheck.pinocchio_joints import JointMap, backward, forward
 from gauss.backends.structure import Edge
+from gauss.errors import extra
 from gauss.system import PlacedJoint, State, System
+
+with extra():
+    import pinocchio as pin
 
 GROUND = -1
 

@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from gauss.analysis.crosscheck.pinocchio_ import GROUND, Configuration, Twin
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
-from gauss.errors import GaussError
+from gauss.errors import GaussError, extra
 from gauss.rotations import cross
+
+with extra():
+    import pinocchio as pin
 
 
 @dataclass(frozen=True)

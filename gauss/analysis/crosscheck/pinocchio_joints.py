@@ -11,11 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
-from gauss.errors import GaussError, did_you_mean
+from gauss.errors import GaussError, did_you_mean, extra
 from gauss.rotations import cross, from_quaternion, skew
 from gauss.system import PlacedJoint
+
+with extra():
+    import pinocchio as pin
 
 ONE, NULL = np.eye(3), np.zeros((3, 3))
 

@@ -11,15 +11,17 @@ left side comes from the two frames on the tree, the right side from a Pinocchio
 """
 
 import numpy as np
-import pinocchio as pin
 from scipy.linalg import block_diag
 
 from gauss.analysis.crosscheck.pinocchio_dynamics import PinocchioInstant
 from gauss.analysis.crosscheck.pinocchio_joints import forward
-from gauss.errors import GaussError
+from gauss.errors import GaussError, extra
 from gauss.rotations import cross, skew
 from gauss.scene import LinearCoupling
 from gauss.system import PlacedJoint, State, System
+
+with extra():
+    import pinocchio as pin
 
 SINGULAR_VALUE_CUTOFF = 1e-9  # of rows of unit length; redundant rows of consistent states lie near 1e-13
 ROW_ROUNDOFF = 1e-13  # length of a row that is zero but for rounding, relative to the longest

@@ -24,7 +24,7 @@ class Adaptive:
     size, row : int
         Length of a point, and of a sample.
     trial : Function
-        (point, *TRIAL_SETTINGS) → (point after, error, factor of the next step, evaluations, factorisations,
+        ``(point, *TRIAL_SETTINGS)`` → (point after, error, factor of the next step, evaluations, factorisations,
         inputs of dense output).
     project : Function or None
         Point → (projected point, constraint residual), with one evaluation; None without projection.

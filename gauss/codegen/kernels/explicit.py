@@ -23,7 +23,7 @@ def stride(n_y: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class ExplicitTrial(NativeFunction):
-    """Trial step: (point, *TRIAL_SETTINGS) → (point after, error, factor of the next step, cost, slopes).
+    """Trial step: ``(point, *TRIAL_SETTINGS)`` → (point after, error, factor of the next step, cost, slopes).
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class ExplicitTrial(NativeFunction):
     finish : Function
         (point, h, change of y) → (point, y').
     control : Function
-        Step-size controller: (point, *TRIAL_SETTINGS, point after, indicators, error estimates) → (error, factor,
+        Step-size controller: ``(point, *TRIAL_SETTINGS, point after, indicators, error estimates)`` → (error, factor,
         evaluations, factorisations).
     """
 

@@ -35,7 +35,7 @@ class LoopOfSteps(NamedTuple):
 
     Attributes
     ----------
-    count : int
+    steps : int
         Finished steps.
     largest : float
         Largest error of the laws of contact, in units of the scene.
@@ -45,7 +45,7 @@ class LoopOfSteps(NamedTuple):
         Whether the last of them has sliding contacts that are to be examined for Painlevé's paradox.
     """
 
-    count: int
+    steps: int
     largest: float
     changes: list[ModeChange]
     doubtful: bool

@@ -31,7 +31,8 @@ from gauss.dynamics.contact.moreau_step import (
     is_impact,
     least_rate,
 )
-from gauss.dynamics.contact.near_contacts import ContactDetection, NearContacts, confirmed
+from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
+from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.errors import SimulationError, StateError
@@ -110,7 +111,6 @@ class FreeBodyStepper:
     def __init__(self, system: System):
         self.system, self.kernels = system, free_body_kernels()
         self.table = ShapeTable(system)
-        self.detection = ContactDetection(self.table, system.scale.length)
         self.moving = [joint for joint in system.joints if joint.pair.n_v]
         Phi = system.Phi.reshape(-1, 6)
         self.child = np.array([joint.child for joint in self.moving])
@@ -120,6 +120,7 @@ class FreeBodyStepper:
         self.n = len(self.moving)
         self.gravity = np.repeat(np.array(system.scene.gravity, dtype=float)[:, None], self.n, axis=1)
         self._index_bodies()
+        self.detection = NearDetection(self.table, self.n + self.fixed.shape[1], system.scale.length)
         self.reach = self._reaches()
         self.share = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
         self.coefficients = np.unique(self.table.restitution)
@@ -161,6 +162,7 @@ class FreeBodyStepper:
 
     def forget(self):
         """Forget the forces of the last step: a new motion begins."""
+        self.detection.connect()
         self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
         self.record.forget()
 
@@ -239,8 +241,7 @@ class FreeBodyStepper:
     def _near(self, state: State, begun: _Begun, speed: float, h: float, share: float) -> NearContacts:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
-        poses = self.table.poses(begun.bodies)
-        near, overlaps = self.detection.find(poses, begun.bodies[9:12], reach, UNSEEN_OVERLAP)
+        near, overlaps = self.detection.find(begun.bodies, reach, UNSEEN_OVERLAP)
         return confirmed(near, overlaps, self.table, state.t)
 
     def _impacts(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:

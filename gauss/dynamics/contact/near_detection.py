@@ -1,4 +1,4 @@
-"""Near contacts of mechanisms by one call of machine code: :mod:`gauss.codegen.kernels.near_pairs` on a table of shapes."""
+"""Near contacts by one call of machine code: :mod:`gauss.codegen.kernels.near_pairs` on a table of shapes."""
 
 from functools import cache
 

@@ -1,15 +1,10 @@
-"""Shapes of a system as arrays, the laws of their pairs, and the pairs that are near (sweep and prune).
-
-Boxes along the world axes around the shapes are sorted by their lower ends along one axis; pairs that overlap there are
-tested along the others (Baraff 1992; Cohen, Lin, Manocha, Ponamgi 1995, I-COLLIDE).
-"""
+"""Shapes of a system as arrays, and the laws of their pairs."""
 
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.dynamics.contact.free_bodies import free_body_kernels
 from gauss.dynamics.contact.pair_kernels import SIZES
 from gauss.rotations import along
 from gauss.scene import Box, Capsule, Collider, Contact, HalfSpace, Points, Sphere
@@ -119,22 +114,6 @@ class ShapeTable:
         return np.linalg.norm(self.centre, axis=0) + np.linalg.norm(half, axis=0) + radius
 
     @cached_property
-    def planes(self) -> np.ndarray:
-        """Half-spaces."""
-        return np.flatnonzero(self.kind == RANK[HalfSpace])
-
-    @cached_property
-    def solids(self) -> np.ndarray:
-        """All other parts."""
-        return np.flatnonzero(self.kind != RANK[HalfSpace])
-
-    @cached_property
-    def on_planes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of a solid and a half-space that have a contact."""
-        first, second = np.nonzero(self.law[np.ix_(self.solids, self.planes)])
-        return self.solids[first], self.planes[second]
-
-    @cached_property
     def gaps(self) -> np.ndarray:
         """Numbers (k + 1,) of the gap functions before each contact, in the order of the scene."""
         return np.cumsum([0, *(len(contact.sides(self.scene)) for contact in self.contacts)])
@@ -164,56 +143,3 @@ class ShapeTable:
         one, other = np.where(turned, second, first), np.where(turned, first, second)
         place, count = self.number
         return self.gaps[self.law[first, second] - 1] + place[one] * count[other] + place[other] + key % MOST_FEATURES
-
-    def poses(self, bodies: np.ndarray) -> np.ndarray:
-        """Poses and velocities (24, k) of the parts, by those of the bodies (24, n + 1), the ground last."""
-        return free_body_kernels().place(np.concatenate([bodies[:, self.body], self.own, self.centre]))
-
-    def near(self, poses: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of parts with a contact that may be nearer than ``reach`` [m], in the order of kinds.
-
-        Parameters
-        ----------
-        poses : ndarray, shape (24, k)
-            Poses of the parts.
-        reach : float
-            Distance [m].
-        """
-        solids = self.solids
-        R, centre = poses[:9, solids].reshape(3, 3, -1), poses[9:12, solids]
-        half, radius = self.sizes[:3, solids], self.sizes[3, solids]
-        extent = (np.abs(R) * half).sum(axis=1) + (radius + 0.5 * reach)
-        low, high = centre - extent, centre + extent
-        first, second = _overlaps(low, high)
-        first, second = solids[first], solids[second]
-        keep = self.law[first, second] > 0
-        one, other = np.minimum(first, second)[keep], np.maximum(first, second)[keep]
-        solid, plane = self._near_planes(poses, extent)
-        return np.concatenate([one, solid]), np.concatenate([other, plane])
-
-    def _near_planes(self, poses: np.ndarray, extent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of a solid and a half-space whose plane reaches into the box around the solid."""
-        solid, plane = self.on_planes
-        if not solid.size:
-            return solid, plane
-        whole = np.zeros((3, len(self.parts)))
-        whole[:, self.solids] = extent
-        normal = poses[[2, 5, 8]][:, plane]
-        height = (normal * (poses[9:12, solid] - poses[9:12, plane])).sum(axis=0)
-        keep = height <= (np.abs(normal) * whole[:, solid]).sum(axis=0)
-        return solid[keep], plane[keep]
-
-
-def _overlaps(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of boxes (3, k) that overlap: sorted along the axis of the widest spread, tested along the others."""
-    axis = int(np.argmax(np.ptp(low, axis=1))) if low.shape[1] else 0
-    order = np.argsort(low[axis], kind="stable")
-    starts = low[axis, order]
-    counts = np.searchsorted(starts, high[axis, order], side="right") - np.arange(order.size) - 1
-    first = np.repeat(np.arange(order.size), counts)
-    second = first + 1 + np.arange(first.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    first, second = order[first], order[second]
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    keep = (low[j, first] <= high[j, second]) & (low[j, second] <= high[j, first])
-    keep &= (low[k, first] <= high[k, second]) & (low[k, second] <= high[k, first])
-    return first[keep], second[keep]

@@ -9,10 +9,9 @@ import warnings
 from collections.abc import Collection
 
 import numpy as np
-import pinocchio as pin
 
 from gauss import rotations
-from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_you_mean
+from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_you_mean, extra
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.joint_file import joint_file
@@ -21,6 +20,9 @@ from gauss.io.urdf.plus import add_loops_and_couplings
 from gauss.io.urdf.unknown import refuse_couplings
 from gauss.scene import GROUND, Scene
 from gauss.scene.body import unphysical
+
+with extra():
+    import pinocchio as pin
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 ROOTS = ("fixed", "free")

@@ -4,13 +4,13 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, one_tier
-from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.outputs import output_function, shape_of, split
 from gauss.dynamics.rules import Question
+from gauss.dynamics.scene_compilation import compile_scene
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean, require

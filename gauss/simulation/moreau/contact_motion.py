@@ -103,16 +103,16 @@ class ContactMotion:
     def _by_machine_code(self, ends: np.ndarray, rows: np.ndarray) -> tuple[int, bool]:
         """Number of steps that machine code finishes, and whether it may continue."""
         begin, loop = self.state, self.stepper.run(self.state, self.work, ends, rows)
-        if not loop.count:
+        if not loop.steps:
             return 0, False
         self._note([begin.t, *ends], loop.changes)
-        self.steps, self.largest = self.steps + loop.count, max(self.largest, loop.largest)
+        self.steps, self.largest = self.steps + loop.steps, max(self.largest, loop.largest)
         if loop.doubtful:
-            before = begin if loop.count == 1 else self._state_of(rows[loop.count - 2])
-            self._examine(before, float(ends[loop.count - 1]))
-        last = rows[loop.count - 1]
+            before = begin if loop.steps == 1 else self._state_of(rows[loop.steps - 2])
+            self._examine(before, float(ends[loop.steps - 1]))
+        last = rows[loop.steps - 1]
         self.state, self.work = self._state_of(last), last[-3:].copy()
-        return loop.count, loop.doubtful or len(loop.changes) >= CHANGES_ROOM
+        return loop.steps, loop.doubtful or len(loop.changes) >= CHANGES_ROOM
 
     def _examine(self, before: State, t: float):
         """Warn of Painlevé's paradoxes of a step, unless the same contacts were warned of."""

@@ -6,7 +6,7 @@ from gauss.codegen.kernels import Control, LoopStatus
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.contact_stepper import contact_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
-from gauss.dynamics.contact.resolve_overlaps import resolved
+from gauss.dynamics.contact.overlap_resolution import resolved
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point, Rates

@@ -13,7 +13,8 @@ import numpy as np
 from gauss.backends import Backend, solve
 from gauss.codegen import Kernel
 from gauss.dynamics.assemble import assemble
-from gauss.dynamics.contact.mode_selection import ModeSelector, forces_of
+from gauss.dynamics.contact.mode_selection import ModeSelector
+from gauss.dynamics.contact.mode_trial import forces_of
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, closed_stop, cut_rows

@@ -1,0 +1,72 @@
+"""Sources of the documentation in one folder, and HTML of them by Sphinx."""
+
+import os
+import shutil
+from importlib import import_module
+from pathlib import Path
+
+from gauss.docs import generated, reference
+from gauss.errors import FileError, extra
+
+HERE = Path(__file__).parent
+
+
+def build(output: Path, program, gallery: bool = True, strict: bool = False) -> Path:
+    """Write the documentation as HTML.
+
+    Parameters
+    ----------
+    output : Path
+        Folder of the pages; sources and the state of Sphinx are kept in ``.build`` below it, so that a second build takes
+        a fraction of the time.
+    program : click.Group
+        The commands of the command line.
+    gallery : bool
+        Whether the examples are run and drawn.
+    strict : bool
+        Whether a warning is an error.
+
+    Returns
+    -------
+    Path
+        The start page.
+
+    Raises
+    ------
+    FileError
+        If the folder cannot be written, or Sphinx fails, with what it says above.
+    MissingPackageError
+        If Sphinx or one of its extensions is not installed.
+    """
+    with extra("docs"):
+        for package in ("furo", "myst_parser", "sphinx_copybutton", "sphinx_design", "sphinx_gallery"):
+            import_module(package)
+        sphinx = import_module("sphinx.cmd.build")
+    work = output / ".build"
+    try:
+        collect(work / "pages", program)
+    except OSError as error:
+        raise FileError(f"{output}: cannot be written: {error.strerror}.") from error
+    command = ["-b", "html", "-q", "-j", str(min(2, os.cpu_count() or 1)), "-c", str(HERE), "-d", str(work / "doctrees")]
+    command += ["-D", f"plot_gallery={int(gallery)}"] + (["-W", "--keep-going"] if strict else [])
+    if sphinx.main([*command, str(work / "pages"), str(output)]):
+        raise FileError(f"{output}: the documentation was not built; Sphinx says why above.")
+    return output / "index.html"
+
+
+def collect(folder: Path, program):
+    """Copy the pages into a folder, and add those that are made of the package."""
+    shutil.copytree(HERE / "pages", folder, dirs_exist_ok=True)
+    for name, source in generated.copies().items():
+        target = folder / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(source, target)
+    for name, text in (generated.texts(program) | reference.pages()).items():
+        _write(folder / name, text)
+
+
+def _write(path: Path, text: str):
+    """Write a page unless it stands there already: Sphinx reads again what is newer."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")

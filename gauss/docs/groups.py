@@ -1,0 +1,160 @@
+"""Public names by task: the chapters of the reference."""
+
+from importlib import import_module
+from typing import NamedTuple
+
+from gauss import errors
+
+
+class Group(NamedTuple):
+    """A chapter of the reference.
+
+    Attributes
+    ----------
+    key : str
+        Name of its page.
+    title, text : str
+        Heading and introduction.
+    names : tuple of str
+        Full public names.
+    """
+
+    key: str
+    title: str
+    text: str
+    names: tuple[str, ...]
+
+
+def _of(package: str, names: str = "") -> tuple[str, ...]:
+    """Full names of some names of a package, or of all."""
+    return tuple(f"{package}.{name}" for name in names.split() or import_module(package).__all__)
+
+
+ERRORS = [name for name, thing in vars(errors).items() if isinstance(thing, type) and thing.__module__ == errors.__name__]
+GROUPS = (
+    Group(
+        "scene",
+        "Build a scene",
+        "A scene holds bodies, joints, constraints and loads; its methods add them. All elements: :doc:`gauss.scene`.",
+        _of("gauss", "Scene Body Frame Joint Coupling Constraint Drive Force Spring JointSpring Start"),
+    ),
+    Group(
+        "files",
+        "Read and write files",
+        "Scenes, linkages, networks, motions and sweeps; :doc:`/formats` describes the files.",
+        _of("gauss", "load save catalog load_linkage load_rotors save_rotors load_motion load_sweep to_dataset to_table"),
+    ),
+    Group(
+        "simulate",
+        "Simulate",
+        "From one motion to many, from a call to a loop of your own. Which route a motion takes: :doc:`/concepts/plan`.",
+        _of("gauss", "simulate Trajectory Simulator SimulatorBatch prepare rollout sweep crossings Plan Baumgarte Taylor")
+        + _of("gauss", "generalised_alpha advise"),
+    ),
+    Group(
+        "instant",
+        "One state",
+        "A scene compiled into a system, whose functions of a state are machine code, and the compulsion that its "
+        "accelerations minimise.",
+        _of("gauss", "compile_scene System State Kinematics assemble Compulsion solve Solution choose"),
+    ),
+    Group(
+        "forces",
+        "Forces and energy",
+        "What joints, constraints, drives and contacts take, at one instant or along a motion.",
+        _of("gauss", "reactions constraint_forces drive_forces contact_forces friction_forces set_valued_forces")
+        + _of("gauss", "inverse_dynamics energy"),
+    ),
+    Group(
+        "analysis",
+        "Analyse a mechanism",
+        "Freedoms, ways of assembly, states of rest, linear models and their modes, derivatives, and the check against "
+        "Pinocchio.",
+        _of("gauss", "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes")
+        + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps"),
+    ),
+    Group(
+        "view",
+        "Look at a motion",
+        "Figures of matplotlib, the viewer in the browser, self-contained pages and films. Needs the extra ``view``.",
+        ("gauss.show", *_of("gauss.view"), *_of("gauss.view.viewer", "Page Viewer export_film export_html page")),
+    ),
+    Group(
+        "laws",
+        "Functions for laws",
+        "Functions that work on numbers and are traced into machine code: what laws of drives, forces and constraints may "
+        "call beside numpy's.",
+        _of("gauss.math"),
+    ),
+    Group(
+        "actuators",
+        "Actuators with states",
+        "Motors, controllers, filters, muscles and friction with states of their own, made of :meth:`gauss.Scene.state`.",
+        _of("gauss.scene.actuators", "dc_motor pi_controller low_pass muscle lugre_friction"),
+    ),
+    Group(
+        "linkages",
+        "Planar linkages",
+        "Assur groups: positions in closed form, reactions, a cycle in one call, balancing. Guide: :doc:`/guides/linkages`.",
+        ("gauss.Linkage", *(name for name in _of("gauss.linkages") if name != "gauss.linkages.Linkage")),
+    ),
+    Group("rotors", "Rotor networks", "Drive trains of machines. Guide: :doc:`/guides/rotors`.", _of("gauss.rotors")),
+    Group(
+        "servo",
+        "Servo-constraints",
+        "Relations held by controlled forces. Guide: :doc:`/guides/servo`.",
+        _of("gauss.servo"),
+    ),
+    Group(
+        "export",
+        "Code of other languages",
+        "Functions of a state as C99, CasADi, JAX and formulas. Guide: :doc:`/guides/export`.",
+        _of("gauss.export"),
+    ),
+    Group(
+        "gym",
+        "Environments for learning",
+        "Environments of Gymnasium, one at a time or many in SIMD lanes. Needs the extra ``gym``.",
+        _of("gauss.gym"),
+    ),
+    Group(
+        "errors",
+        "Errors and warnings",
+        "Every error of gauss is a :class:`gauss.GaussError`; its message names the place, the value and the remedy.",
+        ("gauss.GaussError", *(f"gauss.errors.{name}" for name in ERRORS if name != "GaussError")),
+    ),
+)
+ROOMS = (
+    "gauss.scene",
+    "gauss.simulation",
+    "gauss.simulation.sweeps",
+    "gauss.analysis",
+    "gauss.analysis.crosscheck",
+    "gauss.backends",
+    "gauss.integrators",
+    "gauss.dynamics",
+    "gauss.system",
+    "gauss.io",
+    "gauss.codegen",
+    "gauss.codegen.kernels",
+)
+MADE_BY = {  # names that one seldom types, and what makes such objects: a public name, or a method
+    "gauss.Body": ".body",
+    "gauss.Constraint": ".constrain",
+    "gauss.Coupling": ".couple",
+    "gauss.Drive": ".drive",
+    "gauss.Force": ".force",
+    "gauss.Frame": ".frame",
+    "gauss.Joint": ".revolute",
+    "gauss.JointSpring": ".joint_spring",
+    "gauss.Spring": ".spring",
+    "gauss.Start": ".start",
+    "gauss.Compulsion": "gauss.assemble",
+    "gauss.LinearModel": "gauss.linearise",
+    "gauss.LinearModes": ".modes",
+    "gauss.Solution": "gauss.solve",
+    "gauss.State": ".initial_state",
+    "gauss.StaticEquilibrium": "gauss.equilibrium",
+    "gauss.System": "gauss.compile_scene",
+    "gauss.Trajectory": "gauss.simulate",
+}
