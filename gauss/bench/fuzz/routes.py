@@ -31,6 +31,7 @@ AS_USERS_GET_IT = 4  # one of so many scenes runs its first evaluations by numpy
 ROUTE_TIME = 10.0  # [s] of processor time for a route
 CUT_TIME = 2.0  # [s] of processor time after which the second route is compared as far as it came
 SAYING = (BalanceWarning, SwitchingWarning)  # warnings that a motion is not to be trusted
+MOVED = ("moved", "cut")
 BAD = ("silent", "raised", "timed out", "crashed", "stray")
 
 
@@ -66,20 +67,21 @@ def examine_motion(seed: int, number: int, without: tuple = ()) -> dict:
     words = {"base": given.base, "elements": "+".join(sorted(given.elements)), "integrator": given.integrator}
     routes = _routes(given, number)
     verdict, off, why = _verdict(given, routes)
-    reached = (moved_until(given, route) for route in routes if route.outcome in ("moved", "cut"))
+    reached = (moved_until(given, route) for route in routes if route.outcome in MOVED)
     more = {"claim": max(routes[0].claim), "compared": min(reached, default=0.0) if np.isfinite(off) else np.nan}
     warned = "+".join(sorted({kind for route in routes for kind in route.warned}))
     return _row(seed, number, words, verdict, begin, off=off, warned=warned, why=why, **more)
 
 
 def _routes(given: MovedScene, number: int) -> list[Route]:
-    """All routes of a scene: the compiled one, the certified one, and of some a batch of one method."""
+    """Compiled motion, the certified one beside it, and of some scenes a rollout."""
     with nullcontext() if number % AS_USERS_GET_IT == 0 else compiled_at_once():
         routes = [_route(given, given.integrator, "auto", RTOL, verify=True)]
-    if routes[0].outcome not in ("timed out", "raised"):  # the verdict is clear then
-        second = _second(given, RTOL, CUT_TIME)
-        routes.append(_second(given, RTOL, ROUTE_TIME) if second.outcome == "timed out" else second)  # not one sample
-    if len(routes) > 1 and given.integrator == "dop853" and number % 3 == 0 and not given.scene.nonsmooth:
+    if routes[0].outcome in ("timed out", "raised"):  # the verdict is clear then
+        return routes
+    second = _second(given, RTOL, CUT_TIME)
+    routes.append(_second(given, RTOL, ROUTE_TIME) if second.outcome == "timed out" else second)  # not one sample
+    if given.integrator == "dop853" and number % 3 == 0 and not given.scene.nonsmooth:
         routes.append(_caught(lambda: _rolled_out(given)))
     return routes
 
@@ -115,8 +117,7 @@ def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
     failed = _failed(routes)
     if failed is not None:
         return failed[0], np.nan, failed[1]
-    moved = [route for route in routes if route.outcome in ("moved", "cut")]
-    far = _apart(given, moved)
+    moved, far = _compared(given, [route for route in routes if route.outcome in MOVED])
     if far <= 1.0:
         return "agree", far, ""
     said = {kind for route in moved for kind in route.warned} & {kind.__name__ for kind in SAYING}
@@ -125,16 +126,14 @@ def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
     return _third_route(given, moved, far)
 
 
-def _apart(given: MovedScene, moved: list[Route]) -> float:
-    """How far the first route is from any other, over what they may be; the second is repeated if need be."""
+def _compared(given: MovedScene, moved: list[Route]) -> tuple[list[Route], float]:
+    """Routes and how far they are apart; where that is far, with the second one more exact."""
     far = max(_far(given, moved[0], other) for other in moved[1:])
-    if far <= 1.0 or _has_friction(given):
-        return far
-    again = _second(given, TIGHT, ROUTE_TIME)
-    if again.outcome not in ("moved", "cut"):
-        return far
-    moved[1] = again
-    return max(_far(given, moved[0], other) for other in moved[1:])
+    again = _second(given, TIGHT, ROUTE_TIME) if far > 1.0 and not _has_friction(given) else None
+    if again is None or again.outcome not in MOVED:
+        return moved, far
+    moved = [moved[0], again, *moved[2:]]
+    return moved, max(_far(given, moved[0], other) for other in moved[1:])
 
 
 def _failed(routes: list[Route]) -> tuple[str, str] | None:
@@ -157,7 +156,7 @@ def _third_route(given: MovedScene, moved: list[Route], far: float) -> tuple[str
     if _has_friction(given):
         return "silent", far, "time stepping by two backends"
     third = _cut(_route(given, "dopri5", "kkt", TIGHT, verify=True))
-    if third.outcome not in ("moved", "cut"):
+    if third.outcome not in MOVED:
         return "silent", far, f"third route {third.outcome}: {third.why}"
     apart_of = [_far(given, third, route, alone=True) for route in moved]
     if min(apart_of) <= 1.0 and (apart_of[1] <= 1.0 or np.isfinite(third.claim).all()):
