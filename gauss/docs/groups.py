@@ -70,12 +70,9 @@ GROUPS = (
         "Analyse a mechanism",
         "Freedoms, ways of assembly, states of rest, linear models and their modes, derivatives, and the check against "
         "Pinocchio.",
-        _of(
-            "gauss",
-            "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes "
-            "sensitivities Sensitivities motion_gradient MotionGradient",
-        )
-        + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps"),
+        _of("gauss", "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes")
+        + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps sensitivities Sensitivities")
+        + _of("gauss", "motion_gradient MotionGradient"),
     ),
     Group(
         "view",
@@ -156,6 +153,8 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.Compulsion": "gauss.assemble",
     "gauss.LinearModel": "gauss.linearise",
     "gauss.LinearModes": ".modes",
+    "gauss.MotionGradient": "gauss.motion_gradient",
+    "gauss.Sensitivities": "gauss.sensitivities",
     "gauss.Solution": "gauss.solve",
     "gauss.State": ".initial_state",
     "gauss.StaticEquilibrium": "gauss.equilibrium",

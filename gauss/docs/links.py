@@ -22,6 +22,7 @@ def found(name: str) -> object:
 def setup(app):
     """Let Sphinx ask here where it knows no target."""
     app.connect("missing-reference", resolved)
+    app.connect("autodoc-skip-member", skipped)
 
 
 def resolved(app, env, node, contents):
@@ -34,3 +35,8 @@ def resolved(app, env, node, contents):
         return None
     domain = env.get_domain("py")
     return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", name, node, contents)
+
+
+def skipped(app, what, name, thing, skip, options) -> bool | None:
+    """Leave out members that are another library's, whose docstrings have their own markup."""
+    return True if (getattr(thing, "__module__", None) or "gauss").partition(".")[0] == "ctypes" else None

@@ -202,8 +202,9 @@ def lugre_friction(
     damping: float = 0.0,
     viscous: float = 0.0,
 ) -> Drive:
-    """Bristle friction of a joint: ż = v − σ₀ |v| z / g(v), effort −(σ₀ z + σ₁ ż + σ₂ v); z is the state ``"name bristle"``.
+    """Bristle friction of a joint, with the state ``"name bristle"``.
 
+    z is that state: ``ż = v − σ₀ |v| z / g(v)``, effort −(σ₀ z + σ₁ ż + σ₂ v),
     g(v) = F_c + (F_s − F_c) exp(−(v / v_s)²) (Canudas de Wit, Olsson, Åström, Lischinsky, A new model for control of systems
     with friction, IEEE Transactions on Automatic Control 40, 1995).
 
