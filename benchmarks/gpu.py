@@ -12,9 +12,7 @@ states). Results are compared with those of this CPU. Beside them stand MuJoCo W
 CPU, to try the benchmark. Writes benchmarks/results/gpu.csv and .md.
 """
 
-import time
 from functools import partial
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -67,8 +65,8 @@ def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[di
                 {
                     "scene": name,
                     "work": work,
-                    "device": _seconds(there, rounds) / (len(q) * units),
-                    "cpu": _seconds(here, rounds) / (len(known) * units),
+                    "device": gpu_peers.seconds(there, rounds) / (len(q) * units),
+                    "cpu": gpu_peers.seconds(here, rounds) / (len(known) * units),
                     "operations": flops(function.rows.operations) if work == "forward dynamics" else "",
                     "peak": peak,
                     "difference": difference / max(1.0, np.abs(known[:count]).max()),
@@ -80,16 +78,6 @@ def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[di
         *header("numpy", "llvmlite", "cuda-bindings"),
         f"device: {', '.join(gpus)}; {states} states, {STEPS} steps",
     ]
-
-
-def _seconds(run, rounds: int) -> float:
-    """Median time of a run by the clock."""
-    times = []
-    for _ in range(rounds):
-        began = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - began)
-    return median(times)
 
 
 def page(rows: list[dict], conditions) -> list[str]:

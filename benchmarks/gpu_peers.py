@@ -31,10 +31,10 @@ def rows(
             continue
         for work, (run, units) in works.items():
             run()
-            yield {"scene": name, "peer": peer, "work": work, "time": _seconds(run, rounds) / (len(q) * units)}
+            yield {"scene": name, "peer": peer, "work": work, "time": seconds(run, rounds) / (len(q) * units)}
 
 
-def _seconds(run: Callable, rounds: int) -> float:
+def seconds(run: Callable, rounds: int) -> float:
     """Median time of a run by the clock."""
     times = []
     for _ in range(rounds):

@@ -13,10 +13,8 @@ from gauss.codegen.intrinsics import intrinsic
 DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
 LN2 = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # ln 2 as the sum of 33 bits and the rest
 LOG2_E = 1.44269504088896338700
-LARGEST, SMALLEST = (
-    7.09782712893383973096e02,
-    -7.45133219101941108420e02,
-)  # arguments of eˣ with a finite result, with one above 0
+LARGEST_EXPONENT = 7.09782712893383973096e02  # of a finite eˣ
+SMALLEST_EXPONENT = -7.45133219101941108420e02  # of eˣ above 0
 EXP = (
     1.66666666666666019037e-01,
     -2.77777777770155933842e-03,
@@ -86,7 +84,11 @@ class _Elementary:
 
     def _exp(self, x):
         b = self.b
-        inside = b.and_(b.fcmp_ordered("<=", x, DOUBLE(LARGEST)), b.fcmp_ordered(">=", x, DOUBLE(SMALLEST)))
+        not_above, not_below = (
+            b.fcmp_ordered(relation, x, DOUBLE(bound))
+            for relation, bound in (("<=", LARGEST_EXPONENT), (">=", SMALLEST_EXPONENT))
+        )
+        inside = b.and_(not_above, not_below)
         near = b.select(inside, x, DOUBLE(0.0))
         k = self._call("llvm.rint", b.fmul(near, DOUBLE(LOG2_E)))
         high, low = b.fsub(near, b.fmul(k, DOUBLE(LN2[0]))), b.fmul(k, DOUBLE(LN2[1]))

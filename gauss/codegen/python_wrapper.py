@@ -197,7 +197,7 @@ class PythonWrapper:
             return None
         several, shapes = len(self.shapes) > 1, [(*lead, *shape) for shape in self.shapes]
         if several and not (isinstance(out, tuple | list) and len(out) == len(shapes)):
-            raise StateError(f"out: expected {len(shapes)} writeable arrays of doubles, got {_describe(out)}.")
+            raise StateError(f"out: expected {len(shapes)} writeable arrays of doubles, got {described(out)}.")
         return [_target(given, shape) for given, shape in zip(out if several else (out,), shapes, strict=True)]
 
     def _into(self, out, targets: list[np.ndarray], found):
@@ -226,7 +226,7 @@ def _target(out, shape: Shape) -> np.ndarray:
     fits = isinstance(array, np.ndarray) and array.dtype == float and array.dtype.isnative and array.shape == shape
     if not fits or not array.flags.writeable:
         words = f"{shape[0]}" if len(shape) == 1 else f"shape {shape} of"
-        raise StateError(f"out: expected a writeable array of {words} doubles, got {_describe(out)}.")
+        raise StateError(f"out: expected a writeable array of {words} doubles, got {described(out)}.")
     return array
 
 
@@ -240,7 +240,7 @@ def _as_array(given):
         return given
 
 
-def _floats(given) -> np.ndarray | None:
+def as_doubles(given) -> np.ndarray | None:
     """Array of doubles, the given one if it is; None if it cannot be converted."""
     try:
         array = np.asarray(_as_array(given))
@@ -250,9 +250,9 @@ def _floats(given) -> np.ndarray | None:
 
 
 def _rows(name: str, given, size: int) -> np.ndarray:
-    numbers = _floats(given)
+    numbers = as_doubles(given)
     if numbers is None or numbers.ndim == 0 or numbers.shape[-1] != size:
-        raise StateError(f"{name}: expected {size} numbers, or rows of them (n, {size}), got {_describe(given)}.")
+        raise StateError(f"{name}: expected {size} numbers, or rows of them (n, {size}), got {described(given)}.")
     return numbers
 
 
@@ -263,16 +263,16 @@ def _flat(array: np.ndarray, shape: Shape, flat: Shape) -> np.ndarray:
 
 
 def _numbers(name: str, given) -> np.ndarray:
-    numbers = _floats(given)
+    numbers = as_doubles(given)
     if numbers is None:
-        raise StateError(f"{name}: expected a number, or one for each row, got {_describe(given)}.")
+        raise StateError(f"{name}: expected a number, or one for each row, got {described(given)}.")
     return numbers
 
 
 def _vector(name: str, given, size: int) -> np.ndarray:
-    numbers = _floats(given)
+    numbers = as_doubles(given)
     if numbers is None or numbers.shape != (size,):
-        raise StateError(f"{name}: expected {size} numbers, got {_describe(given)}.")
+        raise StateError(f"{name}: expected {size} numbers, got {described(given)}.")
     return numbers
 
 
@@ -280,10 +280,11 @@ def _number(name: str, given) -> float:
     try:
         return float(given.__float__())
     except (AttributeError, TypeError, ValueError):
-        raise StateError(f"{name}: expected a number, got {_describe(given)}.") from None
+        raise StateError(f"{name}: expected a number, got {described(given)}.") from None
 
 
-def _describe(given) -> str:
+def described(given) -> str:
+    """What was given, for a message."""
     if not isinstance(given, np.ndarray):
         text = repr(given)
         return text if len(text) <= 60 else f"{text[:60]}…"

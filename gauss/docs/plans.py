@@ -11,6 +11,7 @@ TABLES = {
     "Batches, by `gauss.rollout`": plan.BATCHES,
     "Accelerations of a state, by `System.accelerations`": plan.ACCELERATIONS,
     "Functions of a state, by `System.function`": plan.FUNCTIONS,
+    "Accelerations on a device, by `System.function(device=)`": plan.DEVICE_FUNCTIONS,
 }
 
 

@@ -31,7 +31,7 @@ from gauss.dynamics.engines.tree_recursion import corrected_recursion
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_forces import LoadForces
-from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS
+from gauss.dynamics.plan import ACCELERATIONS, DEVICE_FUNCTIONS, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_refinement import refined, refined_once
@@ -131,7 +131,7 @@ def forward_dynamics_on_device(system: System, device) -> "DeviceFunction":
     from gauss.codegen.gpu.rows import RowsOnDevice
 
     laws, device = Laws(system), device_name(device)
-    BATCHES.plan(Question(system, laws))
+    DEVICE_FUNCTIONS.plan(Question(system, laws))
     limits = (ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE)
     interface = Interface(_sizes(system), "t", limits, ((system.n_v,),))
 

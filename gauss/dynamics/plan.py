@@ -220,6 +220,10 @@ RESPONSES = RuleTable(
 # Functions of a state trace the laws once; accelerations call every law anew, for it may have changed.
 FUNCTIONS = RuleTable(_of_states(traced_laws), _refused_state)
 ACCELERATIONS = RuleTable((*_of_states(), Rule("state", "certified")), _refused_state)
+# Accelerations of batches on a device: one straight-line function of all.
+DEVICE_FUNCTIONS = RuleTable(
+    (Rule("batch", "compiled", "certified", conditions=(compilable, few_bodies, traced_laws)),), _refused_state
+)
 # Derivatives of accelerations.
 DERIVATIVES = RuleTable(
     (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),

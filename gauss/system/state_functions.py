@@ -236,6 +236,8 @@ class StateFunctions:
             If there is no such function or reference.
         StateError
             If there is no such frame or joint, or the coordinates cannot be independent.
+        DeviceError, MissingPackageError
+            If there is no such device, no driver or no cuda-bindings, or a function has no code for a GPU.
         """
         return self.mechanics.function(self, names, reference, independent, device)  # type: ignore[attr-defined]  # of System
 

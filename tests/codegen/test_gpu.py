@@ -3,13 +3,13 @@
 import re
 import subprocess
 import sys
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gauss
+from benchmarks.gpu_estimate import assembler
 from gauss import math
 from gauss.codegen import INTEGER, POINTER, write
 from gauss.codegen.gpu import cuda_driver, devices, dlpack
@@ -79,19 +79,6 @@ def test_elementary_functions_need_no_library(name):
     assert np.isnan(found[~regular]).all() or name not in ("sin", "cos")  # never a wrong sine of a huge angle
 
 
-def _assembler() -> Path | None:
-    """NVIDIA's assembler of PTX, where it is installed."""
-    for package in ("nvidia-cuda-nvcc", "nvidia-cuda-nvcc-cu12"):
-        try:
-            files = metadata.files(package) or []
-        except metadata.PackageNotFoundError:
-            continue
-        for file in files:
-            if file.name == "ptxas":
-                return Path(str(file.locate()))
-    return None
-
-
 class Assembled(LaneByLane):
     """This CPU lane by lane; what it runs is assembled for a GPU, too."""
 
@@ -99,12 +86,12 @@ class Assembled(LaneByLane):
         self.folder, self.texts = folder, []
 
     def lowered(self, code):
-        text, assembler = ptx(code.gpu_text(), CAPABILITY), _assembler()
+        text, ptxas = ptx(code.gpu_text(), CAPABILITY), assembler()
         self.texts.append(text)
-        if assembler is not None:
+        if ptxas is not None:
             source = self.folder / f"{code.name}.ptx"
             source.write_text(text)
-            arguments = [assembler, f"-arch=sm_{CAPABILITY}", "-O1", source, "-o", source.with_suffix(".cubin")]
+            arguments = [ptxas, f"-arch=sm_{CAPABILITY}", "-O1", source, "-o", source.with_suffix(".cubin")]
             done = subprocess.run(arguments, capture_output=True, text=True)
             assert done.returncode == 0, done.stderr
         return super().lowered(code)
@@ -215,6 +202,11 @@ def test_what_a_device_refuses():
         mass(q, t=[0.0, 1.0])
     with pytest.raises(DeviceError, match="one device"):
         system.function("mass_matrix", device=["lanes", "lanes"])(q, stream=1)
+    for wrong in (q + 1j, "q", [[1.0, 2.0], [3.0]], q[None]):
+        with pytest.raises(StateError, match="q: expected rows"):
+            mass(wrong)
+    with pytest.raises(StateError, match="t: expected"):
+        mass(q, t=1j)
     assert mass(q[:0]).shape == (0, 2, 2)
     q[2] = np.nan
     with pytest.raises(StateError, match="finite") as caught:

@@ -8,7 +8,7 @@ from benchmarks import free_bodies
 from gauss import Plan
 from gauss.dynamics.conditions import LARGE_TREE_BODIES, WIDEST
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS, MOTIONS, motion_plan
+from gauss.dynamics.plan import ACCELERATIONS, BATCHES, DEVICE_FUNCTIONS, FUNCTIONS, MOTIONS, motion_plan
 from gauss.dynamics.rules import Question
 from gauss.errors import ArgumentError, SimulationError
 from gauss.integrators import METHODS
@@ -242,6 +242,7 @@ def test_states_and_batches_ask_the_same_rules():
         "a large tree": "tree recursion",
     }
     assert FUNCTIONS.plan(ask["smooth"]).dynamics == BATCHES.plan(ask["smooth"]).dynamics == "compiled"
-    for table, name in ((FUNCTIONS, "an opaque law"), (BATCHES, "an opaque law"), (BATCHES, "a large tree")):
+    refused = [(table, name) for table in (BATCHES, DEVICE_FUNCTIONS) for name in ("an opaque law", "a large tree")]
+    for table, name in ((FUNCTIONS, "an opaque law"), (DEVICE_FUNCTIONS, "contacts"), *refused):
         with pytest.raises(SimulationError, match="cannot be compiled"):
             table.plan(ask[name])

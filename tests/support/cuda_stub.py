@@ -82,6 +82,16 @@ class Foreign:
         } | more
 
 
+class Waited(Foreign):
+    """Array as of JAX, which has to be asked whether it is there."""
+
+    count = 0
+
+    def block_until_ready(self):
+        """Count the calls."""
+        self.count += 1
+
+
 class TorchStream:
     def __init__(self, handle: int):
         self.cuda_stream = handle
@@ -119,6 +129,13 @@ def check_functions(system, q, v):
     single = system.function("forward_dynamics", device="cuda float32")
     assert np.abs(single(q, v, v) - right).max() <= 1e-4 * np.abs(right).max() and 0.0 < single.error < 1e-4
     refused(lambda: f(Foreign(q, 1), v, v), "cuda:1")
+    for wish in ({"copy": True}, {"dl_device": (1, 0)}):
+        try:
+            found.__dlpack__(**wish)
+        except BufferError:
+            continue
+        raise AssertionError(f"expected a BufferError for {wish}")
+    assert found.__dlpack__(copy=False, dl_device=(2, 0), stream=1)
     return f, right
 
 
@@ -129,6 +146,10 @@ def check_streams(f, right, q, v):
     for stream in (made, TorchStream(int(made))):
         assert np.array_equal(f(q, v, v, stream=stream), right)
     assert np.array_equal(f(Foreign(q, stream=1), Foreign(v, stream=None), v).numpy(), right)
+    result = f(Foreign(q), v, v, stream=made)
+    assert not result.device.stream and np.array_equal(result.numpy(), right)  # which outlives the stream
+    waited = Waited(q)
+    assert np.array_equal(f(waited, v, v, stream=made).numpy(), right) and waited.count == 1
     refused(lambda: f(q, v, v, stream=12345), "stream")
     refused(lambda: f(q, v, v, stream="a"), "stream")
 
@@ -145,7 +166,10 @@ def check_errors(system, f, q, v):
     stub.stub_fail(b"cuModuleLoadDataEx", 222)
     refused(lambda: fresh(q, v), "UNSUPPORTED_PTX_VERSION", "update")
     refused(lambda: cuda.CudaProgram(cast(cuda.CudaDevice, devices.device("cuda")), cuda.Lowered("run", "", ())), "no PTX")
-    stub.stub_memory(FRAMES + 40_000)  # the batch is split
+    stub.stub_memory(1000)  # of a GPU that others use
+    finding = doctor._gpu()
+    assert finding.works and "does not fit" in finding.text
+    stub.stub_memory(FRAMES + 60_000)  # beside the arrays of the other library: the batch is split
     assert np.array_equal(f(q, v, v), system.forward_dynamics(q, v, v))
     stub.stub_memory(FREE)
 

@@ -85,8 +85,9 @@ int cuStreamCreate(void **stream, unsigned flags) { static int made; NEED("cuStr
 int cuStreamSynchronize(uintptr_t stream) { NEED("cuStreamSynchronize") return is_stream(stream) ? 0 : INVALID_HANDLE; }
 int cuMemGetInfo_v2(size_t *left, size_t *total) {
   NEED("cuMemGetInfo")
-  *total = *left = most_bytes;
-  for (int k = 0; k < MOST; k++) *left -= rooms[k].at && rooms[k].device == current() ? rooms[k].size : 0;
+  size_t used = 0;
+  for (int k = 0; k < MOST; k++) used += rooms[k].at && rooms[k].device == current() ? rooms[k].size : 0;
+  *total = most_bytes, *left = used < most_bytes ? most_bytes - used : 0;
   return 0;
 }
 int cuMemAlloc_v2(uintptr_t *pointer, size_t size) {
@@ -131,7 +132,7 @@ int cuMemcpyDtoHAsync_v2(void *to, uintptr_t from, size_t size, uintptr_t stream
 }
 int cuPointerGetAttribute(void *data, int attribute, uintptr_t pointer) {
   int device;
-  BEGIN("cuPointerGetAttribute")
+  NEED("cuPointerGetAttribute")
   if (attribute != 9 || !stub_room_of(pointer, &device)) return INVALID_VALUE;
   *(int *)data = device;
   return 0;

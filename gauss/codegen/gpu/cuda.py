@@ -89,7 +89,9 @@ class CudaDevice:
         if not hasattr(given, "__cuda_array_interface__"):
             return None
         found = CudaView(self, given)
-        if not self.stream:
+        if hasattr(given, "block_until_ready"):  # of JAX: what writes to it may be in no stream yet
+            given.block_until_ready()
+        elif not self.stream:
             found.wait()
         return found
 

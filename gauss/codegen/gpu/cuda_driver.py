@@ -13,6 +13,8 @@ from gauss.errors import DeviceError, MissingPackageError
 
 REMEDIES = {
     "CUDA_ERROR_NO_DEVICE": "the driver sees no GPU; CUDA_VISIBLE_DEVICES may hide it",
+    "CUDA_ERROR_STUB_LIBRARY": "the library found is that of the toolkit, to link with; the driver has its own",
+    "CUDA_ERROR_SYSTEM_NOT_READY": "the fabric manager of GPUs with NVLink does not run: start nvidia-fabricmanager",
     "CUDA_ERROR_OUT_OF_MEMORY": "the memory of the device is used up: take fewer states, or free arrays of other libraries",
     "CUDA_ERROR_UNSUPPORTED_PTX_VERSION": "the driver is older than CUDA 12.0: update it",
     "CUDA_ERROR_NOT_INITIALIZED": "a forked process cannot use the GPU of its parent: start it by 'spawn'",
@@ -46,8 +48,9 @@ class CudaDriver:
         except DeviceError:
             raise
         except Exception as error:  # cuda-bindings raises errors of its own where the library is missing
+            why = next(iter(str(error).strip().splitlines()), type(error).__name__)
             raise DeviceError(
-                f"device 'cuda': no driver of NVIDIA was found ({str(error).strip().splitlines()[0]})"
+                f"device 'cuda': no driver of NVIDIA was found ({why}); device 'lanes' runs the same code on this CPU."
             ) from None
 
     def call(self, name: str, *arguments):

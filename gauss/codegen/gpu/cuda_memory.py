@@ -48,8 +48,16 @@ class CudaArray:
         """Kind of memory, and number of the device."""
         return dlpack.CUDA, self.device.number
 
-    def __dlpack__(self, **_):
-        """Capsule of the array; programs wait for their threads, so that no stream needs to."""
+    def __dlpack__(self, *, dl_device=None, copy=None, **_):
+        """Capsule of the array; programs wait for their threads, so that no stream needs to.
+
+        Raises
+        ------
+        BufferError
+            If a copy is asked for, or another device.
+        """
+        if copy or dl_device not in (None, self.__dlpack_device__()):
+            raise BufferError("gauss lends this array where it is; numpy() copies it.")
         return dlpack.capsule(self, self.pointer, self.shape, *self.__dlpack_device__())
 
     def numpy(self) -> np.ndarray:
@@ -95,7 +103,8 @@ class CudaView:
 
     def _refuse_other_device(self):
         own, attribute = self.device.driver, self.device.driver.api.CUpointer_attribute
-        number = own.call("cuPointerGetAttribute", attribute.CU_POINTER_ATTRIBUTE_DEVICE_ORDINAL, self.pointer)
+        with self.device.entered():
+            number = own.call("cuPointerGetAttribute", attribute.CU_POINTER_ATTRIBUTE_DEVICE_ORDINAL, self.pointer)
         if int(number) != self.device.number:
             raise DeviceError(f"device {self.device.name!r}: an argument lies on 'cuda:{int(number)}'; take that device.")
 

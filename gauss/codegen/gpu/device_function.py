@@ -6,6 +6,7 @@ import numpy as np
 
 from gauss.codegen.gpu.device import Device, DeviceView
 from gauss.codegen.gpu.rows import RowsOnDevice
+from gauss.codegen.python_wrapper import as_doubles, described
 from gauss.errors import DeviceError, GaussError, StateError
 
 MEASURED_ROWS = 64  # of which the error of single precision is measured
@@ -71,7 +72,7 @@ class DeviceFunction:
                 raise DeviceError("device: several devices share arrays of this process; arrays on a device are on one.")
             found = self._evaluated(devices[0], arrays, numbers)[: len(self.interface.shapes)]
             for array, shape in zip(found, self.interface.shapes, strict=True):
-                array.shape = (count, *shape)
+                array.shape, array.device = (count, *shape), self.rows.devices[0]  # the array may outlive the stream
             results: list = found
         else:
             results = [np.empty((count, *shape)) for shape in self.interface.shapes]
@@ -119,10 +120,10 @@ class DeviceFunction:
 
     def _numbers(self, t, count: int) -> np.ndarray:
         """Time of each row."""
-        try:
-            return np.array(np.broadcast_to(np.asarray(t, dtype=float), count))
-        except (TypeError, ValueError):
-            raise StateError(f"{self.__name__}: t: expected a number, or {count} of them, got {t!r}.") from None
+        numbers = as_doubles(t)
+        if numbers is None or numbers.shape not in ((), (1,), (count,)):
+            raise StateError(f"{self.__name__}: t: expected a number, or {count} of them, got {described(t)}.")
+        return np.array(np.broadcast_to(numbers, count))
 
     def _repair(self, arrays, numbers: np.ndarray, found, first: int):
         """Replace the results of rows that exceed a limit by those of the function on this CPU."""
@@ -142,18 +143,16 @@ class DeviceFunction:
 
 def _rows(name: str, given, size: int) -> np.ndarray:
     """Contiguous rows of doubles."""
-    try:
-        array = np.ascontiguousarray(given, dtype=float)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.ndim != 2 or array.shape[1] != size:
-        raise StateError(f"{name}: expected rows of {size} numbers (n, {size}), got {np.shape(given)}.")
-    return array
+    array = as_doubles(given)
+    if array is None or array.ndim != 2 or array.shape[1] != size:
+        raise StateError(f"{name}: expected rows of {size} numbers (n, {size}), got {described(given)}.")
+    return np.ascontiguousarray(array)
 
 
 def _fitting(name: str, view: DeviceView, size: int) -> DeviceView:
     """Array of another library, if it can be read where it is."""
     fits = view.dtype == "<f8" and len(view.shape) == 2 and view.shape[1] == size
     if not fits or any(step % 8 or step < 0 for step in view.strides):
-        raise StateError(f"{name}: expected doubles (n, {size}) on the device, got {view.dtype} of shape {view.shape}.")
+        found = f"{view.dtype} of shape {view.shape} and strides {view.strides}"
+        raise StateError(f"{name}: expected doubles (n, {size}) on the device, got {found}.")
     return view

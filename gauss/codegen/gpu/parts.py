@@ -18,7 +18,7 @@ def in_parts(
     work: Callable[[Device, slice], None],
     what: str,
 ):
-    """Work on all parts of a batch; devices take the parts that are left, one after the other.
+    """Work on all parts of a batch; devices take the parts that are left, one after the other, until one fails.
 
     Parameters
     ----------
@@ -56,10 +56,15 @@ def in_parts(
             return slice(first, begun)
 
     def run(device: Device):
-        while begun < count:
-            part = part_for(device)
-            if part.stop > part.start:
-                work(device, part)
+        nonlocal begun
+        try:
+            while begun < count:
+                part = part_for(device)
+                if part.stop > part.start:
+                    work(device, part)
+        except BaseException:
+            begun = count
+            raise
 
     if len(devices) == 1:
         run(devices[0])

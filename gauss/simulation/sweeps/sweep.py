@@ -108,7 +108,7 @@ def sweep(
     DeviceError
         If there is no such device, or it cannot move the ensembles, with the reason.
     MissingPackageError
-        If an optional package is not installed.
+        If an optional package is not installed, such as cuda-bindings of device "cuda".
     KeyboardInterrupt
         On Ctrl-C; its ``dataset`` holds the members that are done, the others have ``status`` 0.
     """
