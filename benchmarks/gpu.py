@@ -73,7 +73,7 @@ def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[di
                 }
             )
         rows.extend(gpu_peers.rows(name, scene, q, v, STEPS, STEP, rounds))
-    gpus = device_names() if device.startswith("cuda") else [f"device {device!r}"]
+    gpus = device_names() if device.startswith("cuda") else [device]
     return rows, [
         *header("numpy", "llvmlite", "cuda-bindings"),
         f"device: {', '.join(gpus)}; {states} states, {STEPS} steps",

@@ -15,9 +15,10 @@ from cuda.bindings import driver
 
 import gauss
 from gauss import doctor
-from gauss.codegen import machine
+from gauss.codegen import machine, write
 from gauss.codegen.gpu import cuda, devices
 from gauss.codegen.gpu.cuda_driver import device_names
+from gauss.codegen.gpu.thread_code import states_code
 from gauss.errors import DeviceError
 from tests.support import mechanisms
 
@@ -139,6 +140,15 @@ def check_functions(system, q, v):
     return f, right
 
 
+def check_programs():
+    """A program that nobody has any more leaves its device."""
+    device, modules = devices.device("cuda"), stub.stub_modules()
+    program = device.program(device.lowered(states_code(write(lambda x: x * x, 2))))
+    assert stub.stub_modules() == modules + 1
+    del program
+    assert stub.stub_modules() == modules
+
+
 def check_streams(f, right, q, v):
     _, context = driver.cuDevicePrimaryCtxRetain(0)
     driver.cuCtxPushCurrent(context)  # as another library does; it stays
@@ -202,6 +212,7 @@ def main():
     q, v = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 300, 3))
     check_batches(system, q, v)
     f, right = check_functions(system, q, v)
+    check_programs()
     assert stub.stub_depth() == 0
     check_streams(f, right, q, v)
     check_errors(system, f, q, v)

@@ -164,7 +164,7 @@ int cuModuleGetFunction(void **function, module_t *module, const char *name) {
 }
 int cuFuncGetAttribute(int *value, int attribute, function_t *function) {
   BEGIN("cuFuncGetAttribute")
-  *value = attribute == 0 ? 256 : attribute == 3 ? 64 : attribute == 4 ? 255 : -1;
+  *value = attribute == 0 ? 256 : attribute == 3 ? 64 : -1;
   return !function || *value < 0 ? INVALID_VALUE : 0;
 }
 int cuLaunchKernel(function_t *f, unsigned x, unsigned y, unsigned z, unsigned bx, unsigned by, unsigned bz, unsigned shared,

@@ -1,14 +1,14 @@
 """Batches of motions on a device, in the form of the compiled loops of this CPU."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from gauss.codegen.function import Function
 from gauss.codegen.gpu.batch_threads import adaptive_threads, fixed_step_threads
-from gauss.codegen.gpu.device import Device, DeviceProgram, Lowered
-from gauss.codegen.gpu.devices import device, devices
-from gauss.codegen.gpu.parts import in_parts
+from gauss.codegen.gpu.device import Device
+from gauss.codegen.gpu.devices import device
+from gauss.codegen.gpu.on_device import OnDevice
 from gauss.codegen.gpu.thread_code import states_code
 from gauss.codegen.kernels.adaptive import Adaptive
 from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, MotionQueue
@@ -19,46 +19,6 @@ from gauss.codegen.native_function import NativeFunction
 
 WHOLE = 1 << 40  # budget of steps that is never used up
 FEWER = "take fewer samples: one motion does not fit into the memory of the device"
-
-
-class OnDevice:
-    """Base of code for a device, or for several: what is kept on disk is its text, which is loaded at the first use.
-
-    Parameters
-    ----------
-    name : str
-        Name of the devices.
-    lowered : Lowered
-        The code.
-    """
-
-    def __init__(self, name: str, lowered: Lowered):
-        self.device_name, self.lowered = name, lowered
-        self._programs: dict[str, DeviceProgram] = {}
-
-    def __getstate__(self) -> dict:
-        return vars(self) | {"_programs": {}}
-
-    @property
-    def devices(self) -> tuple[Device, ...]:
-        """The devices."""
-        return devices(self.device_name)
-
-    def program(self, device: Device) -> DeviceProgram:
-        """The code on a device."""
-        found = self._programs.get(device.name)
-        if found is None:
-            found = self._programs[device.name] = device.program(self.lowered)
-        return found
-
-    def run(self, device: Device, threads: int, arguments: Sequence):
-        """Run the threads on a device, and wait for them."""
-        self.program(device)(threads, arguments, device.stream)
-
-    def in_parts(self, count: int, bytes_of_one: int, work: Callable[[Device, slice], None], what: str):
-        """Work on parts of a batch, as :func:`gauss.codegen.gpu.parts.in_parts`, beside the frames of the threads."""
-        free_bytes = lambda device: device.free_bytes() - self.program(device).memory_bytes  # noqa: E731
-        in_parts(self.devices, free_bytes, count, bytes_of_one, work, what)
 
 
 class DeviceKernel(OnDevice):

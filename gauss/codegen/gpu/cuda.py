@@ -131,8 +131,8 @@ class CudaProgram:
 
     Attributes
     ----------
-    registers, frame_bytes : int
-        Registers of a thread, and its memory for what does not fit into them [bytes].
+    threads_per_block : int
+        Threads that start together; fewer where each takes many registers.
     memory_bytes : int
         Memory that the driver takes for the frames of all threads at once [bytes].
 
@@ -155,12 +155,11 @@ class CudaProgram:
                 words = bytes(log).split(b"\0")[0].decode(errors="replace").strip()
                 raise DeviceError(f"{error} {words}".strip()) from None
             self.function = own.call("cuModuleGetFunction", self.module, lowered.name.encode())
-            names = "NUM_REGS", "LOCAL_SIZE_BYTES", "MAX_THREADS_PER_BLOCK"
+            names = "LOCAL_SIZE_BYTES", "MAX_THREADS_PER_BLOCK"
             attributes = (getattr(api.CUfunction_attribute, f"CU_FUNC_ATTRIBUTE_{name}") for name in names)
-            found = [int(own.call("cuFuncGetAttribute", attribute, self.function)) for attribute in attributes]
-        self.registers, self.frame_bytes, most = found
+            frame_bytes, most = (int(own.call("cuFuncGetAttribute", attribute, self.function)) for attribute in attributes)
         self.threads_per_block = min(THREADS_PER_BLOCK, most // WARP * WARP)
-        self.memory_bytes = self.frame_bytes * device.resident_threads
+        self.memory_bytes = frame_bytes * device.resident_threads
 
     def __del__(self):
         if hasattr(self, "module"):

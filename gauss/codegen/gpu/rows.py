@@ -11,9 +11,9 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen.function import Function
-from gauss.codegen.gpu.batches import OnDevice
 from gauss.codegen.gpu.device import Device, DeviceArray
 from gauss.codegen.gpu.devices import device, is_single
+from gauss.codegen.gpu.on_device import OnDevice
 from gauss.codegen.gpu.thread_code import ThreadCode
 from gauss.codegen.ir_blocks import POINTER, counted_loop
 from gauss.codegen.lanes import DOUBLE, INTEGER
