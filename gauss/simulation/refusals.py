@@ -5,6 +5,7 @@ from gauss.dynamics.plan import is_time_stepping
 from gauss.errors import SimulationError
 from gauss.integrators import Library
 from gauss.simulation.problem import Problem
+from gauss.system import System
 
 
 def refuse(problem: Problem):
@@ -21,13 +22,13 @@ def refuse(problem: Problem):
             "stepping are projected; use 'projection'."
         )
     if time_stepping:
-        _refuse_links(problem)
+        refuse_links(system)
     elif nonsmooth:
         _refuse_friction(problem)
 
 
-def _refuse_links(problem: Problem):
-    system = problem.system
+def refuse_links(system: System):
+    """Raise a SimulationError if time stepping does not take the links of a system."""
     links = [name for name, element in system.scene.set_valued.items() if callable(getattr(element, "limit", callable))]
     if links or system.losses:
         raise SimulationError(

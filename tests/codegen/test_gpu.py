@@ -18,8 +18,10 @@ from gauss.codegen.gpu.lane_by_lane import LaneByLane
 from gauss.codegen.gpu.ptx import ptx, refuse_libraries
 from gauss.codegen.gpu.thread_code import ThreadCode
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
-from gauss.errors import ArgumentError, DeviceError, MissingPackageError, StateError
+from gauss.errors import ArgumentError, DeviceError, MissingPackageError, SimulationError, StateError
 from gauss.io.linkage import load_linkage
+from gauss.io.rotors import load_rotors
+from gauss.rotors import to_scene
 from gauss.system import random_state
 from tests.support import mechanisms
 
@@ -35,7 +37,7 @@ ELEMENTARY = {
 SINGLE_ERROR = 1e-5  # relative, of short chains: a hundred units of the last place of a single
 ANGLES = 1e9  # [rad] up to which a GPU has sines
 ROOT = Path(gauss.__file__).parents[1]
-SHIPPED = [*sorted((ROOT / "models").glob("*.toml")), *sorted((ROOT / "models" / "linkages").glob("*.toml"))]
+SHIPPED = [path for folder in ("", "linkages", "servo") for path in sorted((ROOT / "models" / folder).glob("*.toml"))]
 CONTACTS = 1e-12  # relative: the compiler fuses multiply-adds of contact problems as it likes
 LEAST_NORM = 1e-9  # relative: random matrices of this size have condition numbers up to 1e4
 CONTRACTIBLE = re.compile(r"\b(?:mul|add|sub)\.f64")
@@ -127,7 +129,7 @@ def _states(system, count: int):
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_scenes_run_on_a_device(path, assembled):
     scene = load_linkage(path).to_scene() if path.parent.name == "linkages" else gauss.load(path)
-    system = gauss.compile_scene(scene)
+    system = scene.system if path.parent.name == "servo" else gauss.compile_scene(scene)
     if not system.n_v:
         return
     if system.nonsmooth:
@@ -143,6 +145,17 @@ def test_shipped_scenes_run_on_a_device(path, assembled):
         assert np.array_equal(function(q, v, load), system.forward_dynamics(q, v, load))
         assert not CONTRACTIBLE.search(assembled.texts[0])  # by the assembler, which rounds once then
     assert ".entry" in assembled.texts[0]
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "models" / "rotors").glob("*.toml")), ids=lambda path: path.stem)
+def test_links_that_time_stepping_does_not_take_are_named(path):
+    system = gauss.compile_scene(to_scene(load_rotors(path)))
+    start = system.initial_state()
+    for device in (None, "lanes"):
+        with pytest.raises(SimulationError, match="|".join(system.losses)):
+            gauss.rollout(
+                system, start.q[None], start.v[None], integrator="time_stepping", steps=20, step=1e-3, device=device
+            )
 
 
 def test_singular_systems_are_solved_without_a_library():

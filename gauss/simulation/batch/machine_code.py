@@ -1,9 +1,8 @@
 """Machine code of batches of one system: fixed steps of smooth systems and of contacts."""
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.moreau_step import moreau_stepper
@@ -16,7 +15,11 @@ from gauss.integrators import EXPLICIT_FIXED, FixedStep, Integrator
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.moreau.compiled_step import compiled_batch, method_state_size
 from gauss.simulation.moreau.moreau_jean import NONSMOOTH
+from gauss.simulation.refusals import refuse_links
 from gauss.system import System
+
+if TYPE_CHECKING:
+    from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 
 T = TypeVar("T")
 FIXED = {method.name: method for method in EXPLICIT_FIXED}
@@ -30,16 +33,18 @@ def contact_state_size(system: System) -> int:
 
 def fixed_step_code(
     system: System, method: FixedStep, held: bool, device: str | None = None
-) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
     """Machine code of fixed steps of a batch, cached with the system; with inputs that are held in each step, or without.
 
     Raises
     ------
     SimulationError
-        If the system cannot be compiled.
+        If the system cannot be compiled, or has links that the method does not take.
     """
+    if method.nonsmooth:
+        refuse_links(system)
 
-    def make(laws: Laws) -> FixedStepBatchLoop | DeviceFixedStepLoop:
+    def make(laws: Laws) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
         if not method.nonsmooth:
             return fixed_batch(Program(system, laws, inputs=held), method, device)
         stepper, smooth = moreau_stepper(system), smooth_question(Question(system, laws)).laws
