@@ -2,8 +2,8 @@
 Identification
 ==============
 
-Mass and damping of a loaded arm from a recorded motion: inverse dynamics are linear in the masses, and a
-least-squares problem is left.
+Masses of a double pendulum from a recorded motion and torques with noise: inverse dynamics are linear in the masses, and
+a least-squares problem is left.
 """
 
 import numpy as np

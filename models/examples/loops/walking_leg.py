@@ -2,7 +2,7 @@
 A walking leg
 =============
 
-Theo Jansen's leg: seven bodies, ten pins, four loops, one freedom. A motor turns the crank, and the foot follows its
+Theo Jansen's leg: seven bodies, ten pins, three loops, one freedom. A motor turns the crank, and the foot follows its
 well-known path.
 """
 
