@@ -37,7 +37,7 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
 
     before, x = float(begin), float(end)
     f_before, f = value(before), value(x)
-    if f_before == 0.0 or f == 0.0:
+    if 0.0 in (f_before, f):
         return before if f_before == 0.0 else x
     if not _differ(f_before, f):
         raise ValueError(f"the function has one sign at {begin!r} and at {end!r}.")
@@ -56,7 +56,7 @@ def brent(function: Callable[[float], float], begin: float, end: float, xtol: fl
         tried = _interpolated((before, f_before), (x, f), (other, f_other)) if interpolates else NO_STEP
         last, step = (step, tried) if 2.0 * abs(tried) < min(abs(last), 3.0 * abs(half) - least) else (half, half)
         before, f_before = x, f
-        x += step if abs(step) > least else copysign(least, half)
+        x += max(copysign(least, half), step, key=abs)
         f = value(x)
     raise ValueError(f"no root was found within {MOST_ITERATIONS} iterations.")
 
