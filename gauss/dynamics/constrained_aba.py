@@ -200,6 +200,10 @@ class ConstrainedArticulatedBody:
         tau = self._less_constraint_forces(np.zeros(self.subsystem.n_v, dtype=object), wrenches, multipliers)
         return condensed(self.subsystem, tau + self.tree.projected(wrenches))
 
+    def along_tree(self, tau) -> np.ndarray:
+        """Generalised forces (n_v,) along the independent coordinates, with those of loop joints carried inward."""
+        return condensed(self.subsystem, tau + self.tree.projected(self._with_loop_forces({}, tau)))
+
     def dependent_accelerations(self, rates) -> np.ndarray:
         """Joint accelerations (n_v,), with those of loop joints replaced by those that follow from the tree."""
         return self._all_rates(self._by_joint(rates), self.tree.accelerations(rates), still=False)

@@ -144,6 +144,10 @@ class Mechanism:
         pairs = zip(self.bodies, self._rows_of(multipliers), strict=True)
         return self._whole([body.reaction(own) for body, own in pairs])
 
+    def along_tree(self, tau) -> np.ndarray:
+        """Generalised forces (n_v,) along the independent coordinates, with those of loop joints carried inward."""
+        return self._whole([body.along_tree(tau[body.subsystem.v]) for body in self.bodies])
+
     def dependent_rates(self) -> np.ndarray:
         """Rates (n_v,), with those of loop joints replaced by those that follow from the trees."""
         return self._whole([body.dependent_rates() for body in self.bodies])

@@ -13,7 +13,6 @@ import numpy as np
 
 from gauss.codegen import Scalar, forward, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
-from gauss.dynamics.constrained_aba import condensed
 from gauss.dynamics.given_link_frames import with_moved_joint
 from gauss.dynamics.inverse_dynamics_residual import along_rates, inverse_dynamics_residual, outward_accelerations
 from gauss.dynamics.kinematics import Kinematics, kinematics
@@ -80,7 +79,8 @@ def inverse_dynamics_by_parameter(
         columns = [along_rates(motion, own) for own in wrenches]
     else:
         columns = _by_constant(system, loads, t, q, v, kind, name)
-    return np.array([condensed(whole(system), np.array(column, dtype=object)) for column in columns]).T
+    mechanism = Mechanism(system, q, v, t, (whole(system),))
+    return np.array([mechanism.along_tree(np.array(column, dtype=object)) for column in columns]).T
 
 
 def accelerations_by_parameter(

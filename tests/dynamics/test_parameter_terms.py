@@ -157,6 +157,24 @@ def test_parameters_of_a_loop(parameter):
     assert np.abs(found - expected).max() <= OF_STEPS * max(np.abs(expected).max(), 1.0)
 
 
+@pytest.mark.parametrize("joint", ["B", "D"])
+@pytest.mark.parametrize("parameter", ["stiffness:S", "damping:S"])
+def test_constants_of_loads_along_joints_of_a_loop(joint, parameter):
+    """Of the joint that closes the loop, too: its forces act on the links of the tree."""
+    scene = gauss.load("four_bar")
+    scene.joint_spring("S", joint, stiffness=3.0, damping=0.2, rest=0.4)
+    system = gauss.compile_scene(scene)
+    start, a = system.initial_state(), np.linspace(-1.0, 1.0, system.n_v)
+    values = {
+        system.parameter_derivatives(parameter): lambda other: other.forward_dynamics(start.q, start.v, a),
+        system.function(f"inverse_dynamics_by:{parameter}"): lambda o: o.function("inverse_dynamics")(start.q, start.v, a),
+    }
+    for derivative, value in values.items():
+        expected = by_difference(scene, parameter, 1, value, 0.1)
+        assert np.abs(expected).max() > OF_STEPS
+        assert relative(derivative(start.q, start.v, a), expected) <= EXACT
+
+
 def test_the_regressor_is_that_of_pinocchio():
     pin = pytest.importorskip("pinocchio")
     from gauss.analysis.crosscheck.pinocchio_ import twin
