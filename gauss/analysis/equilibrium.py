@@ -7,6 +7,7 @@ equilibrium is stable follows from the eigenvalues of its linear model.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.energies import potential_energy
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import fixed_columns, project_positions
-from gauss.errors import GaussError, SimulationError, StateError, did_you_mean, require
+from gauss.errors import ArgumentError, GaussError, SimulationError, StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.system import State, System, retract
 
@@ -59,7 +60,7 @@ class StaticEquilibrium:
 
 @named_arguments
 def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), loads=None) -> StaticEquilibrium:
-    """StaticEquilibrium near a start.
+    """Equilibrium near a start.
 
     Parameters
     ----------
@@ -120,9 +121,13 @@ def equilibria(
 
     Raises
     ------
+    ArgumentError
+        If the number of starts is no whole number.
     SimulationError
         If none is found.
     """
+    if not isinstance(starts, (int, np.integer)) or starts < 0:
+        raise ArgumentError(f"equilibria: starts: expected a whole number, 0 or more, got {starts!r}.")
     system, rng = _compiled(system, "equilibria"), np.random.default_rng(seed)
     held, load, found = fixed_columns(system, keep), _load(system, loads), list[StaticEquilibrium]()
     base, why = system.initial_state(), None
@@ -165,12 +170,14 @@ def _load(system: System, loads) -> np.ndarray:
     for name, value in loads.items():
         if name not in names:
             raise StateError(f"loads: no coordinate {name!r}. {did_you_mean(str(name), names)}")
+        if not isinstance(value, Real):
+            raise StateError(f"loads: expected a number for {name!r}, got {value!r}.")
         found[names.index(name)] = value
-    return found
+    return checked_load(system, found)
 
 
 def _found(system: System, start: State, held: list[int], load: np.ndarray) -> StaticEquilibrium:
-    """StaticEquilibrium by Newton's method from a start."""
+    """Equilibrium by Newton's method from a start."""
     state, forces = replace(start, v=np.zeros(system.n_v)), np.zeros(len(held))
     total = load.copy()
     unit = system.scale.rates / system.scale.time

@@ -2,9 +2,10 @@
 
 With the tangents of :mod:`gauss.analysis.tangents` and the derivatives of the accelerations of
 :mod:`gauss.analysis.derivatives`, no constraint is approximated: a loop with any redundant rows has as many states as it has
-freedoms, twice. LinearModes are eigenvectors of A (Schiehlen and Eberhard, Applied Dynamics, 2014, ch. 7).
+freedoms, twice. Modes are eigenvectors of A (Schiehlen and Eberhard, Applied Dynamics, 2014, ch. 7).
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -173,6 +174,8 @@ def linearise(
 
     Raises
     ------
+    ArgumentError
+        If inputs or outputs are no names.
     StateError
         If a name is none of the scene, or the independent coordinates do not determine the others.
     SimulationError
@@ -246,7 +249,7 @@ def _described_by(system: System, N: np.ndarray, independent) -> np.ndarray:
 def _input_columns(system: System, state: State, inputs) -> tuple[np.ndarray, tuple[str, ...]]:
     """Generalised forces (n_v, m) for each input of 1, and their names."""
     known = tuple(system.scene.inputs)
-    names = known if inputs is None else (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    names = known if inputs is None else _names(inputs, "inputs")
     columns = []
     for name in names:
         if name in known:
@@ -270,8 +273,7 @@ def _input_slope(system: System, state: State, place: int) -> np.ndarray:
 def _output_rows(system: System, state: State, outputs, places, load):
     """∂y/∂(ξ, v, q̈) (p, 3 n_v), its part of q̈, and the names."""
     known, n = system.scene.outputs, system.n_v
-    names = _default_outputs(system, places) if outputs is None else outputs
-    names = (names,) if isinstance(names, str) else tuple(names)
+    names = _default_outputs(system, places) if outputs is None else _names(outputs, "outputs")
     own = system.accelerations(state, load)
     rows, labels = [], list[str]()
     for name in names:
@@ -310,10 +312,16 @@ def _slopes_of(system: System, state: State, own: np.ndarray, output) -> np.ndar
     return kernel(np.concatenate([np.tile(given[:, None], 3 * n), np.eye(3 * n)]))
 
 
-def _column(system: System, name: Any, what: str, others) -> int:
+def _names(given: Any, what: str) -> tuple[str, ...]:
+    """One name, or several."""
+    names = (given,) if isinstance(given, str) or not isinstance(given, Iterable) else tuple(given)
+    if not all(isinstance(name, str) for name in names):
+        raise ArgumentError(f"{what}: expected names, got {given!r}.")
+    return names
+
+
+def _column(system: System, name: str, what: str, others) -> int:
     """Place of a coordinate in v."""
-    if not isinstance(name, str):
-        raise ArgumentError(f"{what}: expected names, got {name!r}.")
     if name not in system.coordinates:
         raise StateError(f"{what}: nothing is called {name!r}. {did_you_mean(name, [*others, *system.coordinates])}")
     return list(system.coordinates).index(name)

@@ -18,6 +18,7 @@ from gauss.codegen import Graph, reverse, substitute
 from gauss.dynamics import compile_scene
 from gauss.errors import ArgumentError, SimulationError, require
 from gauss.scene import Scene
+from gauss.simulation.tolerances import check_tolerances
 from gauss.system import State, System, coordinate_rates
 
 WHOLE = 1e-9  # share of a step by which the duration may differ from a whole number of steps
@@ -121,7 +122,8 @@ def sensitivities(
     StateError
         If a parameter names what the scene does not have.
     SimulationError
-        If the system has no smooth dynamics in machine code, by the names of its elements, or the motion is not finite.
+        If the system has no smooth dynamics in machine code, by the names of its elements; the duration or the step is no
+        positive number; or the motion is not finite.
 
     Examples
     --------
@@ -177,7 +179,8 @@ def motion_gradient(
     StateError
         If a parameter names what the scene does not have.
     SimulationError
-        If the system has no smooth dynamics in machine code, by the names of its elements, or the motion is not finite.
+        If the system has no smooth dynamics in machine code, by the names of its elements; the duration or the step is no
+        positive number; or the motion is not finite.
 
     Examples
     --------
@@ -206,7 +209,8 @@ class _Motion:
     def __init__(self, system, duration, step, state, inputs, parameters, integrator):
         require(system, (System, Scene), "sensitivities")
         system = compile_scene(system) if isinstance(system, Scene) else system
-        self.steps = round(duration / step) if step > 0.0 else 0
+        check_tolerances(duration=duration, step=step)
+        self.steps = round(duration / step)
         if self.steps < 1 or abs(self.steps * step - duration) > WHOLE * step:
             raise ArgumentError(f"sensitivities: duration {duration} s is no whole number of steps of {step} s.")
         self.h, self.start = step, system.initial_state() if state is None else state
@@ -252,5 +256,8 @@ def _loss(loss: Callable, system: System, end: np.ndarray) -> tuple[float, np.nd
         found = symbols[0].graph.lift(loss(q, v))
     except TypeError as error:
         raise ArgumentError(f"motion_gradient: loss cannot be traced: {error}") from None
-    value, *gradient = (one.value for one in substitute([found, *reverse(found, symbols)], symbols, end))
+    try:
+        value, *gradient = (one.value for one in substitute([found, *reverse(found, symbols)], symbols, end))
+    except (ValueError, ArithmeticError) as error:
+        raise ArgumentError(f"motion_gradient: loss has no value or no gradient at the end of the motion: {error}") from None
     return float(value), np.array(gradient)

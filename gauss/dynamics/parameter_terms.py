@@ -21,7 +21,7 @@ from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.parameters import changed
 from gauss.dynamics.traced_system import applied_loads
-from gauss.errors import ArgumentError, StateError, did_you_mean
+from gauss.errors import ArgumentError, StateError, did_you_mean, require
 from gauss.rotations import cross
 from gauss.scene import Force
 from gauss.system import BoundLoad, State, System, whole
@@ -42,6 +42,7 @@ def size_of(system: System, parameter: str) -> int:
     StateError
         If there is no such body, joint or load.
     """
+    require(parameter, (str,), "parameter")
     kind, _, name = parameter.partition(":")
     if parameter == GRAVITY:
         return 3

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
-from gauss.errors import ArgumentError
 from gauss.export.c_code import PRELUDE, CBody
 from gauss.export.exported_function import ExportedFunction, exported_functions, identifier
 from gauss.scene import Scene
@@ -60,7 +59,7 @@ def to_c(system: System | Scene, names: Sequence[str] | str | None = None, name:
     Raises
     ------
     ArgumentError
-        If there is no such function, or two of them have the same name in C.
+        If there is no such function, or two of them have the same name as code.
     SimulationError
         If the scene has elements that no smooth function describes, by their names.
 
@@ -75,9 +74,6 @@ def to_c(system: System | Scene, names: Sequence[str] | str | None = None, name:
     functions = exported_functions(system, names)
     scene = system if isinstance(system, Scene) else system.scene
     prefix = identifier(scene.name if name is None else name)
-    known = [function.identifier for function in functions]
-    if len(set(known)) < len(known):
-        raise ArgumentError(f"export: functions have the same name in C: {', '.join(known)}.")
     header = "\n".join(_header(prefix, scene, functions))
     source = "\n".join(_source(prefix, functions))
     return CCode(prefix, header, source)
@@ -86,17 +82,23 @@ def to_c(system: System | Scene, names: Sequence[str] | str | None = None, name:
 def _header(prefix: str, scene: Scene, functions: list[ExportedFunction]) -> Iterator[str]:
     guard = f"{prefix.upper()}_H"
     joints = [joint for joint in scene.joints.values() if joint.pair.n_q]
-    yield f"/* Scene {scene.name!r}, written by gauss {VERSION}. SI units, angles in rad, unit quaternions (w, x, y, z)."
-    yield f"   q, v: coordinates and rates of {', '.join(joint.name for joint in joints)}, in this order."
+    title = f"Scene {_remark(repr(scene.name))}, written by gauss {VERSION}"
+    yield f"/* {title}. SI units, angles in rad, unit quaternions (w, x, y, z)."
+    yield f"   q, v: coordinates and rates of {_remark(', '.join(joint.name for joint in joints))}, in this order."
     yield "   load: generalised forces added to those of the scene; u: inputs; t: time. Matrices are stored row by row."
     yield "   _batch: n states, one after the other in every array. Arguments and results must not overlap. */"
     yield f'#ifndef {guard}\n#define {guard}\n\n#include <stddef.h>\n\n#ifdef __cplusplus\nextern "C" {{\n#endif\n'
     if scene.inputs:
-        yield f"/* u: {', '.join(scene.inputs)} */"
+        yield f"/* u: {_remark(', '.join(scene.inputs))} */"
     for function in functions:
         yield f"{_signature(prefix, function)};"
         yield f"{_batch_signature(prefix, function)};\n"
     yield "#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
+
+
+def _remark(text: str) -> str:
+    """Text that does not end a comment."""
+    return text.replace("*/", "* /")
 
 
 def _source(prefix: str, functions: list[ExportedFunction]) -> Iterator[str]:

@@ -89,7 +89,7 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
     Raises
     ------
     ArgumentError
-        If there is no such function.
+        If there is no such function, or two of them have the same name as code.
     SimulationError
         If the scene has elements that no smooth function describes, by their names.
     """
@@ -101,7 +101,11 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
     if not system.n_v:
         raise SimulationError(f"scene {system.scene.name!r} cannot be exported: nothing in it can move.")
     refuse_changed(system)
-    return [_loaded(system, name) if name in LOADED else _of_state(system, name) for name in names]
+    found = [_loaded(system, name) if name in LOADED else _of_state(system, name) for name in names]
+    known = [function.identifier for function in found]
+    if len(set(known)) < len(known):
+        raise ArgumentError(f"export: functions have the same name as code: {', '.join(known)}.")
+    return found
 
 
 def identifier(name: str) -> str:

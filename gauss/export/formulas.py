@@ -173,7 +173,7 @@ def _number(sympy, value: float):
     return fraction if abs(float(fraction) - value) <= FRACTION_ROUNDOFF * max(abs(value), 1.0) else sympy.Float(value)
 
 
-def latex_document(system: System | Scene, names: Sequence[str] | None = None) -> str:
+def latex_document(system: System | Scene, names: Sequence[str] | str | None = None) -> str:
     """Document of LaTeX with the equations of motion of a small scene, and the values of its symbols.
 
     Parameters
@@ -198,7 +198,7 @@ def latex_document(system: System | Scene, names: Sequence[str] | None = None) -
     system = compile_scene(system) if isinstance(system, Scene) else system
     shown: list[str] = []
     values: dict[Any, float] = {}
-    for name in names or _equations(system):
+    for name in _wanted(system, names):
         found = to_sympy(system, name)
         still = [] if names is not None else [(symbol, 0) for symbol in found.arguments.get("acceleration", ())]
         for result, formula in found.results.items():
@@ -231,7 +231,10 @@ SIGNS = {
 }
 
 
-def _equations(system: System) -> tuple[str, ...]:
+def _wanted(system: System, names) -> tuple[str, ...]:
+    """Names of the functions; those of the equations of motion when none are given."""
+    if names:
+        return (names,) if isinstance(names, str) else tuple(names)
     return ("mass_matrix", "inverse_dynamics", *(("loop_constraints",) if system.has_closures else ()))
 
 

@@ -91,7 +91,7 @@ def _module(functions: list[ExportedFunction]) -> Iterator[str]:
 def _definition(exported: ExportedFunction) -> Iterator[str]:
     given = [name if shape else f"{name}=0.0" for name, shape in exported.inputs.items()]
     yield f"\ndef {exported.identifier}({', '.join(given)}):"
-    yield f'    """{_summary(exported)}"""'
+    yield f"    {_summary(exported)!r}"  # names of frames may have quotes and backslashes
     parts = [f"jnp.reshape(jnp.asarray({name}), ({prod(shape)},))" for name, shape in exported.inputs.items()]
     yield f"    x = jnp.concatenate([{', '.join(parts)}])"
     yield from (f"    {line}" for line in _statements(exported.function))

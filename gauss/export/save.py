@@ -10,7 +10,7 @@ from gauss.system import System
 
 
 def save_as(
-    system: System | Scene, language: str, folder=".", names: Sequence[str] | None = None, name: str | None = None
+    system: System | Scene, language: str, folder=".", names: Sequence[str] | str | None = None, name: str | None = None
 ) -> list[Path]:
     """Write functions of a system as code of another language.
 

@@ -8,7 +8,7 @@ from scipy.linalg import solve_continuous_are
 
 import gauss
 from gauss.dynamics.projection import project_positions, project_rates
-from gauss.errors import SimulationError, StateError
+from gauss.errors import ArgumentError, SimulationError, StateError
 from gauss.system import retract
 from models import families
 from tests.support import mechanisms
@@ -156,6 +156,10 @@ def test_outputs_are_slopes_of_what_is_measured():
         (lambda s: gauss.equilibrium(s, keep=["nothing"]), StateError, "nothing"),
         (lambda s: gauss.equilibrium(s, loads={"rial": 1.0}), StateError, "rail"),
         (lambda s: gauss.equilibrium(s, loads={"rail": 1.0}), SimulationError, "'rail' still accelerates"),
+        (lambda s: gauss.equilibrium(s, loads={"rail": "1 N"}), StateError, "rail"),
+        (lambda s: gauss.equilibria(s, starts=-1), ArgumentError, "starts"),
+        (lambda s: gauss.linearise(s, inputs=2), ArgumentError, "inputs"),
+        (lambda s: gauss.linearise(s, outputs=["pin", 2]), ArgumentError, "outputs"),
         (lambda s: gauss.linearise("cart_pole"), gauss.GaussError, "Scene"),
     ],
 )

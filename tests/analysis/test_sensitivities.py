@@ -137,6 +137,13 @@ def test_what_has_no_derivatives_is_refused_by_name():
     scene = gauss.load("pendulum")
     with pytest.raises(ArgumentError, match="whole number"):
         gauss.sensitivities(scene, 0.105, step=0.01)
+    for duration, step in ((np.nan, 0.01), (np.inf, 0.01), ("1 s", 0.01), (0.1, -0.01), (0.1, np.nan)):
+        with pytest.raises(SimulationError, match="positive"):
+            gauss.sensitivities(scene, duration, step=step)
+    with pytest.raises(ArgumentError, match="parameter"):
+        gauss.sensitivities(scene, 0.1, step=0.01, parameters=[3])
+    with pytest.raises(ArgumentError, match="no value"):
+        gauss.motion_gradient(scene, 0.1, lambda q, v: gauss.math.sqrt(-1.0 - q[0] ** 2), step=0.01)
     with pytest.raises(ArgumentError, match="rk4"):
         gauss.sensitivities(scene, 0.1, step=0.01, integrator="rk5")
     with pytest.raises(StateError, match="rod"):

@@ -227,6 +227,27 @@ def test_what_cannot_be_exported_is_named(make, named):
         export.to_c(make(), "forward_dynamics")
 
 
+def with_frames(*names):
+    scene = gauss.load("pendulum")
+    for name in names:
+        scene.frame(name, "rod")
+    return scene
+
+
+@pytest.mark.parametrize("write", [export.to_c, export.jax_source])
+def test_functions_of_the_same_name_as_code_are_refused(write):
+    with pytest.raises(ArgumentError, match="jacobian_left_tip, jacobian_left_tip"):
+        write(with_frames("left tip", "left_tip"), ["jacobian:left tip", "jacobian:left_tip"])
+
+
+def test_names_in_remarks_do_not_end_them():
+    scene = gauss.Scene("a */ #error /*", gravity=(0, 0, -9.81))
+    scene.revolute("turn */ b", "ground", scene.body("rod", 1.0, (0.1, 0.1, 0.1)))
+    assert export.to_c(scene, "mass_matrix").header.count("*/") == 1
+    tip = 'tip """ \\x'
+    compile(export.jax_source(with_frames(tip), [f"jacobian:{tip}"]), "module", "exec")
+
+
 def test_unknown_functions_are_refused():
     with pytest.raises(ArgumentError, match="mass_matrix"):
         export.to_c(gauss.load("pendulum"), "mas_matrix")

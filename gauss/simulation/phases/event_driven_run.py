@@ -223,7 +223,8 @@ class EventDrivenRun(PythonRun):
     def _standstill(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step at which a sliding element, or a train with losses, comes to rest.
 
-        A sliding element that a drive keeps at rest beyond its limit has rates of rounding.
+        A sliding element that a drive keeps at rest beyond its limit has rates of rounding, as a train that starts away from
+        a stop which has not opened yet.
         """
         selector, mode = self.selector, self.phase.mode
         in_trains = np.array([name in selector.train_friction for name in selector.names], dtype=bool)
@@ -239,8 +240,8 @@ class EventDrivenRun(PythonRun):
             return np.concatenate([-self.phase.signs[slipping] * slides, directions[turning] * turns])
 
         def rounding(t: float) -> np.ndarray:
-            sizes = REVERSED_RATE * resting(self.system, dense(t)[0].v) * selector.sizes[slipping]
-            return np.concatenate([sizes, np.zeros(turning.size)])
+            sizes = np.concatenate([selector.sizes[slipping], selector.roots[turning]])
+            return REVERSED_RATE * resting(self.system, dense(t)[0].v) * sizes
 
         found = first_negative(onward, begin, end, rounding)
         return None if found is None else found[0]
