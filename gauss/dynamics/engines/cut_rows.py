@@ -34,7 +34,7 @@ CONVERGED_RESIDUAL = 1e-12  # residual of a force relative to the largest multip
 LEAST_CONTRACTION = 0.1  # of Newton steps: an affine problem converges much faster
 ROUNDOFF_STEP = 1e-8  # Newton step relative to the largest force by round-off, above all of QP solvers
 MOST_ROUNDS = 20  # of Newton's method
-NOT_CONVERGED = "the forces of the links with losses did not converge."
+NOT_CONVERGED = "the forces of the links with losses and of closed stops did not converge."
 
 
 class ClosedStop(NamedTuple):
