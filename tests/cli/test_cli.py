@@ -132,4 +132,4 @@ def test_the_code_of_the_readme_runs(capsys, tmp_path, monkeypatch):
         exec(snippet, scope)
     assert "agreement" in capsys.readouterr().out
     assert str(scope["solution"].status) == "solved"
-    assert "<html" in (tmp_path / "two_links.html").read_text()[:1000].lower()
+    assert "<html" in (tmp_path / "door.html").read_text()[:1000].lower()
