@@ -80,7 +80,7 @@ WRONG = {
     "q, words": (lambda many: many.reset("a"), StateError, "q0: expected"),
     "seed": (lambda many: many.reset(seed="x"), SimulationError, "seed: expected"),
     "spread": (lambda many: many.reset(seed=1, spread=-1.0), SimulationError, "spread: expected"),
-    "no such motion": (lambda many: many.restart([5], np.zeros((1, 2)), np.zeros((1, 2))), StateError, "no such motions"),
+    "no such motion": (lambda many: many.restart([5], np.zeros((1, 2)), np.zeros((1, 2))), StateError, "numbers of motions"),
     "too few": (lambda many: many.restart([0, 1], np.zeros((1, 2)), np.zeros((1, 2))), StateError, "of 2 motions, got 1"),
 }
 
