@@ -141,7 +141,8 @@ class Surfaces:
         self.known = np.minimum(self.known[0], least), np.maximum(self.known[1], most)
         seen = np.maximum(np.abs(self.known[0]), np.abs(self.known[1]))
         allowed = GRADUAL * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol * (seen + self.units)
-        return (np.maximum(high - most[:, None], least[:, None] - low) > allowed[:, None]).any(axis=0)
+        beyond = np.maximum(high - most[:, None], least[:, None] - low) > allowed[:, None]
+        return (beyond | _peaks(np.diff(at), allowed[:, None])).any(axis=0)
 
     def _located(self, crossed, level, edges, dense: Callable, finest: float) -> tuple[np.ndarray, np.ndarray]:
         """Order of crossings (switching function, subinterval), and their ascending times [s], by Brent's method."""
@@ -163,6 +164,12 @@ class Surfaces:
     def _points(self, t, y) -> dict:
         given = {self.symbols[0].index: Interval.point(np.asarray(t))}
         return given | {s.index: Interval.point(value) for s, value in zip(self.symbols[1:], y, strict=True)}
+
+
+def _peaks(changes: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+    """Subintervals (…, PARTS) of steep flanks of a peak that samples meet by chance: stages may lie beside it."""
+    rises, falls = changes > allowed, changes < -allowed
+    return (rises | falls) & rises.any(axis=1, keepdims=True) & falls.any(axis=1, keepdims=True)
 
 
 def _curved(outputs, own: set[int]) -> list[Expression]:

@@ -98,6 +98,18 @@ def test_work_between_two_angles(law, make, method):
     assert motion.speed("a")[-1] == pytest.approx(np.sqrt(speed**2 + 2.0 * work / INERTIA), rel=EXACT)
 
 
+PLACES = 50.0 + 5.0 * np.sin(1.7 * np.arange(40))  # rad; by chance, samples of a step lie on the peak at some of them
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["dop853", "radau"])
+def test_a_smooth_peak_is_met_wherever_it_lies(method):
+    for place in PLACES:
+        law = lambda t, a, w, place=place: 10.0 * np.exp(-(((a - place) / 0.05) ** 2))
+        motion = simulate(shaft(law, 3.0), DURATION, method=method, **TIGHT)
+        assert motion.speed("a")[-1] == pytest.approx(np.sqrt(9.0 + 0.5 * np.sqrt(np.pi)), rel=EXACT), place
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["dop853", "auto"])
 def test_narrow_torque_over_speed(method):
