@@ -47,7 +47,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
-        jam, rates = stepper.forbids(state, added), stepper.over(touch, free, v, h, force, added)
+        jam, rates = stepper.forbids(state, added), stepper.over(state, touch, free, v, h, force, added)
         found, _ = time_step(KnownRates(system, rates, share), point, h)
         forces = [*(force * stepper.unit), math.maximum(method_state[n], error)]
         packed, violation = layout.pack(Point(found.state, found.work, rates, np.array(forces, dtype=object))), [0.0]
