@@ -238,7 +238,7 @@ def _clusters(tree: KinematicTree) -> list[list[tuple[Edge, float]]]:
         if train is None:
             clusters.append([(edge, 1.0)])
         elif edge.constraint == train.joints[0]:
-            clusters.append([(edges[joint], ratio) for joint, ratio in zip(*train, strict=True)])
+            clusters.append([(edges[joint], ratio) for joint, ratio in zip(train.joints, train.ratios, strict=True)])
     return clusters
 
 
