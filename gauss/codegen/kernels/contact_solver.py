@@ -207,7 +207,7 @@ class _ContactSolverWriter:
         with r.each(self.limited) as j:
             i = self.limited_rows + j
             is_held = self.W[i * self.n + i] < w[i]  # its velocity does not react, as that of a prescribed joint
-            share = r.absolute(self.error[i]) / r.maximum(self.limit[j], SMALLEST_DIAGONAL)
+            share = r.absolute(self.error[i]) / (self.limit[j] + SMALLEST_DIAGONAL)
             measure(r.choose(is_held, share * r.absolute(u[i]), 0.0))
         return r.choose(total[0] <= LARGEST_RESIDUAL_SUM, largest[0], np.inf)  # the maximum ignores NaN, the sum does not
 
