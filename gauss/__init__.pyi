@@ -63,9 +63,13 @@ from gauss.analysis.assembly_modes import assembly_modes
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
+from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
+from gauss.analysis.planned_motion import PlannedMotion, plan_motion
+from gauss.analysis.planned_path import plan_path
 from gauss.analysis.recommendation import advise
 from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
+from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
@@ -99,13 +103,16 @@ __version__: str
 __all__ = [
     "Baumgarte",
     "Body",
+    "CenterOfMassTarget",
     "Compulsion",
     "Constraint",
     "Coupling",
+    "DistanceTarget",
     "Drive",
     "Force",
     "Frame",
     "GaussError",
+    "InverseKinematics",
     "Joint",
     "JointSpring",
     "Kinematics",
@@ -114,6 +121,10 @@ __all__ = [
     "Linkage",
     "MotionGradient",
     "Plan",
+    "PlannedMotion",
+    "PointTarget",
+    "PoseTarget",
+    "PostureTarget",
     "Scene",
     "Sensitivities",
     "Simulator",
@@ -137,6 +148,7 @@ __all__ = [
     "crosscheck",
     "crossings",
     "derivatives",
+    "differential_inverse_kinematics",
     "drive_forces",
     "energy",
     "equilibria",
@@ -144,6 +156,7 @@ __all__ = [
     "friction_forces",
     "generalised_alpha",
     "inverse_dynamics",
+    "inverse_kinematics",
     "linearise",
     "load",
     "load_linkage",
@@ -153,6 +166,8 @@ __all__ = [
     "mobility",
     "motion_gradient",
     "paradoxes",
+    "plan_motion",
+    "plan_path",
     "prepare",
     "reactions",
     "resolve_overlaps",

@@ -75,6 +75,14 @@ GROUPS = (
         + _of("gauss", "motion_gradient MotionGradient"),
     ),
     Group(
+        "inverse_kinematics",
+        "Inverse kinematics and planned motions",
+        "States and rates for targets, with loops closed and limits kept; motions of coordinates within limits of speed and "
+        "acceleration. Guide: :doc:`/guides/arms`.",
+        _of("gauss", "inverse_kinematics differential_inverse_kinematics InverseKinematics PoseTarget PointTarget")
+        + _of("gauss", "DistanceTarget CenterOfMassTarget PostureTarget plan_motion plan_path PlannedMotion"),
+    ),
+    Group(
         "view",
         "Look at a motion",
         "Figures of matplotlib, the viewer in the browser, self-contained pages and films. Needs the extra ``view``.",
@@ -151,9 +159,11 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.Spring": ".spring",
     "gauss.Start": ".start",
     "gauss.Compulsion": "gauss.assemble",
+    "gauss.InverseKinematics": "gauss.inverse_kinematics",
     "gauss.LinearModel": "gauss.linearise",
     "gauss.LinearModes": ".modes",
     "gauss.MotionGradient": "gauss.motion_gradient",
+    "gauss.PlannedMotion": "gauss.plan_motion",
     "gauss.Sensitivities": "gauss.sensitivities",
     "gauss.Solution": "gauss.solve",
     "gauss.State": ".initial_state",
