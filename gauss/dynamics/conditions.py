@@ -206,7 +206,7 @@ def takes_pair_kernels(ask: Question) -> list[str]:
         found.append("it was built without machine code")
     n_v = system.n_v
     found += [f"{n_v} rates beside contacts are more than {WIDEST_MECHANISM}"] if n_v > WIDEST_MECHANISM else []
-    return found + (["a constraint depends on the time"] if system.relations.asks_time else [])
+    return found
 
 
 def are_free_in_contact(system: System) -> bool:
