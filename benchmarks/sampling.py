@@ -4,8 +4,8 @@ Run it with:
 
     python -m benchmarks.sampling [--rounds 7]
 
-Sampling control is ``models/examples/control/mppi.py``: 4096 motions of 50 control intervals, each of 4 steps of RK4 of 5 ms, on
-one thread. MuJoCo makes the same steps of the same mechanism, its forces given as ``qfrc_applied``; a control step adds to
+Sampling control is ``models/examples/control/mppi.py``: 4096 motions of 50 control intervals, each of 4 steps of RK4 of 5 ms,
+on one thread. MuJoCo makes the same steps of the same mechanism, its forces given as ``qfrc_applied``; a control step adds to
 the rollouts the noise, the costs and the weights of the law, which are the same for both. ``mujoco.rollout`` returns every
 step, gauss every fourth. Of a Panda that is thrown about, rounding grows to the difference at the end. Environments are
 Gymnasium's;
