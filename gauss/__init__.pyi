@@ -60,11 +60,14 @@ from gauss.analysis import (
     set_valued_forces,
 )
 from gauss.analysis.assembly_modes import assembly_modes
+from gauss.analysis.base_parameters import BaseParameters, base_parameters
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
+from gauss.analysis.identification import Identification, identify
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
 from gauss.analysis.recommendation import advise
+from gauss.analysis.regressor import Regressor, regressor
 from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
@@ -97,6 +100,7 @@ from gauss.view.viewer import show
 __version__: str
 
 __all__ = [
+    "BaseParameters",
     "Baumgarte",
     "Body",
     "Compulsion",
@@ -106,6 +110,7 @@ __all__ = [
     "Force",
     "Frame",
     "GaussError",
+    "Identification",
     "Joint",
     "JointSpring",
     "Kinematics",
@@ -114,6 +119,7 @@ __all__ = [
     "Linkage",
     "MotionGradient",
     "Plan",
+    "Regressor",
     "Scene",
     "Sensitivities",
     "Simulator",
@@ -129,6 +135,7 @@ __all__ = [
     "advise",
     "assemble",
     "assembly_modes",
+    "base_parameters",
     "catalog",
     "choose",
     "compile_scene",
@@ -143,6 +150,7 @@ __all__ = [
     "equilibrium",
     "friction_forces",
     "generalised_alpha",
+    "identify",
     "inverse_dynamics",
     "linearise",
     "load",
@@ -155,6 +163,7 @@ __all__ = [
     "paradoxes",
     "prepare",
     "reactions",
+    "regressor",
     "resolve_overlaps",
     "rollout",
     "save",

@@ -75,6 +75,12 @@ GROUPS = (
         + _of("gauss", "motion_gradient MotionGradient"),
     ),
     Group(
+        "identification",
+        "Identify parameters",
+        "Masses, centres of mass, inertias and friction from measured motions and forces, loops included.",
+        _of("gauss", "identify Identification base_parameters BaseParameters regressor Regressor"),
+    ),
+    Group(
         "view",
         "Look at a motion",
         "Figures of matplotlib, the viewer in the browser, self-contained pages and films. Needs the extra ``view``.",
@@ -140,12 +146,14 @@ ROOMS = (
     "gauss.codegen.kernels",
 )
 MADE_BY = {  # names that one seldom types, and what makes such objects: a public name, or a method
+    "gauss.BaseParameters": "gauss.base_parameters",
     "gauss.Body": ".body",
     "gauss.Constraint": ".constrain",
     "gauss.Coupling": ".couple",
     "gauss.Drive": ".drive",
     "gauss.Force": ".force",
     "gauss.Frame": ".frame",
+    "gauss.Identification": "gauss.identify",
     "gauss.Joint": ".revolute",
     "gauss.JointSpring": ".joint_spring",
     "gauss.Spring": ".spring",
@@ -154,6 +162,7 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.LinearModel": "gauss.linearise",
     "gauss.LinearModes": ".modes",
     "gauss.MotionGradient": "gauss.motion_gradient",
+    "gauss.Regressor": "gauss.regressor",
     "gauss.Sensitivities": "gauss.sensitivities",
     "gauss.Solution": "gauss.solve",
     "gauss.State": ".initial_state",
