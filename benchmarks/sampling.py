@@ -4,13 +4,13 @@ Run it with:
 
     python -m benchmarks.sampling [--rounds 7]
 
-Sampling control is ``models/examples/control/mppi.py``: 4096 motions of 50 control intervals, each of 4 steps of RK4 of 5 ms,
-on one thread. MuJoCo makes the same steps of the same mechanism, its forces given as ``qfrc_applied``; a control step adds to
-the rollouts the noise, the costs and the weights of the law, which are the same for both. ``mujoco.rollout`` returns every
-step, gauss every fourth. Of a Panda that is thrown about, rounding grows to the difference at the end. Environments are
-Gymnasium's;
-an action of a cart-pole of gauss is 10 steps of RK4, one of MuJoCo's InvertedPendulum-v5 is 2. CPU time of the process;
-medians of rounds. Writes benchmarks/results/sampling.csv and .md.
+Sampling control is ``models/examples/control/mppi.py``: 4096 motions of 50 control intervals, each of 4 steps of RK4
+of 5 ms, on one thread. MuJoCo makes the same steps of the same mechanism, its forces given as ``qfrc_applied``; a
+control step adds to the rollouts the noise, the costs and the weights of the law, which are the same for both.
+``mujoco.rollout`` returns every step, gauss every fourth. Of a Panda that is thrown about, rounding grows to the
+difference at the end. Environments are Gymnasium's; an action of a cart-pole of gauss is 10 steps of RK4, one of
+MuJoCo's InvertedPendulum-v5 is 2. CPU time of the process; medians of rounds. Writes benchmarks/results/sampling.csv
+and .md.
 """
 
 import os

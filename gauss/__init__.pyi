@@ -60,14 +60,17 @@ from gauss.analysis import (
     set_valued_forces,
 )
 from gauss.analysis.assembly_modes import assembly_modes
+from gauss.analysis.base_parameters import BaseParameters, base_parameters
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
+from gauss.analysis.identification import Identification, identify
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
 from gauss.analysis.planned_path import plan_path
 from gauss.analysis.recommendation import advise
+from gauss.analysis.regressor import Regressor, regressor
 from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
 from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget
 from gauss.backends import choose, solve
@@ -101,6 +104,7 @@ from gauss.view.viewer import show
 __version__: str
 
 __all__ = [
+    "BaseParameters",
     "Baumgarte",
     "Body",
     "CenterOfMassTarget",
@@ -112,6 +116,7 @@ __all__ = [
     "Force",
     "Frame",
     "GaussError",
+    "Identification",
     "InverseKinematics",
     "Joint",
     "JointSpring",
@@ -125,6 +130,7 @@ __all__ = [
     "PointTarget",
     "PoseTarget",
     "PostureTarget",
+    "Regressor",
     "Scene",
     "Sensitivities",
     "Simulator",
@@ -140,6 +146,7 @@ __all__ = [
     "advise",
     "assemble",
     "assembly_modes",
+    "base_parameters",
     "catalog",
     "choose",
     "compile_scene",
@@ -155,6 +162,7 @@ __all__ = [
     "equilibrium",
     "friction_forces",
     "generalised_alpha",
+    "identify",
     "inverse_dynamics",
     "inverse_kinematics",
     "linearise",
@@ -170,6 +178,7 @@ __all__ = [
     "plan_path",
     "prepare",
     "reactions",
+    "regressor",
     "resolve_overlaps",
     "rollout",
     "save",

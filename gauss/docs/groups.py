@@ -83,6 +83,12 @@ GROUPS = (
         + _of("gauss", "DistanceTarget CenterOfMassTarget PostureTarget plan_motion plan_path PlannedMotion"),
     ),
     Group(
+        "identification",
+        "Identify parameters",
+        "Masses, centres of mass, inertias and friction from measured motions and forces, loops included.",
+        _of("gauss", "identify Identification base_parameters BaseParameters regressor Regressor"),
+    ),
+    Group(
         "view",
         "Look at a motion",
         "Figures of matplotlib, the viewer in the browser, self-contained pages and films. Needs the extra ``view``.",
@@ -148,12 +154,14 @@ ROOMS = (
     "gauss.codegen.kernels",
 )
 MADE_BY = {  # names that one seldom types, and what makes such objects: a public name, or a method
+    "gauss.BaseParameters": "gauss.base_parameters",
     "gauss.Body": ".body",
     "gauss.Constraint": ".constrain",
     "gauss.Coupling": ".couple",
     "gauss.Drive": ".drive",
     "gauss.Force": ".force",
     "gauss.Frame": ".frame",
+    "gauss.Identification": "gauss.identify",
     "gauss.Joint": ".revolute",
     "gauss.JointSpring": ".joint_spring",
     "gauss.Spring": ".spring",
@@ -164,6 +172,7 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.LinearModes": ".modes",
     "gauss.MotionGradient": "gauss.motion_gradient",
     "gauss.PlannedMotion": "gauss.plan_motion",
+    "gauss.Regressor": "gauss.regressor",
     "gauss.Sensitivities": "gauss.sensitivities",
     "gauss.Solution": "gauss.solve",
     "gauss.State": ".initial_state",
