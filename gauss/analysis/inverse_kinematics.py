@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from gauss.analysis.loop_closure import closed
-from gauss.analysis.target_levels import LevelRows, lexicographic, solver_of
+from gauss.analysis.target_levels import NEAR_SINGULAR, LevelRows, lexicographic, solver_of
 from gauss.analysis.target_problem import TargetProblem, bounds, positive_values
 from gauss.analysis.targets import Target
 from gauss.arguments import named_arguments
@@ -35,7 +35,7 @@ KEPT_COST = 1e-7  # relative increase of the costs of the levels before that a s
 ROUNDED_MERIT = 1e-14  # relative increase of the merit that is round-off
 KICK = 0.05  # standard deviation of a displacement from where the errors are stationary, in units
 AT_LIMIT = 1e-7  # distance from a limit in units, below which it is active
-LEAST_SHARE = 1e-6  # of the pull of a target, above which a limit stands against it
+LEAST_SHARE, LEAST_PART = 1e-6, 1e-3  # of the pull of a target, above which a limit, or a target, stands against it
 
 
 @dataclass(frozen=True)
@@ -400,8 +400,18 @@ def _obstacles(point: _Point, gradients: list[np.ndarray], k: int) -> tuple[str,
         found = [
             problem.limit_name(*limit) for limit, force in zip(active, forces, strict=True) if force > LEAST_SHARE * size
         ]
-    for other, gradient in zip(problem.targets, gradients, strict=True):
-        against = gradient @ rest < -LEAST_SHARE * size * np.linalg.norm(gradient)
-        if against and np.linalg.norm(rest) > np.sqrt(LEAST_SHARE) * size and other.level <= problem.targets[k].level:
+    for other, rows, gradient in zip(problem.targets, point.rows, gradients, strict=True):
+        if other.level < problem.targets[k].level:  # it is met: its own pull is round-off
+            against = np.linalg.norm(_within_rows(rows.jacobian @ N / rows.units[:, None], rest)) > LEAST_PART * size
+        else:
+            against = gradient @ rest < -LEAST_SHARE * size * np.linalg.norm(gradient)
+        if against and np.linalg.norm(rest) > LEAST_PART * size and other.level <= problem.targets[k].level:
             found.append(other.label)
     return tuple(found)
+
+
+def _within_rows(rows: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Projection of a vector (k,) on the row space of a matrix (m, k)."""
+    _, sizes, Vt = np.linalg.svd(rows, full_matrices=False)
+    basis = Vt[sizes > NEAR_SINGULAR * sizes.max(initial=0.0)]
+    return basis.T @ (basis @ vector)

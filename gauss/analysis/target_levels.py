@@ -94,9 +94,9 @@ def _least_squares(A, b, G, h, damping: float, solver) -> np.ndarray:
         return free
     H = A.T @ A
     H += (damping + CONVEX * max(np.trace(H), 1e-300)) * np.eye(n)
-    no_rows = sparse.csc_matrix((0, n))
+    no_rows, size = sparse.csc_matrix((0, n)), H.diagonal().max()  # solvers stop at absolute tolerances
     programme = Programme(
-        "rates", sparse.csc_matrix(H), -A.T @ b, no_rows, np.zeros(0), sparse.csc_matrix(G), h, lambda *_: None
+        "rates", sparse.csc_matrix(H / size), -A.T @ b / size, no_rows, np.zeros(0), sparse.csc_matrix(G), h, lambda *_: None
     )
     outcome = attempt(solver, programme.with_rows_of_unit_length())
     if outcome.x is None:
