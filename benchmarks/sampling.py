@@ -4,13 +4,13 @@ Run it with:
 
     python -m benchmarks.sampling [--rounds 7]
 
-Sampling control is ``models/examples/mppi.py``: 4096 motions of 50 control intervals, each of 4 steps of RK4 of 5 ms, on
-one thread. MuJoCo makes the same steps of the same mechanism, its forces given as ``qfrc_applied``; a control step adds to
-the rollouts the noise, the costs and the weights of the law, which are the same for both. ``mujoco.rollout`` returns every
-step, gauss every fourth. Of a Panda that is thrown about, rounding grows to the difference at the end. Environments are
-Gymnasium's;
-an action of a cart-pole of gauss is 10 steps of RK4, one of MuJoCo's InvertedPendulum-v5 is 2. CPU time of the process;
-medians of rounds. Writes benchmarks/results/sampling.csv and .md.
+Sampling control is ``models/examples/control/mppi.py``: 4096 motions of 50 control intervals, each of 4 steps of RK4
+of 5 ms, on one thread. MuJoCo makes the same steps of the same mechanism, its forces given as ``qfrc_applied``; a
+control step adds to the rollouts the noise, the costs and the weights of the law, which are the same for both.
+``mujoco.rollout`` returns every step, gauss every fourth. Of a Panda that is thrown about, rounding grows to the
+difference at the end. Environments are Gymnasium's; an action of a cart-pole of gauss is 10 steps of RK4, one of
+MuJoCo's InvertedPendulum-v5 is 2. CPU time of the process; medians of rounds. Writes benchmarks/results/sampling.csv
+and .md.
 """
 
 import os
@@ -38,7 +38,7 @@ from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head, in_time  # noqa: E402
 from gauss.io.mjcf.write import to_mjcf  # noqa: E402
 
-EXAMPLE = Path(__file__).parents[1] / "models" / "examples" / "mppi.py"
+EXAMPLE = Path(__file__).parents[1] / "models" / "examples" / "control" / "mppi.py"
 MUJOCO, LAW = "MuJoCo", "law"
 ACTIONS = 50  # of an environment in a run
 MANY = 1024  # motions of a vector environment of gauss

@@ -60,12 +60,19 @@ from gauss.analysis import (
     set_valued_forces,
 )
 from gauss.analysis.assembly_modes import assembly_modes
+from gauss.analysis.base_parameters import BaseParameters, base_parameters
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
+from gauss.analysis.identification import Identification, identify
+from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
+from gauss.analysis.planned_motion import PlannedMotion, plan_motion
+from gauss.analysis.planned_path import plan_path
 from gauss.analysis.recommendation import advise
+from gauss.analysis.regressor import Regressor, regressor
 from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
+from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
@@ -97,15 +104,20 @@ from gauss.view.viewer import show
 __version__: str
 
 __all__ = [
+    "BaseParameters",
     "Baumgarte",
     "Body",
+    "CenterOfMassTarget",
     "Compulsion",
     "Constraint",
     "Coupling",
+    "DistanceTarget",
     "Drive",
     "Force",
     "Frame",
     "GaussError",
+    "Identification",
+    "InverseKinematics",
     "Joint",
     "JointSpring",
     "Kinematics",
@@ -114,6 +126,11 @@ __all__ = [
     "Linkage",
     "MotionGradient",
     "Plan",
+    "PlannedMotion",
+    "PointTarget",
+    "PoseTarget",
+    "PostureTarget",
+    "Regressor",
     "Scene",
     "Sensitivities",
     "Simulator",
@@ -129,6 +146,7 @@ __all__ = [
     "advise",
     "assemble",
     "assembly_modes",
+    "base_parameters",
     "catalog",
     "choose",
     "compile_scene",
@@ -137,13 +155,16 @@ __all__ = [
     "crosscheck",
     "crossings",
     "derivatives",
+    "differential_inverse_kinematics",
     "drive_forces",
     "energy",
     "equilibria",
     "equilibrium",
     "friction_forces",
     "generalised_alpha",
+    "identify",
     "inverse_dynamics",
+    "inverse_kinematics",
     "linearise",
     "load",
     "load_linkage",
@@ -153,8 +174,11 @@ __all__ = [
     "mobility",
     "motion_gradient",
     "paradoxes",
+    "plan_motion",
+    "plan_path",
     "prepare",
     "reactions",
+    "regressor",
     "resolve_overlaps",
     "rollout",
     "save",

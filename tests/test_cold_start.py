@@ -28,7 +28,7 @@ UNUSED = (  # drivers, integrators and elements of scenes that a four-bar does n
     *("gauss.integrators.symplectic", "gauss.integrators.radau", "gauss.scene.gears", "gauss.scene.rolling"),
 )
 SIMULATE = "import gauss; gauss.simulate(gauss.load('four_bar'), 0.01, progress=False)"
-HELP = "import sys, runpy; sys.argv = ['gauss', '--help']\ntry: runpy.run_module('gauss')\nexcept SystemExit: pass"
+HELP = "import sys, runpy; sys.argv = ['gauss', {}'--help']\ntry: runpy.run_module('gauss')\nexcept SystemExit: pass"
 
 
 def _imported(code: str, names: tuple[str, ...]) -> set[str]:
@@ -44,7 +44,8 @@ def _imported(code: str, names: tuple[str, ...]) -> set[str]:
     [
         ("import gauss", HEAVY, set()),
         ("from gauss import GaussError", HEAVY, set()),
-        (HELP, HEAVY, {"typer", "rich"}),
+        (HELP.format(""), HEAVY, {"typer"}),
+        (HELP.format("'run', "), ("rich", "numpy", "llvmlite", "scipy", "gauss.scene.scene"), set()),
         (SIMULATE, OPTIONAL + UNUSED, set()),
         ("import gauss; gauss.load('robot:ur5')", ("pinocchio", "scipy"), {"pinocchio"}),
         ("import gauss; gauss.Linkage", ("gauss.linkages", "gauss.rotors"), {"gauss.linkages"}),

@@ -1,5 +1,8 @@
 from gauss.analysis.contact_forces import contact_forces, friction_forces
 from gauss.analysis.inverse_dynamics import InverseDynamics, inverse_dynamics
+from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
+from gauss.analysis.planned_motion import PlannedMotion, plan_motion
+from gauss.analysis.planned_path import plan_path
 from gauss.analysis.reactions import (
     Reaction,
     constraint_forces,
@@ -8,21 +11,34 @@ from gauss.analysis.reactions import (
     set_valued_forces,
     unique_reactions,
 )
+from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget, Target
 from gauss.simulation.energy import Energy, energy
 from gauss.simulation.energy_balance import warn_of_balance
 
 __all__ = [
+    "CenterOfMassTarget",
+    "DistanceTarget",
     "Energy",
     "InverseDynamics",
+    "InverseKinematics",
+    "PlannedMotion",
+    "PointTarget",
+    "PoseTarget",
+    "PostureTarget",
     "Reaction",
+    "Target",
     "constraint_forces",
     "contact_forces",
+    "differential_inverse_kinematics",
     "drive_forces",
     "energy",
     "friction_forces",
-    "set_valued_forces",
     "inverse_dynamics",
+    "inverse_kinematics",
+    "plan_motion",
+    "plan_path",
     "reactions",
-    "warn_of_balance",
+    "set_valued_forces",
     "unique_reactions",
+    "warn_of_balance",
 ]

@@ -46,7 +46,12 @@ class Tangents:
     @cached_property
     def position(self) -> np.ndarray:
         """N_q (n_v, k)."""
-        return _basis(self._slopes(np.eye(self.system.n_v), None)[0], self.held, self._units)
+        return _basis(self.position_rows, self.held, self._units)
+
+    @cached_property
+    def position_rows(self) -> np.ndarray:
+        """J (m, n_v)."""
+        return self._slopes(np.eye(self.system.n_v), None)[0]
 
     @cached_property
     def rate(self) -> np.ndarray:

@@ -6,14 +6,11 @@ from typing import Annotated
 import typer
 
 from gauss.cli import bench, docs, doctor, export, linkage, rotors, run, scenes, show, sweep
+from gauss.cli.common import group
 from gauss.errors import GaussError
 from gauss.versions import VERSION
 
-app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode="markdown",  # the default would swallow units in [brackets]
-    pretty_exceptions_enable=False,
-)
+app = group(pretty_exceptions_enable=False)
 
 for command in (
     run.run,

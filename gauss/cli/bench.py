@@ -9,14 +9,12 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.cli.common import Root, SceneName, load
+from gauss.cli.common import Root, SceneName, group, load
 from gauss.codegen.tiers import OPTIMISED, VARIABLE
 from gauss.errors import FileError
 
-bench = typer.Typer(help="Compare backends, and see where methods fail.", no_args_is_help=True, rich_markup_mode="markdown")
-problems = typer.Typer(
-    help="The quadratic programmes of mechanisms, for other solvers.", no_args_is_help=True, rich_markup_mode="markdown"
-)
+bench = group(help="Compare backends, and see where methods fail.")
+problems = group(help="The quadratic programmes of mechanisms, for other solvers.")
 
 Folder = Annotated[Path, typer.Option(help="Folder of the tables, the report and the charts.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what the tables in the folder already have.")]

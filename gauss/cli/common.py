@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 import gauss
 from gauss.errors import FileError, did_you_mean
@@ -38,7 +39,29 @@ Atol = Annotated[
         "COORDINATES,RATES instead of a number for two, e.g. wrist=1e-8,1e-6; may be repeated."
     ),
 ]
+LONGEST_SUMMARY = 1000  # characters of a command's summary: none is cut
 Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
+
+
+class CommandGroup(TyperGroup):
+    """Group of commands whose help lists each with the whole first sentence, not with what fits one line."""
+
+    def format_commands(self, ctx, formatter):
+        """Write names and summaries of the commands."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, found.get_short_help_str(LONGEST_SUMMARY)) for name, found in commands if found])
+
+
+def group(**settings: Any) -> typer.Typer:
+    """Typer of a group of commands; plain help: panels would cost the import of rich, and read [rad] as markup."""
+    return typer.Typer(
+        cls=CommandGroup,
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        context_settings={"max_content_width": 100},
+        **settings,
+    )
 
 
 def load(scene: str, root: str, read: list[str] | None = None):

@@ -7,6 +7,7 @@ import typer
 
 import gauss
 from gauss.cli.common import INTERRUPTED, as_far_as_it_came, view
+from gauss.errors import FileError, did_you_mean
 
 
 def linkage(
@@ -20,7 +21,14 @@ def linkage(
     speed: Annotated[float | None, typer.Option(help="Speed of the crank [rad/s]; that of the file when not given.")] = None,
     csv: Annotated[Path | None, typer.Option(help="Write torque, reactions and motion at every crank angle (.csv).")] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw the mechanism, torque, reactions and bearing forces (.png, .svg, .pdf).")
+        Path | None,
+        typer.Option(help="Draw the mechanism, torque, forces, transmission angles and coupler curves (.png, .svg, .pdf)."),
+    ] = None,
+    coupler: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Point LINK=X,Y of a link [m] whose curve is drawn by --plot and written by --csv; may be repeated."
+        ),
     ] = None,
     animation: Annotated[
         Path | None, typer.Option(help="Draw the turning mechanism (.gif, or .mp4 where ffmpeg is installed).")
@@ -33,24 +41,41 @@ def linkage(
     ] = None,
 ):
     """Analyse a planar linkage by its Assur groups: torque, reactions, work, quality of motion."""
-    from gauss.linkages import report, table  # other commands need no linkages
+    from gauss.linkages import coupler_curves, report, table  # other commands need no linkages
 
     mechanism = gauss.load_linkage(file)
     if speed is not None:
         mechanism.set_speed(speed)
     cycle = mechanism.cycle(mechanism.sweep(steps))
+    points = _points(coupler, [link.name for link in cycle.chain.links])
     typer.echo(report(mechanism, cycle))
     if fluctuation is not None:
         wheel = mechanism.flywheel(fluctuation)
         typer.echo(f"  flywheel       {wheel.inertia:.6g} kg m² for δ = {fluctuation:g}; ΔE = {wheel.excess_energy:.6g} J")
     if csv is not None:
-        typer.echo(f"table written to {gauss.io.write_csv(table(cycle), csv)}")
-    for path, draw in ((plot, "plot_linkage"), (animation, "animate_linkage")):
-        if path is not None:
-            getattr(view(), draw)(cycle, path)
-            typer.echo(f"{'figure' if path is plot else 'animation'} written to {path}")
+        typer.echo(f"table written to {gauss.io.write_csv(table(cycle) | coupler_curves(cycle, points), csv)}")
+    if plot is not None:
+        view().plot_linkage(cycle, plot, points)
+        typer.echo(f"figure written to {plot}")
+    if animation is not None:
+        typer.echo(f"animation written to {view().animate_linkage(cycle, animation)}")
     if run is not None:
         motion, interrupted = as_far_as_it_came(lambda: mechanism.run(run))
         typer.echo(f"run: {motion}")
         if interrupted:
             raise typer.Exit(INTERRUPTED)
+
+
+def _points(given: list[str] | None, links: list[str]) -> list[tuple[str, tuple[float, float]]]:
+    """Links and points of ``--coupler``."""
+    found = []
+    for entry in given or ():
+        link, _, place = entry.rpartition("=")
+        try:
+            x, y = (float(number) for number in place.split(","))
+        except ValueError:
+            raise FileError(f"--coupler {entry}: expected LINK=X,Y with two lengths [m], e.g. coupler=0.5,0.2.") from None
+        if link not in links:
+            raise FileError(f"--coupler {entry}: no link {link!r}. {did_you_mean(link, links)}")
+        found.append((link, (x, y)))
+    return found

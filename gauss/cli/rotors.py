@@ -24,7 +24,9 @@ def rotors(
     ] = None,
     method: Annotated[str, typer.Option(help="auto, dop853 (explicit) or radau (implicit, for stiff slips).")] = "auto",
     steady: Annotated[bool, typer.Option("--steady", help="Find all steady operating points at the end.")] = False,
-    modes: Annotated[bool, typer.Option("--modes", help="List torsional eigenfrequencies and modes.")] = False,
+    modes: Annotated[
+        bool, typer.Option("--modes", help="List torsional eigenfrequencies and modes in the state at the end.")
+    ] = False,
     explain: Annotated[bool, typer.Option("--explain", help="Say what the network is reduced to, in symbols.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw speeds, slips, torques and losses to this file.")] = None,
     network: Annotated[Path | None, typer.Option(help="Draw the network to this file (.png, .svg, .pdf).")] = None,
@@ -51,7 +53,7 @@ def rotors(
     if steady and not interrupted:
         typer.echo(package.steady_table(package.operating_points(given, duration), duration))
     if modes and not interrupted:
-        typer.echo(package.mode_table(package.eigenmodes(given)))
+        typer.echo(package.mode_table(package.eigenmodes(given, motion)))
     if plot is not None:
         view().plot_rotors(motion, plot)
         typer.echo(f"figure written to {plot}")

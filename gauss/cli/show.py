@@ -2,7 +2,7 @@
 
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -21,7 +21,9 @@ Shown = Annotated[
 
 def show(
     scene: Shown,
-    duration: Annotated[float, typer.Option(help="How long a scene is simulated [s]; 0 shows its start.", min=0.0)] = 5.0,
+    duration: Annotated[
+        float, typer.Option(help="How long a scene is simulated [s]; 0: it is posed by sliders.", min=0.0)
+    ] = 5.0,
     start: Annotated[list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE; may be repeated.")] = None,
     speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE; may be repeated.")] = None,
     root: Root = "fixed",
@@ -35,6 +37,10 @@ def show(
     trace: Annotated[
         list[str] | None, typer.Option(help="Body or frame that leaves a trace; may be repeated. Tips when not given.")
     ] = None,
+    beside: Annotated[
+        Path | None, typer.Option(help="Second motion, that `gauss run` wrote as .nc or .zarr, played beside the first.")
+    ] = None,
+    dark: Annotated[bool, typer.Option("--dark", help="Begin with the dark ground.")] = False,
     port: Annotated[int, typer.Option(help="Port of the viewer.", min=1, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
@@ -51,14 +57,16 @@ def show(
         thing = gauss.simulate(found, duration) if duration > 0 else found
     viewer = import_module("gauss.view.viewer")  # its library takes long to import
     joints = _joints(thing, reactions)
+    second = None if beside is None else gauss.load_motion(beside)
+    look: dict[str, Any] = {"visuals": visuals, "joints": joints, "traces": trace}
     if html is not None:
-        written = viewer.export_html(thing, html, visuals=visuals, joints=joints, traces=trace)
+        written = viewer.export_html(thing, html, beside=second, dark=dark, **look)
         typer.echo(f"viewer written to {written}")
     if film is not None:
-        typer.echo(f"film written to {viewer.export_film(thing, film, visuals=visuals, joints=joints, traces=trace)}")
+        typer.echo(f"film written to {viewer.export_film(thing, film, **look)}")
     if html is not None or film is not None:
         return
-    running = viewer.show(thing, visuals=visuals, joints=joints, traces=trace, port=port, browser=browser)
+    running = viewer.show(thing, beside=second, dark=dark, port=port, browser=browser, **look)
     typer.echo(f"{running.url} (Ctrl+C ends it)")
     running.wait()
 

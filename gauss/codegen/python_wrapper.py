@@ -8,7 +8,7 @@ from math import prod
 
 import numpy as np
 
-from gauss.errors import GaussError, StateError
+from gauss.errors import ArgumentError, GaussError, StateError
 
 CONVERTIBLE_KINDS = "biufO"  # kinds of numpy dtypes converted to float; complex would lose its imaginary part
 Shape = tuple[int, ...]
@@ -109,13 +109,15 @@ class PythonWrapper:
 
         Raises
         ------
+        ArgumentError
+            If an argument is missing, or there are too many.
         StateError
             If an argument cannot be converted or has the wrong shape.
         """
         try:
             bound = self.__signature__.bind(*args, **kwargs).arguments
         except TypeError as error:
-            raise TypeError(f"{self.__name__}{self.__signature__}: {error}.") from None
+            raise ArgumentError(f"{self.__name__}{self.__signature__}: {error}.") from None
         out, number = bound.get("out"), bound.get(self.interface.number, 0.0)
         names = self.interface.vectors.items()
         if self.batch is not None:

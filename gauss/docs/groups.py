@@ -75,6 +75,20 @@ GROUPS = (
         + _of("gauss", "motion_gradient MotionGradient"),
     ),
     Group(
+        "inverse_kinematics",
+        "Inverse kinematics and planned motions",
+        "States and rates for targets, with loops closed and limits kept; motions of coordinates within limits of speed and "
+        "acceleration. Guide: :doc:`/guides/arms`.",
+        _of("gauss", "inverse_kinematics differential_inverse_kinematics InverseKinematics PoseTarget PointTarget")
+        + _of("gauss", "DistanceTarget CenterOfMassTarget PostureTarget plan_motion plan_path PlannedMotion"),
+    ),
+    Group(
+        "identification",
+        "Identify parameters",
+        "Masses, centres of mass, inertias and friction from measured motions and forces, loops included.",
+        _of("gauss", "identify Identification base_parameters BaseParameters regressor Regressor"),
+    ),
+    Group(
         "view",
         "Look at a motion",
         "Figures of matplotlib, the viewer in the browser, self-contained pages and films. Needs the extra ``view``.",
@@ -140,20 +154,25 @@ ROOMS = (
     "gauss.codegen.kernels",
 )
 MADE_BY = {  # names that one seldom types, and what makes such objects: a public name, or a method
+    "gauss.BaseParameters": "gauss.base_parameters",
     "gauss.Body": ".body",
     "gauss.Constraint": ".constrain",
     "gauss.Coupling": ".couple",
     "gauss.Drive": ".drive",
     "gauss.Force": ".force",
     "gauss.Frame": ".frame",
+    "gauss.Identification": "gauss.identify",
     "gauss.Joint": ".revolute",
     "gauss.JointSpring": ".joint_spring",
     "gauss.Spring": ".spring",
     "gauss.Start": ".start",
     "gauss.Compulsion": "gauss.assemble",
+    "gauss.InverseKinematics": "gauss.inverse_kinematics",
     "gauss.LinearModel": "gauss.linearise",
     "gauss.LinearModes": ".modes",
     "gauss.MotionGradient": "gauss.motion_gradient",
+    "gauss.PlannedMotion": "gauss.plan_motion",
+    "gauss.Regressor": "gauss.regressor",
     "gauss.Sensitivities": "gauss.sensitivities",
     "gauss.Solution": "gauss.solve",
     "gauss.State": ".initial_state",

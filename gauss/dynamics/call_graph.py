@@ -2,8 +2,8 @@
 
 Kernels of links and loops are traced once for each kind; the work grows with their number. The unit wrench of every row is
 carried inward along its branches, and u is its force on a joint of the branch: rows of loops that share no branch are
-uncoupled in S. S + μ is factored block by block, LDLᵀ, loops of least degree first: where few loops share a branch the
-factor has few blocks per loop.
+uncoupled in S. The unit forces of couplings act along joints, and are carried inward likewise. S + μ is factored block by
+block, LDLᵀ, loops of least degree first: where few loops share a branch the factor has few blocks per loop.
 """
 
 from collections.abc import Callable
@@ -12,6 +12,7 @@ import numpy as np
 
 from gauss.codegen.kernels import BlockLDLT, CallRecorder, Operand
 from gauss.dynamics.constrained_aba import MU
+from gauss.dynamics.coupling_calls import CouplingCalls
 from gauss.dynamics.link_frames import joint_sides, link_frames
 from gauss.dynamics.link_kernels import (
     acceleration,
@@ -38,7 +39,7 @@ class CallGraph:
     Parameters
     ----------
     subsystem : Subsystem
-        One without couplings, relations and gear trains.
+        One without relations and gear trains.
     recorder : CallRecorder
         Recorder of the calls.
     q, v : ndarray
@@ -56,6 +57,7 @@ class CallGraph:
         for index, axis in subsystem.redundant:
             left_out[index].append(axis)
         self.loops = {index: LoopJointKind(subsystem.joints[index], left_out[index]) for index in subsystem.loop_joints}
+        self.couplings = CouplingCalls(subsystem, recorder)
         self._classify(links)
         self._factor()
 
@@ -161,16 +163,36 @@ class CallGraph:
             )
             self.held[index] = {joint.parent: on_parent, joint.child: on_child}
             self.free[index] = {joint.parent: free_parent, joint.child: free_child}
+        sizes = [scale.shape[0] for scale in self.scale.values()]
+        ends = np.cumsum([0, *sizes], dtype=int)
+        self.rows = {i: np.arange(end - m, end) for i, m, end in zip(self.loops, sizes, ends[1:], strict=True)}
+        self.rows |= {block: ends[-1] + members for block, members in self.couplings.members.items()}
+        self.scale |= self.couplings.scale
+
+    def _unit_forces(self):
+        """Unit wrenches (6, m) on links, and unit forces along joints of the tree, {body: (1, m)}, of each block of rows."""
+        for index, wrenches in self.held.items():
+            yield index, wrenches, {}
+        outer = {edge.constraint: edge.outer for edge in self.edges}
+        for block, along in self.couplings.unit_forces.items():
+            wrenches, forces = {}, {outer[joint]: own for joint, own in along.items() if joint in outer}
+            for joint in along.keys() - outer.keys():
+                for body, free in self.free[joint].items():
+                    (more,) = self.recorder.call("along loop joint", lambda free, own: (free @ own,), free, along[joint])
+                    wrenches[body] = self._sum(wrenches[body], more) if body in wrenches else more
+            none = self.couplings.no_wrenches[len(self.couplings.members[block])]
+            yield block, {body: none for body in forces} | wrenches, forces
 
     def _delassus(self):
-        """Blocks of S: unit wrenches of each loop, carried inward along its branches."""
+        """Blocks of S: unit wrenches of each block of rows, carried inward along its branches."""
         joint_forces: dict[int, list] = {body: [] for body in self.order}
-        for index, wrenches in self.held.items():
+        for index, wrenches, forces in self._unit_forces():
             waiting = {body: wrench for body, wrench in wrenches.items() if body >= 0 and wrench.shape[1]}
             while waiting:
                 body = max(waiting, key=self.order.__getitem__)
-                across = *self.kinematics[body], *self.eliminated[body][:2]
-                u, onward = self._inward("carry row", body, row_inward, *across, waiting.pop(body))
+                across, wrench = (*self.kinematics[body], *self.eliminated[body][:2]), waiting.pop(body)
+                along = forces.get(body, np.zeros((self.joint[body].pair.n_v, wrench.shape[1])))
+                u, onward = self._inward("carry row", body, row_inward, *across, wrench, along)
                 joint_forces[body].append((index, u))
                 inner = self.inner[body]
                 if inner >= 0:
@@ -199,12 +221,11 @@ class CallGraph:
 
     def multipliers(self, residual, mu: float = MU) -> np.ndarray:
         """Record (S + μ 1)⁻¹ residual, with scaled rows; μ is MU, or that of :meth:`factor_damped`."""
-        found = self.factors[mu].solve({i: part for i, part in self._rows_of(residual).items() if part.size})
-        return self._joined(found[index] for index in self.loops if index in found)
+        return self._joined(self.factors[mu].solve({i: part for i, part in self._rows_of(residual).items() if part.size}))
 
     def motion(self, tau, multipliers, still: bool) -> tuple[np.ndarray, np.ndarray]:
         """Record joint accelerations (n_v,) under forces, and the residual of the scaled rows; still: by forces alone."""
-        nothing = np.zeros(6)
+        nothing, tau = np.zeros(6), self.couplings.less_forces(tau, self._rows_of(multipliers))
         forces = self._with_loop_forces(
             {body: nothing if still else self.gyro[body] for body in self.order}, tau, multipliers
         )
@@ -229,6 +250,7 @@ class CallGraph:
     def residual(self, rates, multipliers, tau) -> tuple[np.ndarray, np.ndarray]:
         """Record the residuals of the equations of motion (n_v,), by inverse dynamics, and of the scaled rows."""
         accelerations = self._accelerations(rates, still=False)
+        tau = self.couplings.less_forces(tau, self._rows_of(multipliers))
         forces = self._with_loop_forces({body: np.zeros(6) for body in self.order}, tau, multipliers)
         residual = self._none()
         for edge in reversed(self.edges):
@@ -248,13 +270,11 @@ class CallGraph:
             residual[place] = self.recorder.array(own)
             if inner >= 0:
                 forces[inner] = onward
-        return residual, self._values(self._none(), accelerations, still=False)
+        return residual, self._values(self._along_tree(rates), accelerations, still=False)
 
     def velocity_residual(self) -> tuple[np.ndarray, np.ndarray]:
         """Record rates (n_v,) with dependent ones of loop joints, and the velocity residual of the scaled rows."""
-        rates = self._none()
-        for joint in self.joint.values():
-            rates[joint.v] = self.v[joint.v]
+        rates = self._along_tree(self.v)
         return rates, self._values(rates, self._accelerations(self.v, still=True), still=True)
 
     def loop_residual(self) -> tuple[np.ndarray, np.ndarray]:
@@ -263,18 +283,18 @@ class CallGraph:
         for edge in self.edges:
             body = edge.outer
             (poses[body],) = self._at_link("pose", body, pose, self._own(self.q, body), poses[edge.inner])
-        residuals, off = {}, self._none()
+        residuals, off = self.couplings.position_residuals(self.q), self._none()
         for index in self.loops:
             joint = self.subsystem.joints[index]
             here = poses[joint.parent], poses[joint.child]
             residuals[index], along = self._at_loop("gap", index, LoopJointKind.position_residual, self.q[joint.q], *here)
             off[joint.v] = self.recorder.array(along)
-        return self._joined(residuals.values()), off
+        return self._joined(residuals), off
 
     @property
     def scales(self) -> np.ndarray:
         """Factors of the rows."""
-        return self._joined(self.scale.values())
+        return self._joined(self.scale)
 
     def _accelerations(self, rates, still: bool):
         nothing = np.zeros(6)
@@ -307,29 +327,37 @@ class CallGraph:
 
     def _values(self, rates, accelerations, still: bool):
         """Record the left sides of the rows; rates of loop joints are added to ``rates``."""
-        values, turning = [], {body: np.zeros(3) for body in self.omega} if still else self.omega
+        values, turning = {}, {body: np.zeros(3) for body in self.omega} if still else self.omega
         for index in self.loops:
             joint = self.subsystem.joints[index]
             ends = joint.parent, joint.child
             motions = *(turning[body] for body in ends), *(accelerations[body] for body in ends), accelerations[GROUND]
             function = _value_still if still else _value
-            value, own = self._at_loop(
+            values[index], own = self._at_loop(
                 f"value {still}", index, function, self.q[joint.q], self.v[joint.v], self.scale[index], *motions
             )
             rates[joint.v] = self.recorder.array(own)
-            values.append(value)
-        return self._joined(values)
+        return self._joined(values | self.couplings.values(rates))
 
-    def _joined(self, blocks) -> np.ndarray:
-        """Object array of all entries of vectors."""
-        return np.concatenate([np.zeros(0, dtype=object), *(self.recorder.array(self._block(block)) for block in blocks)])
+    def _joined(self, blocks: dict) -> np.ndarray:
+        """Object array (m,) of all rows, given by blocks."""
+        found = np.zeros(sum(map(len, self.rows.values()))).astype(object)
+        for index, block in blocks.items():
+            found[self.rows[index]] = self.recorder.array(self._block(block))
+        return found
 
     def _block(self, vector):
         return vector if isinstance(vector, Operand) else self.recorder.operand(vector)
 
     def _rows_of(self, vector) -> dict[int, np.ndarray]:
-        ends = np.cumsum([scale.shape[0] for scale in self.scale.values()], dtype=int)
-        return {i: vector[end - scale.shape[0] : end] for (i, scale), end in zip(self.scale.items(), ends, strict=True)}
+        return {index: vector[rows] for index, rows in self.rows.items()}
+
+    def _along_tree(self, rates) -> np.ndarray:
+        """Rates (n_v,) of joints of the tree alone."""
+        found = self._none()
+        for joint in self.joint.values():
+            found[joint.v] = rates[joint.v]
+        return found
 
     def _none(self) -> np.ndarray:
         return np.zeros(self.subsystem.n_v).astype(object)

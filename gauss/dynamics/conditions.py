@@ -4,6 +4,7 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 
 from gauss.codegen import callbacks_are_available
@@ -20,6 +21,7 @@ LARGE_TREE_BODIES = (
     40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
 )
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
+MOST_COUPLING_WORK = 10_000  # operations for couplings above which kernels are as fast, and compiled in a fifth of the time
 MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops are slower
 WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
@@ -49,10 +51,10 @@ def is_large(system) -> bool:
 def has_large_loops(system) -> bool:
     """Whether the compiled dynamics are a call graph of kernels of links and loops, instead of straight-line code."""
     subsystems = system.subsystems
-    bound = any(subsystem.couplings or subsystem.relations or subsystem.trains for subsystem in subsystems)
-    if bound or not any(subsystem.loop_joints for subsystem in subsystems):
+    bound = any(subsystem.relations or subsystem.trains for subsystem in subsystems)
+    if bound or not any(subsystem.loop_joints or subsystem.couplings for subsystem in subsystems):
         return False
-    if system.n_v <= WIDE and _loop_work(subsystems) <= MOST_WORK:
+    if system.n_v <= WIDE and _loop_work(subsystems) <= MOST_WORK and _coupling_work(subsystems) <= MOST_COUPLING_WORK:
         return False
     return sum(subsystem.shared_joints for subsystem in subsystems) <= MOST_SHARED_JOINTS * _n_bodies(subsystems)
 
@@ -75,6 +77,12 @@ def _limits_and_losses(scene) -> list[str]:
 
 def _loop_work(subsystems) -> int:
     return sum(subsystem.loop_elimination_work for subsystem in subsystems)
+
+
+def _coupling_work(subsystems) -> int:
+    """Work of the couplings alone."""
+    coupled = [subsystem for subsystem in subsystems if subsystem.couplings]
+    return _loop_work(coupled) - _loop_work([replace(subsystem, couplings=()) for subsystem in coupled])
 
 
 def _n_bodies(subsystems) -> int:
@@ -206,7 +214,7 @@ def takes_pair_kernels(ask: Question) -> list[str]:
         found.append("it was built without machine code")
     n_v = system.n_v
     found += [f"{n_v} rates beside contacts are more than {WIDEST_MECHANISM}"] if n_v > WIDEST_MECHANISM else []
-    return found + (["a constraint depends on the time"] if system.relations.asks_time else [])
+    return found
 
 
 def are_free_in_contact(system: System) -> bool:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import LDLT, as_number, entered
-from gauss.dynamics.aba import ArticulatedBody
+from gauss.dynamics.aba import ArticulatedBody, InwardForces
 from gauss.dynamics.coupling_constraints import Couplings, RelationRows
 from gauss.dynamics.loop_joints import LoopJoint
 from gauss.dynamics.rnea import KinematicTree
@@ -92,18 +92,24 @@ class ConstrainedArticulatedBody:
         return self
 
     @cached_property
-    def responses(self) -> list:
-        """Accelerations M⁻¹ Kᵀ of joints and links under a unit multiplier of each row."""
-        return [self.articulated.response(tau, self._with_loop_forces(wrenches, tau)) for wrenches, tau in self.unit_forces]
+    def joint_forces(self) -> list[dict[int, np.ndarray]]:
+        """Joint forces u of the inward recursion under a unit multiplier of each row, by the first body of each cluster."""
+        inward = self.articulated.inward_response
+        return [inward(tau, self._with_loop_forces(wrenches, tau)).u for wrenches, tau in self.unit_forces]
 
     @cached_property
     def S(self) -> np.ndarray:
-        """K M⁻¹ Kᵀ of the scaled rows."""
-        rows = np.array([self._rows(rates, links, still=True) for rates, links in self.responses]).T
-        S = np.zeros(rows.shape, dtype=object)
-        for i, row in enumerate(rows):
-            others = np.flatnonzero(row != 0)  # sparse: most loops share no branch
-            S[i, others] = self.scale[i] * row[others] * self.scale[others]
+        """K M⁻¹ Kᵀ = Σ u D⁻¹ uᵀ of the scaled rows, over the joints."""
+        m, eliminations = len(self.joint_forces), self.articulated.eliminations
+        S = np.zeros((m, m), dtype=object)
+        for i, one in enumerate(self.joint_forces):
+            rates = {body: eliminations[body].D_inverse @ u for body, u in one.items()}
+            for j, other in enumerate(self.joint_forces[: i + 1]):
+                shared = [
+                    rates[body] @ u for body, u in other.items() if body in rates
+                ]  # sparse: most loops share no branch
+                if shared:
+                    S[i, j] = S[j, i] = self.scale[i] * sum(shared) * self.scale[j]
         return S
 
     @cached_property
@@ -128,9 +134,8 @@ class ConstrainedArticulatedBody:
         feedback : BaumgarteFeedback, optional
             Stabilisation.
         """
-        rates, accelerations = self.articulated.motion(tau, self._external_wrenches(tau, forces))
-        target = 0.0 if feedback is None else feedback.rows
-        found, multipliers = self._constrained(rates, accelerations, still=False, target=target)
+        inward = self.articulated.inward_motion(tau, self._external_wrenches(tau, forces))
+        found, multipliers = self._constrained(inward, still=False, target=0.0 if feedback is None else feedback.rows)
         return found if feedback is None else found + feedback.rates, multipliers
 
     def velocity_residual(self) -> np.ndarray:
@@ -179,13 +184,15 @@ class ConstrainedArticulatedBody:
 
     def response(self, tau, target) -> tuple[np.ndarray, np.ndarray]:
         """Rates (n_v,) x and multipliers y with M x + Kᵀ y = tau and K x = target."""
-        rates, accelerations = self.articulated.response(tau, self._with_loop_forces({}, tau))
-        return self._constrained(rates, accelerations, still=True, target=target)
+        inward = self.articulated.inward_response(tau, self._with_loop_forces({}, tau))
+        return self._constrained(inward, still=True, target=target)
 
     def released(self, tau, multipliers) -> np.ndarray:
         """Rates (n_v,) x with M x + Kᵀ y = tau for given multipliers y."""
-        rates, accelerations = self.articulated.response(tau, self._with_loop_forces({}, tau))
-        return self._all_rates(*self.under_multipliers(rates, accelerations, multipliers), still=True)
+        inward = self.articulated.inward_response(tau, self._with_loop_forces({}, tau))
+        return self._all_rates(
+            *self.articulated.outward_recursion(inward.plus(self._reaction_forces(multipliers))), still=True
+        )
 
     def determined(self, multipliers) -> np.ndarray:
         """Multipliers without their part along redundant rows, which is undetermined: S (S + ν)⁻¹ y if scaled."""
@@ -214,7 +221,11 @@ class ConstrainedArticulatedBody:
 
     def nearest(self, v, target) -> np.ndarray:
         """Rates x (n_v,) nearest to v in the mass metric with K x = target."""
-        return self._constrained(self._by_joint(v), self.tree.carried(v), still=True, target=target)[0]
+        rates, accelerations = self._by_joint(v), self.tree.carried(v)
+        if self.unit_forces:
+            multipliers = self._multipliers(rates, accelerations, still=True, target=target)
+            rates, accelerations = self.under_multipliers(rates, accelerations, multipliers)
+        return self._all_rates(rates, accelerations, still=True)
 
     def position_correction(self, phi, slack) -> np.ndarray:
         """Newton step (n_v,), the least in the mass metric, on the position residual.
@@ -233,12 +244,23 @@ class ConstrainedArticulatedBody:
 
     def under_multipliers(self, rates, accelerations, multipliers) -> tuple[dict, dict]:
         """Accelerations of tree joints and of links with the constraint forces −Kᵀ y added."""
-        rates, accelerations = dict(rates), dict(accelerations)
-        for multiplier, (more_rates, more) in zip(multipliers, self.responses if self.unit_forces else (), strict=True):
-            for total, change in ((rates, more_rates), (accelerations, more)):
-                for key, own in change.items():
-                    total[key] = total.get(key, 0.0) - multiplier * own
-        return rates, accelerations
+        found = dict(rates), dict(accelerations)
+        for total, change in zip(
+            found,
+            self.articulated.outward_recursion(InwardForces(self._reaction_forces(multipliers), {}, None)),
+            strict=True,
+        ):
+            for key, own in change.items():
+                total[key] = total[key] + own if key in total else own
+        return found
+
+    def _reaction_forces(self, multipliers) -> dict[int, np.ndarray]:
+        """Joint forces u of the inward recursion under the constraint forces −Kᵀ y."""
+        found: dict[int, np.ndarray] = {}
+        for multiplier, forces in zip(multipliers, self.joint_forces if self.unit_forces else (), strict=True):
+            for body, u in forces.items():
+                found[body] = found[body] - multiplier * u if body in found else -multiplier * u
+        return found
 
     def _less_constraint_forces(self, tau, wrenches: dict, multipliers) -> np.ndarray:
         """Generalised forces less the constraint forces Kᵀ y; their wrenches on links are subtracted in place."""
@@ -263,15 +285,19 @@ class ConstrainedArticulatedBody:
                     add_to(wrenches, loop_joint.wrench(direction), force)
         return wrenches
 
-    def _constrained(self, rates, accelerations, still: bool, target):
+    def _constrained(self, inward: InwardForces, still: bool, target):
         """Joint accelerations (n_v,) that meet the loop constraints, and the multipliers."""
-        multipliers = np.zeros(0)
+        multipliers, (rates, accelerations) = np.zeros(0), self.articulated.outward_recursion(inward)
         if self.unit_forces:
-            residual = self._rows(rates, accelerations, still) - target
-            multipliers = self.scale * self._multipliers(self.scale * residual)
-        return self._all_rates(*self.under_multipliers(rates, accelerations, multipliers), still), multipliers
+            multipliers = self._multipliers(rates, accelerations, still, target)
+            rates, accelerations = self.articulated.outward_recursion(inward.plus(self._reaction_forces(multipliers)))
+        return self._all_rates(rates, accelerations, still), multipliers
 
-    def _multipliers(self, residual):
+    def _multipliers(self, rates, accelerations, still: bool, target):
+        """Multipliers of the constraint forces that accelerations without them need to meet the loop constraints."""
+        return self.scale * self._proximal(self.scale * (self._rows(rates, accelerations, still) - target))
+
+    def _proximal(self, residual):
         """Proximal iterations for S y = residual."""
         y, columns = self.factor.solve(residual), [np.flatnonzero(row != 0) for row in self.S]
         for _ in range(ITERATIONS - 1):

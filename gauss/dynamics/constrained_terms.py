@@ -63,6 +63,10 @@ class ConstrainedTerms(StateTerms):
         found = mechanism.dependent_accelerations(found)
         return found - self.null_space @ found[self.independent]
 
+    def allowed_acceleration(self, acceleration) -> np.ndarray:
+        """N ÿ + b (n_v,), with ÿ the accelerations of the independent coordinates."""
+        return self.null_space @ acceleration[self.independent] + self.null_space_bias
+
     @cached_property
     def bias_forces(self) -> np.ndarray:
         """Nᵀ (h + M b) (k,)."""

@@ -50,8 +50,12 @@ def projected(system: System, state: State) -> State:
     state = within_limits(system, state)
     if not system.has_closures:
         return state
-    residual = cached(system, (_residual,), lambda: _residual(system))
-    return state if residual(state) <= RESIDUAL_ROUNDOFF else consistent(system, state)
+    return state if constraint_residual(system, state) <= RESIDUAL_ROUNDOFF else consistent(system, state)
+
+
+def constraint_residual(system: System, state: State) -> float:
+    """Constraint residual of a state, in position and velocity, relative to the sizes of the constraints."""
+    return float(cached(system, (_residual,), lambda: _residual(system))(state))
 
 
 def _residual(system: System) -> TieredFunction:

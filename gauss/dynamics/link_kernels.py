@@ -47,12 +47,12 @@ def _flat(inertia) -> np.ndarray:
     return np.concatenate([A[UPPER], B.ravel(), C[UPPER]])
 
 
-def row_inward(link, pair, forward, R, p, S, U, D_inverse, wrenches):
-    """Joint forces u (k, m) of wrenches (6, m) on the link, and the wrenches passed on to the inner link."""
+def row_inward(link, pair, forward, R, p, S, U, D_inverse, wrenches, forces):
+    """Joint forces u (k, m) of wrenches (6, m) on the link and forces (k, m) along the joint; wrenches on the inner link."""
     kin, eliminated = _kinematics(R, p, S), Elimination(U, D_inverse, (np.zeros((3, 3)),) * 3)
     joint_forces, onward = [], []
-    for wrench in wrenches.T:
-        u, passed = force_inward(kin, eliminated, -wrench, np.zeros(6), np.zeros(pair.n_v))
+    for wrench, tau in zip(wrenches.T, forces.T, strict=True):
+        u, passed = force_inward(kin, eliminated, -wrench, np.zeros(6), tau)
         joint_forces.append(u)
         onward.append(-force_to_inner(link, kin, passed))
     return np.array(joint_forces, dtype=object).T, np.array(onward, dtype=object).T

@@ -73,6 +73,11 @@ def _(load: Drive, laws, motion: Kinematics, applied: Applied):
     effort = _evaluate(laws[0], motion, f"drive {load.name!r}", joint.pair.n_v)
     if load.limit is not None:
         effort = math.clip(effort, -load.limit, load.limit)
+    if joint.pair.n_v == 1:  # the usual case, without arrays
+        column = joint.v.start
+        applied.P[column] += effort[0]
+        applied.driven += effort[0] * motion.state.v[column]
+        return
     applied.P[joint.v] += effort
     applied.driven += effort @ motion.state.v[joint.v]
 

@@ -13,6 +13,7 @@ from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_
 from gauss.dynamics.acceleration_derivatives import acceleration_derivatives, inverse_dynamics_derivatives
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
+from gauss.dynamics.inertial_regressor import STANDARD, inertial_regressor
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import inverse_dynamics, loop_constraint_scales, loop_constraints, loop_residual
 from gauss.dynamics.mobility import mobility
@@ -55,7 +56,7 @@ class Term(NamedTuple):
         Its arguments, of q, v, a (acceleration), l (load).
     shapes : tuple of str
         Shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints; p: values
-        of the parameter.
+        of the parameter; i: standard inertial parameters of all bodies.
     trace : callable
         (terms, request, acceleration or load) → its results.
     of_frame, has_reference, is_reduced, has_loads, of_parameter : bool
@@ -117,6 +118,7 @@ TERMS = {
     "momentum_matrix": Term("q", ("6v",), lambda terms, *_: terms.momentum_matrix),
     "kinetic_energy": Term("qv", ("",), lambda terms, *_: terms.kinetic_energy),
     "potential_energy": Term("q", ("",), lambda terms, *_: terms.potential_energy),
+    "inertial_regressor": Term("qva", ("vi",), lambda terms, _, given: inertial_regressor(terms, given)),
     "null_space": Term("q", ("Vv",), lambda terms, *_: terms.null_space),
     "inverse_dynamics": Term("qva", ("V",), _inverse_dynamics, is_reduced=False, has_loads=True),
     "inverse_dynamics_derivatives": Term(
@@ -336,6 +338,7 @@ def _traced(term: Term, terms: StateTerms, one: Request, arguments: dict):
 def _shapes(system: System, requests, columns) -> tuple[tuple[int, ...], ...]:
     """Shapes of the results of requests."""
     sizes = {"V": system.n_v, "v": system.n_v if columns is None else len(columns), "r": whole(system).n_loop_constraints}
+    sizes["i"] = len(STANDARD) * system.structure.n_bodies
     shapes = [(one, shape) for one in requests for shape in TERMS[one.name].shapes]
 
     def length(one: Request, letter: str) -> int:

@@ -18,7 +18,7 @@ from gauss.dynamics.aba import add, inertia_to_inner
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.rnea import KinematicTree, apply, force_to_inner
 from gauss.rotations import cross, skew
-from gauss.system import State, System, coordinate_rates, whole
+from gauss.system import PlacedFrame, State, System, coordinate_rates, whole
 
 REFERENCES = ("local_world_aligned", "world", "local")
 
@@ -128,9 +128,17 @@ class StateTerms:
     def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Rotation (3, 3) to world and origin (3,) of a body frame or named frame."""
         placed = self.system.frame(frame)
-        R, p, link = *self.still.poses[placed.body], self.still.links[placed.body]
-        turn = rotations.clean(link.R_central.T @ placed.R)
-        return R @ turn, p + R @ (link.R_central.T @ (placed.p - link.p_central))
+        (R, p), (turn, offset) = self.still.poses[placed.body], self.in_link_frame(placed)
+        return R @ turn, p + R @ offset
+
+    def in_link_frame(self, placed: PlacedFrame) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation (3, 3) and origin (3,) of a frame in the link frame of its body: constants."""
+        link = self.still.links[placed.body]
+        return rotations.clean(link.R_central.T @ placed.R), link.R_central.T @ (placed.p - link.p_central)
+
+    def allowed_acceleration(self, acceleration) -> np.ndarray:
+        """Accelerations (n_v,) of all joints that the constraints allow."""
+        return acceleration
 
     def jacobian(self, frame: str, reference: str) -> np.ndarray:
         """Jacobian J (6, n_v): angular and linear velocity of a frame, J v; see ``REFERENCES``."""

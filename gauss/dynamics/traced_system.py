@@ -32,6 +32,7 @@ from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.shared_elimination import SharedElimination
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.train_coordinates import on_trains
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
 
@@ -327,6 +328,10 @@ class Program:
         point = self.layout.point(x)
         state, rates, (_, residual) = self.on_constraints(point.state)
         return self.layout.pack(Point(state, point.work, rates, point.method_state)), [residual]
+
+    def on_trains(self, state: State) -> State:
+        """State after a step whose gear trains follow their first joints, where states are projected."""
+        return on_trains(self.system, state) if self.drift.projects else state
 
     def projection(self) -> Function | None:
         """Function of a point → (projected point, position residual); None where nothing is projected."""

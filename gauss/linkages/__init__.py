@@ -10,7 +10,7 @@ cycle of crank angles is one call::
 from gauss.arguments import named_arguments, named_methods
 from gauss.linkages.balancing import shaking
 from gauss.linkages.chain import Chain, Dyad, Triad
-from gauss.linkages.columns import table
+from gauss.linkages.columns import coupler_curves, table
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.cycles import cycle
 from gauss.linkages.dynamics import CrankRun, ReducedLinkage, run
@@ -36,6 +36,7 @@ __all__ = [
     "PlanarLink",
     "ReducedLinkage",
     "Triad",
+    "coupler_curves",
     "cycle",
     "cycle_kernel",
     "kinetic",

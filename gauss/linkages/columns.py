@@ -41,3 +41,26 @@ def table(found: Cycle) -> dict[str, np.ndarray]:
         columns[f"transmission angle of {name} [rad]"] = mu
     force, moment = shaking(found)
     return columns | {"shaking force x [N]": force[:, 0], "shaking force y [N]": force[:, 1], "shaking moment [N m]": moment}
+
+
+def coupler_curves(found: Cycle, points) -> dict[str, np.ndarray]:
+    """Columns (k,) of the curves of points of links.
+
+    Parameters
+    ----------
+    found : Cycle
+        The cycle.
+    points : iterable of (str, array_like (2,))
+        Links and points of them, in their frames [m].
+
+    Returns
+    -------
+    dict
+        Columns (k,) by name and unit.
+    """
+    columns: dict[str, np.ndarray] = {}
+    for link, point in points:
+        z = found.link(link).point(complex(*point)) + np.zeros(len(found))
+        name = f"{link} ({point[0]:g}, {point[1]:g})"
+        columns |= {f"{name} x [m]": z.real, f"{name} y [m]": z.imag}
+    return columns

@@ -28,12 +28,12 @@ def report(motion: RotorMotion) -> str:
         repr(motion),
         f"  {stats.steps} steps, {stats.evaluations} evaluations ({how}), {stats.wall_time:.3g} s",
         "",
-        f"  {'shaft':20} {'speed at the end':>18} {'fastest':>14} {'at the end':>12}",
+        f"  {'shaft':20} {'speed at the end':>18} {'fastest':>14}",
     ]
     for j, name in enumerate(reduced.names[:LISTED]):
         fastest = motion.speeds[np.abs(motion.speeds[:, j]).argmax(), j]
-        state = "stuck" if motion.stuck[-1, j] else ""
-        lines.append(f"  {name:20} {motion.speeds[-1, j]:12.6g} rad/s {fastest:8.5g} rad/s {state:>12}")
+        stuck = "  stuck at rest" if motion.stuck[-1, j] else ""
+        lines.append(f"  {name:20} {motion.speeds[-1, j]:12.6g} rad/s {fastest:8.5g} rad/s{stuck}")
     lines += _more(reduced.names)
     lines += [
         "",
@@ -122,7 +122,7 @@ def mode_table(modes: Modes) -> str:
         Lines to be printed.
     """
     shown = modes.names[:LISTED]
-    lines = ["", "torsional modes", f"  {'f [Hz]':>10}  amplitudes"]
+    lines = ["", f"torsional modes, {modes.state}", f"  {'f [Hz]':>10}  amplitudes"]
     for frequency, shape in zip(modes.frequencies[:LISTED], modes.shapes.T, strict=False):
         amplitudes = "  ".join(f"{name} {value:+.3f}" for name, value in zip(shown, shape, strict=False))
         lines.append(f"  {frequency:10.5g}  {amplitudes}")

@@ -167,7 +167,7 @@ class Surfaces:
 
 
 def _peaks(changes: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """Subintervals (…, PARTS) of steep flanks of a peak that samples meet by chance: stages may lie beside it."""
+    """Subintervals (…, PARTS) on which a peak rises or falls that samples meet by chance: stages may lie beside it."""
     rises, falls = changes > allowed, changes < -allowed
     return (rises | falls) & rises.any(axis=1, keepdims=True) & falls.any(axis=1, keepdims=True)
 

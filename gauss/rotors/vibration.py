@@ -3,18 +3,20 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+from scipy.linalg import eigh, null_space
 
 from gauss.errors import SceneError
 from gauss.rotors.contract import reduce
 from gauss.rotors.links import GearPair, TorsionSpring
 from gauss.rotors.mechanics import NetworkEquations
 from gauss.rotors.mode import Mode, indicate
+from gauss.rotors.motion import RotorMotion
 from gauss.rotors.network import Network
 from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import ReducedNetwork, active
 
 RIGID_FREQUENCY = 1e-6  # relative to the highest: below it is a rigid motion, the root of the rounding of its square
+NO_SLIP = 1e-9  # slip, relative to the speed: below it a link sticks
 LINEAR_SLIP = 1e-6  # slip within which a curve is straight
 OSCILLATING_PART = 1e-6  # imaginary part, relative to the largest eigenvalue
 
@@ -31,22 +33,28 @@ class Modes:
         [Hz].
     shapes : ndarray, shape (n, m)
         Amplitudes of the shafts, the largest of each mode 1.
+    state : str
+        State that they are linearised in.
     """
 
     names: tuple
     frequencies: np.ndarray
     shapes: np.ndarray
+    state: str = "friction drives and clutches open"
 
 
-def eigenmodes(network: Network) -> Modes:
+def eigenmodes(network: Network, at: RotorMotion | None = None) -> Modes:
     """Torsional eigenfrequencies and modes: K φ = (2 π f)² M φ in the coordinates of the groups.
 
-    Gears are ideal, backlash is closed, friction drives and clutches transmit nothing.
+    Gears are ideal, backlash is closed. Friction drives and clutches transmit nothing, except those that stick at the end of
+    a given motion: they bind their shafts, as do shafts stuck at rest.
 
     Parameters
     ----------
     network : Network
         The network.
+    at : RotorMotion, optional
+        Motion of the network, at the end of which the modes are found.
 
     Returns
     -------
@@ -55,12 +63,44 @@ def eigenmodes(network: Network) -> Modes:
     """
     reduced = reduce(network)
     M = np.diag(np.bincount(reduced.group, reduced.inertia * reduced.K**2, reduced.n_groups))
-    squares, shapes = eigh(stiffness(reduced), M)
+    stiff, state = stiffness(reduced), Modes.state
+    if at is None:
+        squares, shapes = eigh(stiff, M)
+    else:
+        rows, state = _bound(at)
+        free = null_space(rows) if len(rows) else np.eye(len(M))
+        squares, shapes = eigh(free.T @ stiff @ free, free.T @ M @ free)
+        shapes = free @ shapes
     shapes = reduced.K[:, None] * shapes[reduced.group]
     frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
     frequencies[frequencies <= RIGID_FREQUENCY * frequencies.max(initial=0.0)] = 0.0
     peaks = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
-    return Modes(reduced.names, frequencies, shapes / peaks)
+    return Modes(reduced.names, frequencies, shapes / peaks, state)
+
+
+def _bound(at: RotorMotion) -> tuple[np.ndarray, str]:
+    """Rows (m, n_g) of the speeds of the groups that vanish at the end of a motion, and the state in words."""
+    reduced, rows = at.reduced, []
+    stuck, sticking, open_links = at.stuck[-1], [], []
+    for g in dict.fromkeys(reduced.group[stuck]):
+        rows.append(np.eye(reduced.n_groups)[g])
+    for b, link in enumerate(reduced.links):
+        if isinstance(link, GearPair | TorsionSpring):
+            continue
+        p, d = reduced.driver[b], reduced.driven[b]
+        ahead, behind = at.speeds[-1, p], reduced.ratio[b] * at.speeds[-1, d]
+        if abs(ahead - behind) <= NO_SLIP * max(abs(ahead), abs(behind), reduced.v_0) and at.torques[-1, b] != 0.0:
+            row = np.zeros(reduced.n_groups)
+            row[reduced.group[p]] += reduced.K[p]
+            row[reduced.group[d]] -= reduced.ratio[b] * reduced.K[d]
+            rows.append(row)
+            sticking.append(link.name)
+        else:
+            open_links.append(link.name)
+    shafts = [name for name, held in zip(reduced.names, stuck, strict=True) if held]
+    parts = {"sticking": sticking, "slipping or open": open_links, "stuck at rest": shafts}
+    said = [f"{what}: {', '.join(names)}" for what, names in parts.items() if names]
+    return np.array(rows), "; ".join([f"at t = {at.t[-1]:g} s", *said])
 
 
 def stiffness(reduced: ReducedNetwork) -> np.ndarray:

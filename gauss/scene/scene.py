@@ -133,6 +133,10 @@ class Scene(ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputB
     def free(self, name: str, parent, child, at=(0, 0, 0), **options) -> Joint:
         """Let a body move freely: coordinates are translations along the joint axes on the parent and a quaternion.
 
+        Translations are displacements from the drawn pose, not places in the world: a box that is drawn at z = 0.5 m and has
+        fallen to z = 0.1 m has the coordinate −0.4 m. ``trajectory.body(name).position`` and
+        ``gauss.Kinematics(system, state).position(name)`` are places in the world.
+
         The last three rates are ω in the axes of the joint frame on the child, as of :meth:`ball`.
         """
         return self.joint(name, "free", parent, child, at=at, **options)

@@ -147,6 +147,7 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
 
 def _library(problem: Problem, plan: Plan) -> Trajectory:
     from gauss.dynamics.engines.compiled import projected
+    from gauss.dynamics.train_coordinates import on_trains
     from gauss.simulation.library_run import certified_rates, compiled_rates, library_run, projection_kernel, rates_kernel
     from gauss.simulation.residual_run import ResidualEquations
 
@@ -157,7 +158,8 @@ def _library(problem: Problem, plan: Plan) -> Trajectory:
         rates, kernel = compiled_rates(p.system, _cached(p, rates_kernel)), None
         if p.drift.projects and p.system.closes:
             kernel = _cached(p, projection_kernel)
-        project_state = lambda state: state if kernel is None else projected(p.system, kernel, state)  # noqa: E731
+        follow = lambda state: on_trains(p.system, state) if p.drift.projects else state  # noqa: E731
+        project_state = lambda state: follow(state) if kernel is None else projected(p.system, kernel, state)  # noqa: E731
     else:
         rates = certified_rates(p.system, engine(plan.dynamics, p))
         project_state = lambda state: project(p.system, state) if p.drift.projects else state  # noqa: E731

@@ -7,7 +7,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.outputs import output_function, shape_of, split
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
@@ -31,7 +32,7 @@ from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import steps_per_check
-from gauss.simulation.tolerances import check_tolerances
+from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import refuse_jumps, warn_of_short_features, warn_of_undetected
 from gauss.system import State, System, retract
 
@@ -150,6 +151,11 @@ class Simulator:
 
     def __reduce__(self):
         return _again, ((self.system, self.step_size, *self._methods), self.snapshot())
+
+    @property
+    def program(self) -> Program:
+        """Functions of the smooth system."""
+        return self._run.program
 
     def _bind(self):
         """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
@@ -366,19 +372,6 @@ def random_changes(seed, spread: float, shape: tuple[int, ...]) -> np.ndarray:
         return np.random.default_rng(seed).uniform(-spread, spread, shape)
     except (TypeError, ValueError) as error:
         raise SimulationError(f"seed: expected a whole number ≥ 0, got {seed!r}.") from error
-
-
-def checked_count(name: str, value) -> int:
-    """A positive whole number.
-
-    Raises
-    ------
-    SimulationError
-        If it is none.
-    """
-    if not isinstance(value, Integral) or value < 1:
-        raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
-    return int(value)
 
 
 def _floats(u) -> np.ndarray | None:

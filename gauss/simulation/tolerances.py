@@ -1,6 +1,7 @@
 """Local error tolerances given for all coordinates, for a kind of them, or for a joint, as the tolerance of a system."""
 
 from collections.abc import Mapping
+from numbers import Integral
 
 import numpy as np
 
@@ -90,3 +91,16 @@ def _is_positive(value) -> bool:
         return 0.0 < value < np.inf
     given = np.asarray(value)
     return given.dtype.kind in "iuf" and bool(np.isfinite(given).all() and (given > 0).all())
+
+
+def checked_count(name: str, value) -> int:
+    """A positive whole number.
+
+    Raises
+    ------
+    SimulationError
+        If it is none.
+    """
+    if not isinstance(value, Integral) or value < 1:
+        raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
+    return int(value)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from importlib import import_module
 from numbers import Integral
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -242,11 +243,15 @@ class Trajectory:
 
         return html_table(self.system, self.t, self.q, repr(self))
 
-    def plot(self, path=None):
-        """Figure of coordinates, rates, energies and energy balance; see :func:`gauss.view.plot_motion`.
+    def plot(self, *others: "Trajectory", path=None):
+        """Figure of this motion alone, or compared with others.
+
+        See :func:`gauss.view.plot_motion` and :func:`gauss.view.plot_comparison`.
 
         Parameters
         ----------
+        *others : Trajectory
+            Motions that it is compared with: coordinates, and their differences from this motion.
         path : str or Path, optional
             Where to save it: .png, .svg or .pdf.
 
@@ -260,7 +265,10 @@ class Trajectory:
         MissingPackageError
             If matplotlib is not installed.
         """
-        return import_module("gauss.view").plot_motion(self, path)
+        view = import_module("gauss.view")
+        if others and isinstance(others[0], str | Path):  # motion.plot("figure.png"), as before
+            others, path = others[1:], others[0]
+        return view.plot_comparison([self, *others], path=path) if others else view.plot_motion(self, path)
 
     def recorded(self, system: System, settings: dict, plan: Plan) -> "Trajectory":
         """Trajectory with the arguments of the simulation and its plan, of a system."""

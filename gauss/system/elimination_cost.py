@@ -2,8 +2,11 @@
 
 from collections import Counter
 
+import numpy as np
+
 from gauss.backends.structure import GROUND
 
+MOST_ROWS = 6  # of a block of couplings, as of a loop joint
 MOST_WORK = 250_000  # operations: traced in a few seconds
 OPERATIONS_PER_LINK = 30  # for the response of one link to one loop constraint
 
@@ -57,11 +60,36 @@ def shared_joints(subsystem) -> int:
     """Number of pairs of loops that share a joint of the tree, summed over the joints: blocks of the sum K M⁻¹ Kᵀ."""
     inner = {edge.outer: edge.inner for edge in subsystem.tree}
     crossed: Counter = Counter()
-    for index in subsystem.loop_joints:
+    loops = [{subsystem.joints[index].parent, subsystem.joints[index].child} for index in subsystem.loop_joints]
+    coupled = [set().union(*(_coupled_bodies(subsystem, int(k)) for k in block)) for block in coupling_blocks(subsystem)]
+    for ends in loops + coupled:
         bodies = set()
-        for body in (subsystem.joints[index].parent, subsystem.joints[index].child):
-            while body != GROUND:
+        for end in ends:
+            body = end
+            while body != GROUND and body not in bodies:
                 bodies.add(body)
                 body = inner[body]
         crossed.update(bodies)
     return sum(count**2 for count in crossed.values())
+
+
+def coupling_blocks(subsystem) -> list[np.ndarray]:
+    """Indices of couplings, in blocks that share branches: their rows are carried inward, and factored, together."""
+    branch, order = _branches(subsystem), {edge.outer: place for place, edge in enumerate(subsystem.tree)}
+    alike: dict[frozenset, list[int]] = {}
+    for k in range(len(subsystem.couplings)):
+        bodies = _coupled_bodies(subsystem, k) - {GROUND}
+        alike.setdefault(frozenset(branch[body] for body in bodies), []).append(k)
+    outermost = lambda k: max(order[body] for body in _coupled_bodies(subsystem, k) - {GROUND})  # noqa: E731
+    return [
+        np.array(block)
+        for some in alike.values()
+        for block in np.array_split(sorted(some, key=outermost), -(-len(some) // MOST_ROWS))
+    ]
+
+
+def _coupled_bodies(subsystem, k: int) -> set[int]:
+    """Bodies on the joints of a coupling."""
+    coupling = subsystem.couplings[k]
+    joints = subsystem.joint(coupling.driven), subsystem.joint(coupling.driver)
+    return {body for joint in joints for body in (joint.parent, joint.child)}

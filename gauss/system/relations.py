@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Function, Graph, Kernel, forward, from_disk, jacobian
+from gauss.codegen import Function, Graph, Kernel, as_number, forward, from_disk, jacobian, substitute
 from gauss.codegen.expression import reachable
 from gauss.errors import GaussError, SceneError, SimulationError
 from gauss.scene.values import is_scalar
@@ -43,13 +43,14 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class PlacedRelation:
-    """A relation with its bodies and joints, its number of rows, and the number of those that are nonholonomic."""
+    """A relation: bodies, joints, its number of rows, that of nonholonomic ones, and whether C may differ from zero."""
 
     name: str
     bodies: tuple[int, ...]
     joints: tuple[int, ...]
     size: int
     velocities: int
+    moves: bool
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,11 @@ class Relations:
     def asks_time(self) -> bool:
         """Whether any row depends on the time."""
         return bool(self.function.outputs) and _asks(self.function.outputs, self.function.inputs[-1:])
+
+    @property
+    def have_power(self) -> bool:
+        """Whether constraints prescribe velocities other than zero: their forces have power −λᵀ C."""
+        return any(relation.moves for relation in self.placed)
 
     def values(self, view: View) -> np.ndarray:
         """Outputs of the function, by a view in numbers or expressions."""
@@ -138,10 +144,10 @@ def place_relations(system, relations) -> Relations:
     joints: dict[int, tuple] = {}
     for relation in relations:
         view = Symbols(system, graph)
-        blocks, size, velocities = _traced_rows(relation, view)
+        blocks, *about = _traced_rows(relation, view)
         bodies |= view.bodies
         joints |= view.joints
-        placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), size, velocities))
+        placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), *about))
         outputs += [entry for block in blocks for entry in np.ravel(block)]
     return _bound(graph, placed, bodies, joints, outputs)
 
@@ -163,7 +169,7 @@ def _bound(graph: Graph, placed, bodies: dict, joints: dict, outputs) -> Relatio
 
 
 def _traced_rows(relation, view: Symbols):
-    """Blocks A of each body, B of each joint, then C, D, gap, as expressions; number of rows, and of nonholonomic ones."""
+    """Blocks A of each body, B of each joint, then C, D, gap, as expressions; and the numbers of :class:`PlacedRelation`."""
     c, g = _traced_residuals(relation, view)
     moving, rates = view.motion()
     velocities = view.velocities()
@@ -187,7 +193,15 @@ def _traced_rows(relation, view: Symbols):
         C = C + B @ v
     D = -forward(rate, moving, rates)
     gap = np.concatenate([c, np.zeros(len(g))])
-    return [*blocks, C, D, gap], len(rate), len(g)
+    return [*blocks, C, D, gap], len(rate), len(g), _moves(rate, velocities)
+
+
+def _moves(rate: np.ndarray, velocities) -> bool:
+    """Whether the rates of residuals may differ from zero at rest."""
+    try:
+        return any(as_number(entry) != 0.0 for entry in substitute(rate, velocities, np.zeros(len(velocities))))
+    except TypeError:  # it calls a function
+        return True
 
 
 def _traced_residuals(relation, view: Symbols) -> tuple[np.ndarray, np.ndarray]:

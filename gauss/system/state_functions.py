@@ -211,8 +211,8 @@ class StateFunctions:
         Parameters
         ----------
         *names : str
-            Names of these functions, "inverse_dynamics" or "loop_constraints"; those of frames with the frame, as in
-            "jacobian:hand". "forward_dynamics" alone.
+            Names of these functions, "inverse_dynamics", "inertial_regressor" or "loop_constraints"; those of frames with
+            the frame, as in "jacobian:hand". "forward_dynamics" alone.
         reference : str
             Axes and point of Jacobians: "local_world_aligned", "world" or "local".
         independent : sequence of str, optional

@@ -21,10 +21,11 @@ from gauss.versions import FormerAttribute
 
 
 class Train(NamedTuple):
-    """Gear train, joints with one coordinate: q̇ of each is its ratio times the rate of the first."""
+    """Gear train, joints with one coordinate: q of each is its ratio times that of the first, plus its offset."""
 
     joints: tuple[int, ...]
     ratios: tuple[float, ...]
+    offsets: tuple[float, ...]
 
 
 @dataclass(frozen=True)

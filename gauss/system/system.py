@@ -175,6 +175,12 @@ class System(StateFunctions):
     def _joints_by_name(self) -> dict[str, PlacedJoint]:
         return {joint.name: joint for joint in reversed(self.joints)}
 
+    @cached_property
+    def _coordinates_by_name(self) -> dict[str, tuple[PlacedJoint, int | None]]:
+        joints = self._joints_by_name.items()
+        single = {f"{name}.{rate}": (joint, k) for name, joint in joints for k, rate in enumerate(joint.pair.rates)}
+        return single | {name: (joint, None) for name, joint in joints}
+
     def joint(self, name: str) -> PlacedJoint:
         """Return the joint of this name.
 
@@ -196,11 +202,8 @@ class System(StateFunctions):
         StateError
             If there is neither.
         """
-        owner, _, rate = name.rpartition(".")
-        found = self._joints_by_name.get(owner)
-        if found is None or rate not in found.pair.rates or name in self._joints_by_name:
-            return self.joint(name), None
-        return found, found.pair.rates.index(rate)
+        found = self._coordinates_by_name.get(name)
+        return (self.joint(name), None) if found is None else found
 
     def column(self, name: str) -> int:
         """Return the place in v of a joint of one freedom, or of one rate of a joint."""

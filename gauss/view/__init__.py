@@ -3,6 +3,7 @@
 from gauss.errors import extra
 
 with extra("view"):
+    from gauss.view.comparison import plot_comparison
     from gauss.view.linkages import animate_linkage, plot_linkage
     from gauss.view.phase import plot_phase
     from gauss.view.plots import plot_coordinates, plot_energy, plot_motion, plot_reactions, plot_speeds
@@ -13,6 +14,7 @@ with extra("view"):
 __all__ = [
     "animate_linkage",
     "draw_network",
+    "plot_comparison",
     "plot_coordinates",
     "plot_energy",
     "plot_linkage",

@@ -34,7 +34,7 @@ class Drawing:
 
     def __init__(self, axes, found: Cycle):
         self.axes, self.found, self.colours = axes, found, colours(found.chain)
-        self.corners = {link.name: self._corners(link.name) for link in found.chain.links}
+        self.corners = {link.name: self.corners_of(found.chain, link.name) for link in found.chain.links}
         everything = np.concatenate([*(self._world(name) for name in self.corners), *self._fixed(), *self._slots(GROUND)])
         low, high = (f([everything.real, everything.imag], axis=1) for f in (np.min, np.max))
         self.size = float(max(high - low))
@@ -42,9 +42,10 @@ class Drawing:
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]")
         axes.set_aspect("equal")
 
-    def _corners(self, link: str) -> list[complex]:
+    @staticmethod
+    def corners_of(chain: Chain, link: str) -> list[complex]:
         """Joint points of a link in its own frame; the guides that it carries are not among them."""
-        joints = [j for j in self.found.chain.joints if link in (j.parent, j.child)]
+        joints = [j for j in chain.joints if link in (j.parent, j.child)]
         points = [j.point(link) for j in joints if j.kind == "revolute" or link == j.child]
         return list(dict.fromkeys(points))
 

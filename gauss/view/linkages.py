@@ -19,8 +19,8 @@ MOVIES: dict[str, type[PillowWriter] | type[FFMpegWriter]] = {".gif": PillowWrit
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)), (0, (8, 2)))  # curves differ in grey, too
 
 
-def plot_linkage(found: Cycle, path=None):
-    """Figure of a cycle: the mechanism, driving torque, reactions, and the forces on the bearings of the frame.
+def plot_linkage(found: Cycle, path=None, points=()):
+    """Figure of a cycle: mechanism, torque, reactions, bearing forces on the frame, transmission angles, coupler curves.
 
     Parameters
     ----------
@@ -28,6 +28,9 @@ def plot_linkage(found: Cycle, path=None):
         Crank angles in order, both ends of a turn among them.
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
+    points : iterable of (str, array_like (2,))
+        Links and points of them, in their frames [m], whose curves are drawn; the middles of the joints of each coupler when
+        none are given.
 
     Returns
     -------
@@ -40,12 +43,14 @@ def plot_linkage(found: Cycle, path=None):
         If the format is none of these.
     """
     check_format(path)
-    figure = Figure(figsize=(11, 8.5), layout="constrained")
-    grid = figure.add_gridspec(2, 2)
+    figure = Figure(figsize=(15, 8.5), layout="constrained")
+    grid = figure.add_gridspec(2, 3)
     _positions(figure.add_subplot(grid[0, 0]), found)
     _torque(figure.add_subplot(grid[0, 1]), found)
     _reactions(figure.add_subplot(grid[1, 0]), found)
     _bearings(figure.add_subplot(grid[1, 1], projection="polar"), found)
+    _transmission(figure.add_subplot(grid[0, 2]), found)
+    _coupler_curves(figure.add_subplot(grid[1, 2]), found, tuple(points))
     figure.suptitle(f"{found.chain.name}, crank at {found.motion.crank_speed[0]:.4g} rad/s")
     return saved(figure, path)
 
@@ -86,6 +91,45 @@ def _torque(axes, found: Cycle):
     _angle_axis(axes, found)
     axes.set_ylabel("driving torque [N m]")
     axes.set_title("torque of the motor on the crank", fontsize="medium")
+
+
+def _transmission(axes, found: Cycle):
+    for k, (group, angle) in enumerate(found.transmission().items()):
+        axes.plot(
+            np.degrees(found.crank_angle),
+            np.degrees(angle),
+            color=f"C{k % 10}",
+            linestyle=DASHES[k % len(DASHES)],
+            label=group,
+        )
+    _angle_axis(axes, found)
+    axes.set_ylim(0.0, 90.0)
+    axes.set_ylabel("transmission angle [°]")
+    axes.set_title("transmission angles (0°: singular)", fontsize="medium")
+    if axes.lines:
+        axes.legend(fontsize="small", frameon=False)
+
+
+def _coupler_curves(axes, found: Cycle, points: tuple):
+    for k, (link, point) in enumerate(points or coupler_points(found)):
+        x, y = found.link(link).point(complex(*point)).view(float).reshape(-1, 2).T
+        axes.plot(x, y, color=f"C{k % 10}", label=f"{link} ({point[0]:.4g}, {point[1]:.4g}) m")
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(alpha=0.3)
+    axes.set_title("coupler curves", fontsize="medium")
+    if axes.lines:
+        axes.legend(fontsize="small", frameon=False)
+
+
+def coupler_points(found: Cycle) -> list[tuple[str, tuple[float, float]]]:
+    """Couplers, which no joint holds on the ground, and the middle of the joints of each in its frame [m]."""
+    held = {j.child for j in found.chain.joints if j.parent == GROUND} | {
+        j.parent for j in found.chain.joints if j.child == GROUND
+    }
+    couplers = [link.name for link in found.chain.links if link.name not in held]
+    middles = [np.mean(Drawing.corners_of(found.chain, name)) for name in couplers]
+    return [(name, (float(z.real), float(z.imag))) for name, z in zip(couplers, middles, strict=True)]
 
 
 def _reactions(axes, found: Cycle):

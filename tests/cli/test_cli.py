@@ -90,6 +90,11 @@ def test_help_is_there(command):
     assert "Usage" in result.output
 
 
+@pytest.mark.parametrize("group", [(), ("bench",), ("problems",)])
+def test_help_of_a_group_lists_whole_summaries(group):
+    assert "..." not in call(*group, "--help").output.partition("Commands:")[2]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments, words",

@@ -62,6 +62,34 @@ def _two_islands() -> gauss.Scene:
     return scene
 
 
+def _coupled_chain(n: int = 16, gravity=(0, 0, -9.81)) -> gauss.Scene:
+    """Chain of hinges; every second one is coupled to that before it."""
+    scene, rng = gauss.Scene("coupled chain", gravity=gravity), np.random.default_rng(0)
+    for i in range(n):
+        scene.body(f"link{i}", rng.uniform(0.5, 2.0), mechanisms.inertia(rng), position=(i + 0.5, 0, 0))
+        scene.revolute(f"J{i}", f"link{i - 1}" if i else "ground", f"link{i}", at=(i, 0, 0), axis=rng.normal(size=3))
+    for i in range(0, n - 1, 2):
+        scene.couple(f"C{i}", f"J{i + 1}", f"J{i}", ratio=-1.2 - 0.1 * i)
+    return scene
+
+
+def _coupled_five_bar() -> gauss.Scene:
+    """Five-bar with a hanging rod, which carries a wheel for each joint of the loop, coupled to it."""
+    scene, points = gauss.Scene("coupled five-bar", gravity=(0, -9.81, 0)), [(0, 0), (0, 1), (1, 1.5), (2, 1), (2, 0)]
+    rod, bodies = {"mass": 1.0, "inertia": (0.1, 0.1, 0.12)}, ["ground", "a", "b", "c", "d", "ground"]
+    for name, one, two in zip("abcd", points, points[1:], strict=False):
+        scene.body(name, **rod, position=(*(np.add(one, two) / 2), 0))
+    for name, one, two, at in zip("ABCDE", bodies, bodies[1:], points, strict=False):
+        scene.revolute(name, one, two, at=(*at, 0))
+    scene.body("rod", **rod, position=(1, 1, 0))
+    scene.revolute("R", "b", "rod", at=(1, 1.5, 0))
+    for k, name in enumerate("ABCDE"):
+        scene.body(f"wheel{name}", **rod, position=(1, k / 5, 0))
+        scene.revolute(f"W{name}", "rod", f"wheel{name}", at=(1, k / 5, 0))
+        scene.couple(f"C{name}", f"W{name}", name, ratio=0.4 * k - 0.7)
+    return scene
+
+
 SCENES = {
     "four-bar": mechanisms.four_bar,
     "four-bar with a joint twice": lambda: mechanisms.four_bar(twice=True),
@@ -73,6 +101,8 @@ SCENES = {
     "ring of balls": lambda: _ring("ball"),
     "ring of universals": lambda: _ring("universal"),
     "islands": _two_islands,
+    "coupled chain": _coupled_chain,
+    "coupled five-bar": _coupled_five_bar,
 }
 
 
@@ -92,7 +122,15 @@ def _refined(system, state, load) -> np.ndarray:
     return kernel(np.concatenate([state.q, state.v, load, [state.t]]))
 
 
-WRITTEN = ("four-bar with a joint twice", "ladder 10", "bricard", "hung chain", "islands")  # soon compiled as a whole
+WRITTEN = (
+    "four-bar with a joint twice",
+    "ladder 10",
+    "bricard",
+    "hung chain",
+    "islands",
+    "coupled chain",
+    "coupled five-bar",
+)  # soon compiled as a whole
 
 
 @pytest.fixture(scope="module", params=SCENES)
@@ -231,6 +269,17 @@ def test_a_long_ladder_moves_on_its_constraints():
         assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET_RESIDUAL
     cranks = motion.q[:, [system.column(f"A{i}") for i in range(51)]]
     assert np.ptp(cranks, axis=1).max() <= 1e-9
+    energy = gauss.energy(motion)
+    assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
+
+
+@pytest.mark.slow
+def test_a_long_chain_with_couplings_moves_on_them():
+    system = gauss.compile_scene(_coupled_chain(30))
+    motion = gauss.simulate(system, 0.1, times=[0.05, 0.1], progress=False)
+    assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
+    for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
+        assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET_RESIDUAL
     energy = gauss.energy(motion)
     assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
 

@@ -114,6 +114,21 @@ def test_two_masses_and_a_spring():
     assert modes.shapes[:, 1] == pytest.approx([1.0, -1 / J_2, -0.5 / J_2])
 
 
+def test_modes_of_a_state_have_the_clutch_that_sticks_in_it():
+    """Two discs on a spring, the second clutched to a third: f = √(k (1/J_1 + 1/(J_2 + J_3)))/2π once it sticks."""
+    network = Network("clutch")
+    for name, inertia in (("one", 1.0), ("two", 0.5), ("three", 2.0)):
+        network.shaft(name, inertia)
+    network.spring("spring", "two", "one", stiffness=500.0, damping=2.0)
+    network.clutch("clutch", "three", "two", 200.0)
+    network.torque("one", 5.0)
+    modes = eigenmodes(network, simulate(network, 1.0))
+    expected = np.sqrt(500.0 * (1 / 1.0 + 1 / 2.5)) / (2 * np.pi)
+    assert modes.frequencies == pytest.approx([0.0, expected], abs=1e-6 * expected)
+    assert modes.shapes[1] == pytest.approx(modes.shapes[2]) and "sticking: clutch" in modes.state
+    assert len(eigenmodes(network).frequencies) == 3
+
+
 @pytest.mark.parametrize("n", [3, 6])
 def test_chain_of_equal_discs(n):
     """Free chain: ω_k = 2 √(k/J) sin(k π/2n)."""

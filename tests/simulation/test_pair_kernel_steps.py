@@ -9,7 +9,7 @@ from gauss.errors import StateError
 from tests.simulation.test_mechanism_contacts import GAIN, SAME_STEPS, STEP, arm, driven
 
 KERNELS, WRITTEN_OUT = Plan("time stepping", "pair kernels"), Plan("time stepping", "compiled")
-TIERS = 1e-11  # of the same steps in quick and in optimised code, over 100 steps
+TIERS = 1e-11  # of the same steps in quick and in optimised code, or in Python, over 100 steps
 CLEARANCE = 1e-6  # of the length of the scene: overlap that counts as none
 RATE = 130.0  # Hz: samples of the control law beside the ends of steps
 
@@ -136,6 +136,41 @@ def gripper() -> gauss.Scene:
         scene.input(f"{name} force", f"{name} slides", limits=20.0)
         scene.contact(f"{name} touch", f"{name} tip", "block", friction=0.5)
     return scene
+
+
+def test_a_batch_makes_the_steps_of_simulators_in_turn():
+    scene = with_motor(arm)
+    scene.output("push", "contact_force", "touch")
+    many, alone = gauss.SimulatorBatch(scene, STEP, batch=3), gauss.Simulator(scene, STEP)
+    values = np.sin(np.arange(30.0)).reshape(10, 3, 1)
+    for u in values:
+        many.step(u, n=10)
+        alone.step(u[1], n=10)
+    np.testing.assert_allclose(many.q[1], alone.state.q, atol=TIERS)
+    np.testing.assert_allclose(many.v[1], alone.state.v, atol=TIERS)
+    np.testing.assert_allclose(many.outputs["push"][1], alone.outputs["push"], rtol=SAME_STEPS)
+    assert np.abs(many.q[1] - many.q[0]).max() > 1e-3
+
+    fast = np.where(np.arange(2) == 1, 1e200, 0.0)
+    many.restart([0, 2], many.q[[1, 1]], [many.v[1], fast])
+    many.step(values[0][[1, 1, 1]], n=5)
+    alone.reset(alone.state)
+    alone.step(values[0][1], n=5)
+    assert list(many.diverged) == [False, False, True]
+    np.testing.assert_allclose(many.q[0], alone.state.q, atol=TIERS)
+    many.restart([2], many.q[:1], many.v[:1])
+    assert not many.diverged.any()
+
+
+def test_a_batch_refuses_starts_off_its_constraints():
+    scene = with_motor(arm)
+    scene.couple("belt", "hinge 1", "hinge 0", -0.5)
+    scene.start("hinge 0", position=0.7, rate=1.0)
+    scene.start("hinge 1", position=-0.35, rate=-0.5)
+    many = gauss.SimulatorBatch(scene, STEP, batch=2)
+    many.step(np.zeros((2, 1)), n=5)
+    with pytest.raises(StateError, match="'belt'"):
+        many.reset(q=[[0.7, -0.35], [0.7, 0.2]], v=np.zeros((2, 2)))
 
 
 @pytest.mark.parametrize("squeeze", [9.6, 9.7, 9.82, 12.0])

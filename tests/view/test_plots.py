@@ -139,3 +139,22 @@ def test_the_stroboscope_shows_the_last_position_in_full(motions):
 def test_a_plane_is_two_axes(motions, plane):
     with pytest.raises(StateError, match="two axes"):
         view.plot_stroboscope(motions["four_bar"], plane=plane)
+
+
+def test_a_comparison_shows_the_difference_from_the_first_motion(tmp_path):
+    scene = gauss.load("pendulum")
+    one, two = (
+        gauss.simulate(scene, 1.0, rtol=rtol, times=np.linspace(0, 1, samples))
+        for rtol, samples in ((1e-12, 51), (1e-4, 101))
+    )
+    figure = one.plot(two, path=tmp_path / "both.png")
+    values, apart = figure.axes
+    assert (tmp_path / "both.png").exists() and len(values.lines) == 2 and len(apart.lines) == 1
+    assert apart.lines[0].get_ydata() == pytest.approx(abs(two.q[::2, 0] - one.q[:, 0]), abs=1e-12)
+    for wrong in (
+        {"motions": [one]},
+        {"motions": [one, two], "coordinates": ["none"]},
+        {"motions": [one, two], "labels": ["a"]},
+    ):
+        with pytest.raises(gauss.errors.ArgumentError):
+            gauss.view.plot_comparison(**wrong)

@@ -1,5 +1,6 @@
 """The viewer: what stands on the stage is the motion, files play without a network, a browser has nothing to complain of."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -11,7 +12,8 @@ import rich
 
 import gauss
 from gauss.errors import FileError
-from gauss.view.viewer import export_html, show
+from gauss.view.viewer import export_html, page, show
+from gauss.view.viewer.cameras import CAMERAS
 from gauss.view.viewer.forms import forms
 from gauss.view.viewer.show import LOOPBACK, _free_port
 from gauss.view.viewer.shown import resampled
@@ -65,6 +67,75 @@ def test_play_and_pause(viewer):
     player.play(True)
     assert player.button.label == "Pause"
     player.play(False)
+
+
+def test_steps_pause_and_move_by_a_picture(viewer):
+    player = viewer.player
+    player._go(float(player.times[3]))
+    for pictures, expected in ((1, 4), (-1, 3), (-9, 0), (10**6, len(player.times) - 1)):
+        player.step(pictures)
+        assert player.now == player.times[expected] and not player.playing
+
+
+def test_two_motions_stand_side_by_side_at_the_same_time(motion):
+    longer = gauss.simulate(gauss.load("double_pendulum"), 0.8)
+    with_two = show(motion, beside=longer, port=_free_port())
+    try:
+        first, second = with_two.player.stages
+        with_two.player.play(False)
+        with_two.player._go(0.8)
+        assert first.trajectory.t[-1] == 0.5 and with_two.player.times[-1] == 0.8
+        assert second.nodes[1].position == pytest.approx(second.positions[-1, 1], abs=FLOATS)
+        apart = first.place_beside(second) @ first.framing.right
+        assert apart > 0.0
+    finally:
+        with_two.close()
+
+
+def test_a_slider_poses_a_loop_and_the_others_follow():
+    posed = show(gauss.load("four_bar"), port=_free_port())
+    try:
+        player = posed.player
+        player.pose("A", 0.4)
+        state = player.state
+        assert [state.q[0], player.sliders["A"].value] == pytest.approx([0.4, 0.4], abs=1e-12)
+        residual, *_ = player.system.loop_constraints(state.q, state.v)
+        assert abs(residual).max() < 1e-12
+        node = dict(zip(player.stage.bodies, player.stage.nodes, strict=True))["coupler"]
+        assert node.position == pytest.approx(gauss.Kinematics(player.system, state).position("coupler"), abs=FLOATS)
+        player.reset()
+        assert np.array_equal(player.state.q, player.begun.q)
+    finally:
+        posed.close()
+
+
+def test_a_spring_pulls_a_point_to_the_pointer():
+    scene = gauss.Scene("puck", gravity=(0, 0, 0))
+    scene.free("F", "ground", scene.body("puck", mass=2.0, inertia=(0.1, 0.1, 0.1)))
+    posed = show(scene, port=_free_port())
+    try:
+        player = posed.player
+        player._grasp("puck", np.array([0.1, 0.0, 0.0]))
+        player.play(False)
+        player.pull.goal = np.array([0.3, 0.2, 0.1])
+        for _ in range(150):
+            player.advance(1 / 60)
+        held = gauss.Kinematics(player.system, player.state).position("puck", player.pull.local)
+        assert held == pytest.approx(player.pull.goal, abs=1e-3)  # m: after 30 times 1/ω
+    finally:
+        posed.close()
+
+
+def test_a_page_has_curves_cameras_and_layers_beside_the_scene(motion):
+    text = page(motion, joints=["C"], dark=True).html
+    panel = text[text.index('<aside id="panel" class="dark">') :]
+    given = json.loads(re.search(r"const given = (.*);", panel)[1])
+    assert set(given["cameras"]) == set(CAMERAS) and given["span"] == pytest.approx(0.5)
+    distances = [np.linalg.norm(np.subtract(place, given["middle"])) for place in given["cameras"].values()]
+    assert distances == pytest.approx([distances[0]] * len(distances))
+    assert not given["layers"]["frames"]["visible"] and given["layers"]["reactions"]["nodes"] == ["/reactions"]
+    for label in ("coordinates [rad]", "rates [rad/s]", "energies [J]"):
+        assert label in panel
 
 
 def test_pictures_between_samples_lie_on_the_motion():

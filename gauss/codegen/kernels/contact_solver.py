@@ -198,9 +198,17 @@ class _ContactSolverWriter:
             self.error[i], *slopes = r.inline(self.laws.limited, f[i], u[i], w[i], self.limit[j])
             self._slope(i, [i], slopes)
         largest, total = r.variable(0.0), r.variable(0.0)
-        with r.each(self.n) as i:
-            size = r.absolute(self.error[i] * w[i])
+
+        def measure(size: Value):
             largest[0], total[0] = r.maximum(size, largest[0]), total[0] + size
+
+        with r.each(self.n) as i:
+            measure(r.absolute(self.error[i] * w[i]))
+        with r.each(self.limited) as j:
+            i = self.limited_rows + j
+            is_held = self.W[i * self.n + i] < w[i]  # its velocity does not react, as that of a prescribed joint
+            share = r.absolute(self.error[i]) / (self.limit[j] + SMALLEST_DIAGONAL)
+            measure(r.choose(is_held, share * r.absolute(u[i]), 0.0))
         return r.choose(total[0] <= LARGEST_RESIDUAL_SUM, largest[0], np.inf)  # the maximum ignores NaN, the sum does not
 
     def _slope(self, row: Value, rows, slopes):

@@ -253,10 +253,12 @@ class MechanismStepper:
             raise SimulationError(f"t = {state.t:.6g} s: contacts make bodies faster and faster; shorten the step.")
         v = state.v + h * acceleration
         q = self.kernels.move(np.concatenate([begun.q, ((1.0 - share) * h) * v]))
-        work = force * (rows.K @ (state.v + 0.5 * h * acceleration))
+        middle = state.v + 0.5 * h * acceleration
+        work = force * (rows.K @ middle)
         lossy = np.ones(work.size, dtype=bool)
         lossy[work.size - self.rows.lossy.size :] = self.rows.lossy
-        power = begun.power + np.array([work[~lossy].sum(), 0.0, -work[lossy].sum()])
+        driven = work[~lossy].sum() + self._prescribed_power(rows, begun, acceleration, middle, force)
+        power = begun.power + np.array([driven, 0.0, -work[lossy].sum()])
         contacts, others = self.rows.split(rows, near, force * rows.unit)
         self._keep(near, contacts, others)
         name = partial(self.rows.name, near)
@@ -264,6 +266,12 @@ class MechanismStepper:
         hits = self._impacts(rows, begun, h, rest, share)
         modes = self.rows.modes(rows, near, force, h * acceleration, h * work, hits, self.slow(state.v))
         return MechanismStep(q, v, near, contacts, others, power, error, paradoxes, modes)
+
+    def _prescribed_power(self, rows: StepRows, begun: _FreeStep, a: np.ndarray, v: np.ndarray, force: np.ndarray) -> float:
+        """Power of constraints that prescribe velocities [W]: (M a − τ − Kᵀ f) · v, as all others have none."""
+        if not self.smooth.relations.have_power:
+            return 0.0
+        return float((begun.terms.M @ a - begun.terms.tau - rows.K.T @ force) @ v)
 
     def _begin(self, state: State, h: float, share: float) -> _FreeStep:
         kernels, t = self.kernels, state.t + share * h

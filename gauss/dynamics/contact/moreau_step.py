@@ -32,6 +32,7 @@ from gauss.dynamics.contact.paradox import (
     with_sliding_friction,
 )
 from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
@@ -154,7 +155,7 @@ class MoreauStepper:
         force = np.zeros_like(force)
         force[rows] = found
         self._refuse_jam(state, at, rows[found != 0.0], responses[found != 0.0], after)
-        rates = self.over(touch, free, state.v, h, force, acceleration)
+        rates = self.over(at, touch, free, state.v, h, force, acceleration)
         return MoreauStep(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
 
     def relative(self, touch: ContactTerms) -> ContactTerms:
@@ -255,11 +256,23 @@ class MoreauStepper:
         size = np.abs(response) / self.system.scale.coordinates
         return math.where(sum(forbidden, 0.0) > INCONSISTENT_RESPONSE * sum(size, 0.0), 1.0, 0.0)
 
-    def over(self, touch: ContactTerms, free: Rates, v, h, force, acceleration) -> Rates:
-        """Mean accelerations and powers over a step under forces (n,) and their accelerations."""
+    def over(self, at: State, touch: ContactTerms, free: Rates, v, h, force, acceleration) -> Rates:
+        """Mean accelerations and powers over a step under forces (n,) and their accelerations.
+
+        ``at`` is the place of the forces, with any rates.
+        """
         total = free.acceleration + acceleration
-        work = force * (touch.J @ (v + 0.5 * h * total))
-        return Rates(total, free.power + np.array([work[~self.lossy].sum(), 0.0, -work[self.lossy].sum()]))
+        middle = v + 0.5 * h * total
+        work = force * (touch.J @ middle)
+        driven = work[~self.lossy].sum() + self._reacting_power(at, acceleration, middle, work)
+        return Rates(total, free.power + np.array([driven, 0.0, -work[self.lossy].sum()]))
+
+    def _reacting_power(self, at: State, a, v, work) -> Scalar:
+        """Power (M a − Kᵀ f) · v of constraints that prescribe velocities, by the forces f: all others have none."""
+        if not self.smooth.relations.have_power:
+            return 0.0
+        changed, moved = (Kinematics(self.smooth, State(at.t, at.q, rates)).quasi_velocities() for rates in (a, v))
+        return changed @ (self.smooth.Phi * moved) - sum(work)
 
     def owner(self, gap: str) -> str:
         """Name of the contact, stop or rope of a gap."""

@@ -24,7 +24,7 @@ class CallGraphKernels:
     Parameters
     ----------
     system : System
-        One with loops, without couplings and relations.
+        One with loops or couplings, without relations and gear trains.
     gains : tuple of float, optional
         Gains α and β [1/s] of the Baumgarte feedback −2α φ̇ − β² φ.
     """

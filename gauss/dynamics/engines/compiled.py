@@ -10,6 +10,7 @@ from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.load_forces import LoadForces
+from gauss.dynamics.train_coordinates import on_trains
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
@@ -18,7 +19,7 @@ def projected(system: System, kernel: Callable[[np.ndarray], np.ndarray], state:
     """State projected onto the constraints by machine code, see :class:`StateKernels`; by numpy where a residual is left."""
     found, n_q = kernel(np.concatenate([[state.t], state.q, state.v])), system.n_q
     if found[-1] <= RESIDUAL_TOLERANCE:
-        return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
+        return on_trains(system, State(state.t, found[:n_q], found[n_q : n_q + system.n_v]))
     return project(system, state)
 
 

@@ -6,11 +6,12 @@ sampling interval may be missed; ``breaks=`` gives such times.
 
 import numpy as np
 
+from gauss.dynamics.laws.recorded_time import at_time, reads_time
 from gauss.dynamics.laws.switching_times import CLOSE, NO_TIMES, Timetable
 from gauss.scene.stateful_laws import preserved
 
 SAMPLES = 32_768  # of a law over a motion: resolves a millisecond in twenty seconds
-LEAST_SAMPLES = 256  # of a short motion
+LEAST_SAMPLES = 256  # of a short motion, and of a law that does not read the time: they show whether it remembers calls
 LONGEST_GAP = 1.5  # between two samples, relative to their mean distance
 MOST_JUMPS = 1000  # located jumps: a law with more of them is rough throughout
 REPEATED_SAMPLES = 4  # taken again after all others: a function of time gives equal numbers
@@ -34,11 +35,12 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law", us
     uses_time : bool
         Whether the law is known to use the time: a constant value is then warned of.
     """
+    own, of_motion = (True, False) if motion is None else reads_time(law, motion)
 
     def values(times) -> np.ndarray:
         """Values (k, n) at times (k,)."""
         try:
-            found = [law(t, motion) for t in times]
+            found = [law(t, at_time(motion, t) if of_motion else motion) for t in times]
             if any(isinstance(one, np.ndarray | list | tuple) for one in found):
                 found = [np.ravel(np.asarray(one, dtype=float)) for one in found]
             return np.array(found, dtype=float).reshape(len(found), -1)
@@ -47,7 +49,8 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law", us
 
     try:
         with preserved(law):
-            return _located(values, begin, end, what, _count(motion, end - begin), CONSTANT if uses_time else "")
+            count = _count(motion, end - begin) if own or of_motion or uses_time else LEAST_SAMPLES
+            return _located(values, begin, end, what, count, CONSTANT if uses_time else "")
     except _NoValueError:  # the motion reports this failure by name
         return NO_TIMES
 

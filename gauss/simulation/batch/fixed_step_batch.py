@@ -79,6 +79,10 @@ class FixedStepBatch:
         """States (n_q + n_v, batch) so far."""
         return self.points[self.states, : self.size]
 
+    def take(self, chosen: np.ndarray, fresh: "FixedStepBatch"):
+        """Continue some motions from the points of another batch."""
+        self.points[:, chosen] = fresh.points[:, : fresh.size]
+
     def advance(self, done: int, n: int, h: float, threads: int, control: np.ndarray | None = None):
         """Make n steps of length h [s] after the first ``done``, under inputs (batch, 1, n_u), without samples."""
         given = [] if control is None else [control]

@@ -7,7 +7,7 @@ from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import BATCHES, method_key
+from gauss.dynamics.plan import BATCHES, method_key, plan_of
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
@@ -29,6 +29,13 @@ STEPPED = FIXED | {method.name: method for method in NONSMOOTH}
 def contact_state_size(system: System) -> int:
     """Numbers of the method state of time stepping."""
     return method_state_size(moreau_stepper(system))
+
+
+def has_pair_kernels(system: System, method: FixedStep, held: bool) -> bool:
+    """Whether motions are made by kernels of pairs of shapes, one after the other."""
+    if not method.nonsmooth:
+        return False
+    return plan_of(Question(system, Laws(system), method=method, held=held)).dynamics == "pair kernels"
 
 
 def fixed_step_code(

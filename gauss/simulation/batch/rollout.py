@@ -14,8 +14,6 @@ from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import plan_of
-from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
@@ -25,7 +23,7 @@ from gauss.simulation.batch.batch_result import Rollout
 from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
-from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, machine_code
+from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, has_pair_kernels, machine_code
 from gauss.simulation.batch.repeated_motions import repeat
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
@@ -160,7 +158,7 @@ def _fixed(
     t = step * every * np.arange(steps // every + 1)
     run = {"integrator": method.name, "step": step, "times": t}
     settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
-    if device is None and _has_pair_kernels(system, method, control is not None):
+    if device is None and has_pair_kernels(system, method, control is not None):
         return _singly(system, starts, steps, run, settings, control)
     batch = _begun(system, starts, method, control is not None, device)
     times = _switching(system, starts, steps * step).times
@@ -183,13 +181,6 @@ def _fixed(
     lost, repeated = tuple(map(int, np.flatnonzero(~finite))), tuple(map(int, doubtful))
     marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again}
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
-
-
-def _has_pair_kernels(system: System, method: FixedStep, held: bool) -> bool:
-    """Whether a motion is made by kernels of pairs of shapes, one after the other."""
-    if not method.nonsmooth:
-        return False
-    return plan_of(Question(system, Laws(system), method=method, held=held)).dynamics == "pair kernels"
 
 
 def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[int, float]:

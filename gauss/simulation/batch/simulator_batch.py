@@ -1,4 +1,7 @@
-"""Batch of simulators: motions that Python advances together, in SIMD code, each with inputs of its own."""
+"""Batch of simulators: motions that Python advances together, each with inputs of its own."""
+
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -14,20 +17,24 @@ from gauss.dynamics.scene_compilation import compile_scene
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean, require
+from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
-from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code
+from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code, has_pair_kernels
+from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.integrators import usual_fixed_step
-from gauss.simulation.simulator import Simulator, SimulatorState, checked_count, random_changes
-from gauss.simulation.tolerances import check_tolerances
+from gauss.simulation.simulator import Simulator, SimulatorState, random_changes
+from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import refuse_jumps, warn_of_passages, warn_of_short_features
 from gauss.system import State, System, retract
 
 
 class SimulatorBatch:
     """Motions of a scene in fixed steps, all in one call; see :class:`gauss.Simulator`.
+
+    Motions are advanced side by side in vector registers; those with contacts of many pairs of shapes one after the other.
 
     Parameters
     ----------
@@ -41,7 +48,7 @@ class SimulatorBatch:
         "rk4", "semi_implicit_euler" or "time_stepping"; the last for scenes with contacts, friction or limited forces, "rk4"
         for all others when not given.
     threads : int
-        Threads that share the motions; the results do not depend on it.
+        Threads that share the motions in vector registers; the results do not depend on it.
 
     Attributes
     ----------
@@ -86,14 +93,25 @@ class SimulatorBatch:
             raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(self.integrator, STEPPED)}")
         method = STEPPED[self.integrator]
         with one_tier():
-            self._loop = fixed_step_code(system, method, bool(self.inputs))
-            self._measure = _outputs(system, bool(self.inputs), method.nonsmooth)
+            self._begin, self._measure = self._compiled(method)
         self._start, self._size = system.initial_state(), checked_count("batch", batch)
         refuse_jumps(system, self._start, self.step_size)
         warn_of_short_features(whole.name, Laws(system), self.step_size)
         self._u = np.zeros((self._size, 1, len(self.inputs)))
         self._alone: Simulator | None = None
         self.reset()
+
+    def _compiled(self, method: FixedStep) -> tuple[Callable, Kernel]:
+        """Maker of a batch at some initial states, and machine code of the outputs."""
+        system, held = self.system, bool(self.inputs)
+        if has_pair_kernels(system, method, held):
+            alone = Simulator(system, self.step_size, self.integrator)
+            return partial(SimulatorsInTurn, alone), _outputs(alone.program, system, True)
+        ask = smooth_question(Question(system, Laws(system))) if method.nonsmooth else Question(system, Laws(system))
+        memory = contact_state_size(system) if method.nonsmooth else 0
+        program = Program(ask.system, ask.laws, memory=memory, inputs=held)
+        loop = fixed_step_code(system, method, held)
+        return partial(FixedStepBatch, loop), _outputs(program, system, method.nonsmooth)
 
     @property
     def has_time_laws(self) -> bool:
@@ -126,7 +144,7 @@ class SimulatorBatch:
         if seed is not None:
             changes = random_changes(seed, spread, (self._size, 2, self.system.n_v))
             starts = np.array([self._changed(*pair) for pair in zip(starts.T, changes, strict=True)]).T
-        self._batch, self._steps, self._warned = FixedStepBatch(self._loop, starts), 0, False
+        self._batch, self._steps, self._warned = self._begin(starts), 0, False
         refuse_inconsistent(self.system, starts, self._batch.residual)
         self._u[:] = 0.0
         self.diverged, self.unconfirmed = np.zeros((2, self._size), dtype=bool)
@@ -153,10 +171,10 @@ class SimulatorBatch:
         starts, chosen = columns(self.system, q, v), _chosen(which, self._size)
         if starts.shape[1] != chosen.size:
             raise StateError(f"restart: expected the states of {chosen.size} motions, got {starts.shape[1]}.")
-        fresh = FixedStepBatch(self._loop, starts)
+        fresh = self._begin(starts)
         refuse_inconsistent(self.system, starts, fresh.residual)
         fresh.points[0] = self.t
-        self._batch.points[:, chosen] = fresh.points[:, : starts.shape[1]]
+        self._batch.take(chosen, fresh)
         self.diverged[chosen] = self.unconfirmed[chosen] = False
 
     def _changed(self, start: np.ndarray, change: np.ndarray) -> np.ndarray:
@@ -274,10 +292,8 @@ def _tiled(own: np.ndarray, given, batch: int):
     return np.tile(own, (batch, 1)) if given is None else given
 
 
-def _outputs(system: System, held: bool, nonsmooth: bool) -> Kernel:
+def _outputs(program: Program, system: System, nonsmooth: bool) -> Kernel:
     """Machine code of points → values of all outputs; accelerations of contacts are means over the last step."""
-    ask = smooth_question(Question(system, Laws(system))) if nonsmooth else Question(system, Laws(system))
-    memory = contact_state_size(system) if nonsmooth else 0
-    program = Program(ask.system, ask.laws, memory=memory, inputs=held)
+    key = _outputs, program.laws.key, len(program.inputs), program.layout.size, nonsmooth
     make = lambda: Kernel(output_function(program, system.scene, nonsmooth))  # noqa: E731
-    return cached_on_disk(ask.system, (_outputs, ask.laws.key, held, nonsmooth), make, system)
+    return cached_on_disk(program.system, key, make, system)

@@ -14,6 +14,7 @@ from gauss.codegen import INTEGER, Function, write
 from gauss.codegen.kernels import RowCode, RowFunction
 from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.traced_system import Program
+from gauss.dynamics.train_coordinates import followers
 from gauss.integrators import Tolerance
 from gauss.rotations import rotation_vector_lead
 from gauss.system import turned
@@ -33,6 +34,7 @@ class ChartCode:
     def __init__(self, program: Program, shares: np.ndarray | None = None):
         self.layout: PointLayout = program.layout
         self.n_q, self.n_v, self.shares = self.layout.n_q, self.layout.n_v, shares
+        self.followers = followers(program.system) if program.drift.projects else []
         places: dict[str, list] = {"plain": [], "quaternion": []}
         for joint in program.system.joints:
             k = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
@@ -96,6 +98,14 @@ class ChartCode:
         code.copy(target, theta, self.n_v)
         for at_q, at_v in self._each(code, "plain"):
             code.put(target, at_v, code.b.fsub(code.number(moved, at_q), code.number(q, at_q)))
+
+    def follow(self, code: RowCode, x):
+        """Let the gear trains of a point follow their first joints, as :meth:`Program.on_trains`."""
+        for joint in self.followers:
+            q, v = code.number(x, 1 + joint.first_q), code.number(x, 1 + self.n_q + joint.first_v)
+            ratio, offset = code.motions.constant(joint.ratio), code.motions.constant(joint.offset)
+            code.put(x, 1 + joint.q, code.b.fadd(code.b.fmul(ratio, q), offset))
+            code.put(x, 1 + self.n_q + joint.v, code.b.fmul(ratio, v))
 
     def state(self, code: RowCode, x, t, y, target):
         """Write the state (t, q, v) of y in the chart around a point x."""

@@ -196,6 +196,7 @@ class ExplicitStages:
         kept, due = code.room(n_v), b.fadd(h, code.number(x, lost + n_y))
         code.put(found, 0, b.fadd(code.number(x, 0), due))
         self.chart.retract(code, code.at(x, 1), y, code.at(found, 1))
+        self.chart.follow(code, found)
         rate = code.room(n_v)  # that to which the step without compensation leads
         for k in code.each(n_v + 3):
             place = b.add(k, INTEGER(moving))
@@ -236,6 +237,7 @@ class ExplicitStages:
         state, found = self.chart.state_room(code), code.found
         self.chart.state(code, x, t, y, state)
         code.copy(found, state, 1 + n_q + n_v)
+        self.chart.follow(code, found)
         if self.program.projects:
             code.copy(code.at(found, 1), self._projected(code, state, x), n_q + n_v)
         code.copy(code.at(found, 1 + n_q + n_v), code.at(y, 2 * n_v), 3)

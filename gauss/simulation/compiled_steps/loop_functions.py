@@ -49,6 +49,7 @@ def _sample(program: Program, method: Controlled, begin: Callable, count: int) -
         state, work = method.interpolate(equations, layout.point(x), h[0], coefficients, t[0])
         if program.drift.partitioned:
             state, _ = equations.completed(state)
+        state = program.on_trains(state)
         if program.projects:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work
@@ -97,9 +98,9 @@ def _equations(program: Program, method: Controlled | FixedStep) -> Callable[[Po
 
 
 def _completed(program: Program, equations, point: Point) -> tuple[Point, Scalar]:
-    """Point with dependent coordinates from the independent ones, and the remaining constraint residual."""
+    """Point at the end of a step with dependent coordinates from the independent ones, and the remaining residual."""
     if not program.drift.partitioned:
-        return point, 0.0
+        return replace(point, state=program.on_trains(point.state)), 0.0
     state, residual = equations.completed(point.state)
     return replace(point, state=state, rates=program.evaluate(state)), residual
 
@@ -148,7 +149,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         if method.state_size:  # it satisfies the constraints itself, and a projection would spoil its compensated sums
             residual = equations.largest_violation(reached.state)
             return (
-                layout.pack(reached),
+                layout.pack(replace(reached, state=program.on_trains(reached.state))),
                 [residual],
                 [cost.evaluations, cost.factorisations, cost.unsolved, unseen],
             )

@@ -43,7 +43,7 @@ def taylor_step(program: Program, shares=None) -> TaylorStep:
 
     def finish(x, h, change):
         state, work, compensation = _moved(program, x, h[0], change)
-        return layout.pack(Point(state, work, layout.point(x).rates, compensation))
+        return layout.pack(Point(program.on_trains(state), work, layout.point(x).rates, compensation))
 
     def renew(x):
         point = layout.point(x)
@@ -57,6 +57,7 @@ def taylor_step(program: Program, shares=None) -> TaylorStep:
 
     def sample(x, h, change):
         state, work, _ = _moved(program, x, h[0], change)
+        state = program.on_trains(state)
         if program.projects:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work

@@ -47,10 +47,11 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
-        jam, rates = stepper.forbids(state, added), stepper.over(touch, free, v, h, force, added)
+        jam, rates = stepper.forbids(state, added), stepper.over(state, touch, free, v, h, force, added)
         found, _ = time_step(KnownRates(system, rates, share), point, h)
         forces = [*(force * stepper.unit), math.maximum(method_state[n], error)]
-        packed, violation = layout.pack(Point(found.state, found.work, rates, np.array(forces, dtype=object))), [0.0]
+        end = Point(program.on_trains(found.state), found.work, rates, np.array(forces, dtype=object))
+        packed, violation = layout.pack(end), [0.0]
         packed, violation = program.projected(packed) if program.projects else (packed, violation)
         normals = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # above 0 without a contact normal
         lost = [

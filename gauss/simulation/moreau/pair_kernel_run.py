@@ -4,7 +4,7 @@ A step of bodies that move freely is :mod:`gauss.dynamics.contact.free_body_step
 :mod:`gauss.dynamics.contact.mechanism_step`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -82,21 +82,33 @@ class PairKernelRun(PythonRun):
         warn_of_laws(self.motion.largest, self.motion.relaxed, self.steps)
         return found
 
+    def evaluate(self, state: State) -> Rates:
+        """Zeros: contacts make accelerations of single states."""
+        return Rates(np.zeros(self.system.n_v), np.zeros(self.powers))
+
     def _first(self, start: State) -> Point:
         self.stepper.check(start)
-        return Point(start, np.zeros(self.powers), Rates(np.zeros(self.system.n_v), np.zeros(self.powers)))
+        return Point(start, np.zeros(self.powers), self.evaluate(start))
 
     def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
         """Points of fixed steps; samples between them are the ends of separate shorter steps."""
         pairs = grid_of(method, point.state.t, self.end, self.h, samples, self.switching)
+        jumps = self._jumps(point.state.t)
+        for before, after in jumps:
+            pairs = pairs[(pairs[:, 0] <= before) | (pairs[:, 0] > after)]
         self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.h)
         holds: dict[int, int] = {}
         if self.held is not None:
             pairs, holds = with_samples(pairs, self.held.times[1:], self.h, samples is None)
             holds[0] = 0
-        ends, stops = _divided(pairs, holds)
+        impacts = {int(np.searchsorted(pairs[:, 0], before, side="right")): after for before, after in jumps}
+        ends, stops = _divided(pairs, [*holds, *impacts])
         done = 0
         for place, stop in stops:
+            jumped = self._jumped(point, impacts[place]) if place in impacts else None
+            if jumped:
+                point, self.motion.state, self.motion.work = jumped, jumped.state, jumped.work
+                yield point, None
             if place in holds:
                 self._hold(holds[place])
             while done < stop:
@@ -107,6 +119,11 @@ class PairKernelRun(PythonRun):
                     if point.state.t >= self.end:
                         self.stepper.check(point.state)
                     yield point, lambda t, state=begin[0], work=begin[1]: self.motion.beside(state, work, t)
+
+    def _jumps(self, begin: float) -> list[tuple[float, float]]:
+        """Times just before and just after possible jumps of prescribed velocities [s]."""
+        stops = self.switching.times.stops(begin, self.end)
+        return [stop for stop in stops if self.switching.jumps.within(*stop)]
 
     def _hold(self, k: int):
         """Set the inputs of a sample of the control law, at the present state."""
@@ -120,21 +137,22 @@ class PairKernelRun(PythonRun):
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         motion = self.motion
-        self.engine.evaluations, self.events = motion.steps, [*self.events, *motion.events]
+        self.engine.evaluations = motion.steps
+        self.events = sorted([*self.events, *motion.events], key=lambda event: event.t)
         whole = super()._trajectory(kept, samples, began)
         method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method)
         return replace(whole, stats=whole.stats._replace(method=method), step=self.step)
 
 
-def _divided(pairs: np.ndarray, holds: dict[int, int]) -> tuple[np.ndarray, list[tuple[int, int]]]:
+def _divided(pairs: np.ndarray, changes: Iterable[int]) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Ends of all steps of a grid [s], and the parts that are made at once.
 
-    A part ends where inputs change, after a step that has samples inside, and after :data:`CHUNK` steps. It is given by the
-    number of pairs before it, and the number of steps at its end.
+    A part ends where something changes, such as inputs, after a step that has samples inside, and after :data:`CHUNK` steps.
+    It is given by the number of pairs before it, and the number of steps at its end.
     """
     is_step = pairs[:, 1] != Due.OFF_GRID_SAMPLE
     steps = np.cumsum(is_step)  # at the end of each pair
     inside = np.flatnonzero(is_step & np.concatenate([[False], ~is_step[:-1]])) + 1
-    cuts = {0, len(pairs), *inside.tolist(), *holds, *range(0, len(pairs), CHUNK)}
+    cuts = {0, len(pairs), *inside.tolist(), *changes, *range(0, len(pairs), CHUNK)}
     places = sorted(cuts)
     return pairs[is_step, 0], [(a, int(steps[b - 1])) for a, b in zip(places[:-1], places[1:], strict=True)]

@@ -78,6 +78,7 @@ class PairKernelSteps:
         motion, layout, n_v = self.motion, self.layout, self.layout.n_v
         row, end = point[: layout.row].copy(), 1 + layout.n_q
         motion.state, motion.work = State(float(row[0]), row[1:end], row[end : end + n_v]), row[-3:]
+        motion.events.clear()  # of the steps of this call alone: a motion from Python may have no end
         motion.hold(point[layout.size - self.inputs.size :])
         try:
             rows = motion.advance(grid[:n, 0])

@@ -57,6 +57,13 @@ def framing(trajectory: Trajectory) -> Framing:
     return Framing(middle, eye, right, away, up, middle + lowest * up, reach)
 
 
+def joined(view: Framing, other: Framing, displacement: np.ndarray) -> Framing:
+    """View of two motions, of which the second is displaced to the right [m]."""
+    middle, reach = (view.middle + other.middle + displacement) / 2, view.reach + other.reach
+    eye = middle + (view.eye - view.middle) * reach / view.reach
+    return view._replace(middle=middle, eye=eye, reach=reach)
+
+
 def _ground(scene: Scene, up: np.ndarray, middle: np.ndarray) -> float | None:
     """Height of a level half-space of the scene over the middle [m]; None if there is none."""
     for shape in scene.shapes.values():

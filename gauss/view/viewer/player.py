@@ -6,11 +6,13 @@ import time
 import numpy as np
 
 from gauss.analysis import energy
+from gauss.simulation import Trajectory
 from gauss.view.style import COLOURS, NAMED
+from gauss.view.viewer.controls import add_layers, add_view
 from gauss.view.viewer.stage import ViewerStage
 
 SPEEDS = ("0.1×", "0.25×", "0.5×", "1×", "2×", "4×")
-SHOWN = {"link": "links", "joint": "joints", "contact": "shapes of contact", "frame": "frames", "path": "paths"}
+STEPS = {"◀ step": -1, "step ▶": 1}  # by so many pictures
 PAUSE = 1 / 60  # between two looks at the clock [s]
 
 
@@ -20,29 +22,30 @@ class Player:
     Parameters
     ----------
     stage : ViewerStage
-        What is moved.
+        What is moved; of more than one picture.
+    beside : ViewerStage, optional
+        Stage of a second motion, which moves with the first.
     """
 
-    def __init__(self, stage: ViewerStage):
+    def __init__(self, stage: ViewerStage, beside: ViewerStage | None = None):
         self.stage, self.trajectory = stage, stage.trajectory
-        t, gui = self.trajectory.t, stage.server.gui
-        self.now, self.playing, self.stopped = float(t[0]), len(t) > 1, threading.Event()
-        gui.add_markdown(f"**{self.trajectory.system.scene.name}**")
-        if len(t) > 1:
-            self.button = gui.add_button("Pause")
-            self.slider = gui.add_slider("time [s]", float(t[0]), float(t[-1]), float(t[1] - t[0]), float(t[0]))
-            self.speed = gui.add_dropdown("speed", SPEEDS, initial_value="1×")
-            self.button.on_click(lambda _: self.play(not self.playing))
-            self.slider.on_update(lambda event: self._dragged() if event.client is not None else None)
-        with gui.add_folder("show"):
-            for role, label in SHOWN.items():
-                self._toggle(gui, label, stage.parts[role])
-            if stage.arrows is not None:
-                self._toggle(gui, f"reactions, longest {stage.largest:.3g} N", [stage.arrows])
-            if stage.contacts.places:
-                self._contacts(gui, stage.contacts)
-        if len(t) > 1:
-            self._curves(gui)
+        self.stages = [stage] if beside is None else [stage, beside]
+        longest = max(self.stages, key=lambda each: float(each.trajectory.t[-1]))
+        self.times, gui = longest.trajectory.t, stage.server.gui
+        t = self.times
+        self.now, self.playing, self.stopped = float(t[0]), True, threading.Event()
+        gui.add_markdown(" | ".join(f"**{each.trajectory.system.scene.name}**" for each in self.stages))
+        self.button = gui.add_button("Pause")
+        self.slider = gui.add_slider("time [s]", float(t[0]), float(t[-1]), float(t[1] - t[0]), float(t[0]))
+        steps = gui.add_button_group("step", tuple(STEPS))
+        self.speed = gui.add_dropdown("speed", SPEEDS, initial_value="1×")
+        self.button.on_click(lambda _: self.play(not self.playing))
+        steps.on_click(lambda _: self.step(STEPS[steps.value]))
+        self.slider.on_update(lambda event: self._dragged() if event.client is not None else None)
+        add_layers(self.stages, lambda: self._go(self.now))
+        add_view(stage)
+        for each in self.stages:
+            self._curves(gui, each.trajectory)
 
     def play(self, on: bool):
         """Play or pause."""
@@ -50,7 +53,7 @@ class Player:
 
     def run(self):
         """Move the stage with the clock, until ``stopped`` is set."""
-        t, before = self.trajectory.t, time.perf_counter()
+        t, before = self.times, time.perf_counter()
         while not self.stopped.wait(PAUSE):
             elapsed, before = time.perf_counter() - before, time.perf_counter()
             if self.playing:
@@ -62,46 +65,36 @@ class Player:
         self.play(False)
         self._go(float(self.slider.value))
 
+    def step(self, pictures: int):
+        """Pause, and move by so many pictures."""
+        self.play(False)
+        here = int(abs(self.times - self.now).argmin()) + pictures
+        self._go(float(self.times[min(max(here, 0), len(self.times) - 1)]))
+        self.slider.value = self.now
+
     def _go(self, t: float):
         self.now = t
         with self.stage.server.atomic():
-            self.stage.to(int(abs(self.trajectory.t - t).argmin()))
+            for stage in self.stages:
+                stage.at(t)
 
     @staticmethod
-    def _toggle(gui, label: str, handles: list):
-        if not handles:
-            return
-        box = gui.add_checkbox(label, handles[0].visible)
-
-        @box.on_update
-        def _(_event):
-            for handle in handles:
-                handle.visible = box.value
-
-    def _contacts(self, gui, contacts):
-        box = gui.add_checkbox(f"contacts, longest {contacts.largest:.3g} N", True)
-
-        @box.on_update
-        def _(_event):
-            contacts.visible = box.value
-            self._go(self.now)
-
-    def _curves(self, gui):
+    def _curves(gui, trajectory: Trajectory):
         """Plots of coordinates, rates and energies; of the first coordinates, where they are many."""
         from viser import uplot
 
-        names = self.trajectory.system.coordinates[:NAMED]
+        names = trajectory.system.coordinates[:NAMED]
         scales = {"x": uplot.Scale(time=False)}
-        found = {"rates [rad/s, m/s]": self.trajectory.v[:, : len(names)]}
-        if self.trajectory.system.is_flat:
-            found = {"coordinates [rad, m]": self.trajectory.q[:, : len(names)]} | found
+        found = {"rates [rad/s, m/s]": trajectory.v[:, : len(names)]}
+        if trajectory.system.is_flat:
+            found = {"coordinates [rad, m]": trajectory.q[:, : len(names)]} | found
         lines = [uplot.Series(label=name, stroke=COLOURS[k % len(COLOURS)], width=2) for k, name in enumerate(names)]
         for title, columns in found.items():
-            data = (self.trajectory.t, *np.ascontiguousarray(columns.T))
+            data = (trajectory.t, *np.ascontiguousarray(columns.T))
             gui.add_uplot(data, (uplot.Series(label="t [s]"), *lines), title=title, scales=scales, aspect=1.4)
-        energies = energy(self.trajectory)
+        energies = energy(trajectory)
         kinetic, potential = energies.kinetic, energies.potential
         parts = {"kinetic": kinetic, "potential": potential, "sum": kinetic + potential}
         lines = [uplot.Series(label=name, stroke=COLOURS[k], width=2) for k, name in enumerate(parts)]
-        data, axis = (self.trajectory.t, *parts.values()), uplot.Series(label="t [s]")
+        data, axis = (trajectory.t, *parts.values()), uplot.Series(label="t [s]")
         gui.add_uplot(data, (axis, *lines), title="energies [J]", scales=scales, aspect=1.4)

@@ -7,6 +7,7 @@ import webbrowser
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from html import escape
+from itertools import pairwise
 from pathlib import Path
 
 import rich
@@ -15,7 +16,9 @@ import viser
 from gauss.errors import FileError
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
+from gauss.view.viewer.panel import with_panel
 from gauss.view.viewer.player import Player
+from gauss.view.viewer.poser import Poser
 from gauss.view.viewer.shown import FRAMES, Shown, shown
 from gauss.view.viewer.stage import ViewerStage
 
@@ -32,6 +35,10 @@ class Viewer:
         What is shown.
     port : int
         Port of the viewer on this machine.
+    dark : bool
+        Whether the ground is dark.
+    beside : Shown, optional
+        Second motion.
 
     Attributes
     ----------
@@ -39,12 +46,14 @@ class Viewer:
         Where a browser finds it.
     """
 
-    def __init__(self, what: Shown, port: int):
+    def __init__(self, what: Shown, port: int, dark: bool = False, beside: Shown | None = None):
         self.server = _server(port, what.motion.system.scene.name)
         self.url = f"http://{LOOPBACK}:{self.server.get_port()}"
-        stage = ViewerStage(self.server, what)
-        stage.make_room()
-        self.player = Player(stage)
+        stage = ViewerStage(self.server, what, dark)
+        second = None if beside is None else ViewerStage(self.server, beside, beside=stage)
+        stage.make_room(second)
+        moves = len(what.pictures) > 1 or second is not None
+        self.player: Player | Poser = Player(stage, second) if moves else Poser(stage)
         self.clock = threading.Thread(target=self.player.run, daemon=True)
         self.clock.start()
 
@@ -85,9 +94,20 @@ class Page:
 
 
 def show(
-    thing: Scene | Trajectory, *, visuals=(), joints=(), traces=None, port: int = 8080, browser: bool = False
+    thing: Scene | Trajectory,
+    *,
+    visuals=(),
+    joints=(),
+    traces=None,
+    beside: Trajectory | None = None,
+    dark: bool = False,
+    port: int = 8080,
+    browser: bool = False,
 ) -> Viewer:
-    """Show a scene in its start, or a motion, in the browser; only this machine can see it.
+    """Show a scene or a motion in the browser; only this machine can see it.
+
+    A scene is posed by sliders, and runs from there, while bodies are dragged by a spring. A motion plays or is stepped
+    through, with its curves beside it.
 
     Parameters
     ----------
@@ -99,6 +119,10 @@ def show(
         Joints whose reactions are drawn as arrows.
     traces : iterable of str, optional
         Bodies and frames that leave a trace; the bodies that carry no others when not given.
+    beside : Trajectory, optional
+        Second motion, which plays beside the first at the same times.
+    dark : bool
+        Whether the ground is dark at first.
     port : int
         Port of the viewer.
     browser : bool
@@ -119,18 +143,30 @@ def show(
     with socket.socket() as probe:
         if probe.connect_ex((LOOPBACK, port)) == 0:
             raise FileError(f"port {port} is taken, perhaps by another viewer; choose another one with port=.")
-    viewer = Viewer(shown(thing, 2 * FRAMES, visuals, joints, traces), port)
+    second = None if beside is None else shown(beside, 2 * FRAMES)
+    viewer = Viewer(shown(thing, 2 * FRAMES, visuals, joints, traces), port, dark, second)
     if browser:
         webbrowser.open(viewer.url)
     return viewer
 
 
-def page(thing: Scene | Trajectory, *, visuals=(), joints=(), traces=None, frames: int = FRAMES) -> Page:
+def page(
+    thing: Scene | Trajectory,
+    *,
+    visuals=(),
+    joints=(),
+    traces=None,
+    beside: Trajectory | None = None,
+    dark: bool = False,
+    frames: int = FRAMES,
+) -> Page:
     """Put a scene or motion on one page that plays in any browser, without a network, and inside a notebook.
+
+    Beside the scene are curves, cameras, steps, and the layers: links, frames, paths, forces.
 
     Parameters
     ----------
-    thing, visuals, joints, traces
+    thing, visuals, joints, traces, beside, dark
         As for :func:`show`.
     frames : int
         Pictures per second.
@@ -141,27 +177,34 @@ def page(thing: Scene | Trajectory, *, visuals=(), joints=(), traces=None, frame
         With its ``html``; a notebook shows it where it is the value of a cell.
     """
     what = shown(thing, frames, visuals, joints, traces)
-    server, motion = _server(_free_port(), what.motion.system.scene.name), what.pictures
+    server = _server(_free_port(), what.motion.system.scene.name)
     try:
-        stage = ViewerStage(server, what)
+        stages = [ViewerStage(server, what, dark)]
+        if beside is not None:
+            stages.append(ViewerStage(server, shown(beside, frames), beside=stages[0]))
+        stages[0].make_room(stages[-1] if len(stages) > 1 else None, aside=0.0)
+        times = max((stage.trajectory.t for stage in stages), key=lambda t: float(t[-1]))
         recording = server.get_scene_serializer()
-        for k in range(1, len(motion)):
-            recording.insert_sleep(float(motion.t[k] - motion.t[k - 1]))
-            stage.to(k)
-        return Page(recording.as_html())
+        for before, t in pairwise(times):
+            recording.insert_sleep(float(t - before))
+            for stage in stages:
+                stage.at(t)
+        return Page(with_panel(recording.as_html(dark), stages))
     finally:
         _stop(server)
 
 
-def export_html(thing: Scene | Trajectory, path, *, visuals=(), joints=(), traces=None, frames: int = FRAMES) -> Path:
+def export_html(thing: Scene | Trajectory, path, **options) -> Path:
     """Write a scene or motion as one HTML file that plays in any browser, without a network.
 
     Parameters
     ----------
-    thing, visuals, joints, traces, frames
-        As for :func:`page`.
+    thing : Scene or Trajectory
+        What is shown.
     path : str or Path
         The file, .html.
+    **options
+        As for :func:`page`.
 
     Returns
     -------
@@ -176,7 +219,7 @@ def export_html(thing: Scene | Trajectory, path, *, visuals=(), joints=(), trace
     path = Path(path)
     if path.suffix.lower() != ".html":
         raise FileError(f"{path}: a viewer is written as .html.")
-    text = page(thing, visuals=visuals, joints=joints, traces=traces, frames=frames).html
+    text = page(thing, **options).html
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:

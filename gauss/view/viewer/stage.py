@@ -1,5 +1,7 @@
 """The mechanism on the stage of a viser server: meshes, frames, paths, arrows; one call moves it to a sample."""
 
+from typing import Any
+
 import numpy as np
 
 from gauss.analysis import reactions
@@ -7,8 +9,9 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS
 from gauss.view.viewer.forms import forms, size
-from gauss.view.viewer.framing import FIELD, framing
-from gauss.view.viewer.shown import Shown
+from gauss.view.viewer.framing import FIELD, framing, joined
+from gauss.view.viewer.ground import ground, sky
+from gauss.view.viewer.shown import Shown, resampled
 from gauss.view.viewer.touches import touches
 
 STEEL, CONTACT = (0.32, 0.34, 0.38), (0.85, 0.65, 0.3)  # colours of joints and shapes of contact
@@ -17,8 +20,7 @@ RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contac
 ASIDE = 0.2  # of the reach of the motion: half the width of the controls
 FAINT = 1e-3  # of the largest contact force: smaller ones are not drawn
 POINT = 0.016  # radius of a contact point, of the size of the mechanism
-TOP, BOTTOM = np.array([214, 224, 236]), np.array([250, 250, 251])  # colours of the background
-LINES_OF_THE_FLOOR = {"cell_color": (218, 222, 228), "section_color": (190, 197, 207)}
+SMOOTHNESS, FINEST_PATH = 6, 6000  # points of a path for each picture, and most of them
 ROLES = ("link", "joint", "contact", "frame", "path")
 
 
@@ -31,10 +33,14 @@ class ViewerStage:
         Where it is drawn.
     shown : Shown
         What is drawn.
+    dark : bool
+        Whether the ground is dark.
+    beside : ViewerStage, optional
+        Stage of another motion, to the right of which this one stands.
     """
 
-    def __init__(self, server, shown: Shown):
-        self.server, self.trajectory = server, shown.pictures
+    def __init__(self, server, shown: Shown, dark: bool = False, beside: "ViewerStage | None" = None):
+        self.server, self.trajectory, self.ground = server, shown.pictures, ground(dark)
         trajectory, self.framing = self.trajectory, framing(self.trajectory)
         self.bodies = trajectory.system.structure.bodies
         self.size = size(trajectory.system)
@@ -43,12 +49,16 @@ class ViewerStage:
         self.colours = {name: rgb(COLOURS[k % len(COLOURS)]) for k, name in enumerate(self.bodies)}
         self.reactions = {joint: reactions(trajectory, joint).force for joint in shown.joints}
         self.largest = max((float(np.linalg.norm(f, axis=1).max()) for f in self.reactions.values()), default=0.0)
+        self.root = "" if beside is None else "/beside"
         with server.atomic():
-            self._surroundings()
+            if beside is None:
+                self._surroundings()
+            else:
+                server.scene.add_frame(self.root, show_axes=False, position=beside.place_beside(self))
             self._bodies(shown.visuals)
-            self._paths(shown.traces)
-            self.arrows = server.scene.add_arrows("/reactions", **self._arrows(0)) if self.reactions else None
-            self.contacts = ContactMarks(server, touches(shown.motion, self.trajectory, self.size), self.size)
+            self._paths(shown)
+            self.arrows = server.scene.add_arrows(f"{self.root}/reactions", **self._arrows(0)) if self.reactions else None
+            self.contacts = ContactMarks(server, touches(shown.motion, self.trajectory, self.size), self.size, self.root)
             self.to(0)
 
     def to(self, k: int):
@@ -59,40 +69,72 @@ class ViewerStage:
             self.arrows.points = self._arrows(k)["points"]
         self.contacts.to(k)
 
-    def make_room(self):
-        """Look a little to the right of the middle, where controls cover the picture."""
+    def at(self, t: float):
+        """Move everything to the picture nearest to a time [s]."""
+        self.to(int(abs(self.trajectory.t - t).argmin()))
+
+    def place(self, state):
+        """Move the bodies to a state."""
+        motion = kinematics(self.trajectory.system, state)
+        turns = _quaternions(np.array([motion.rotation(name) for name in self.bodies]).reshape(-1, 3, 3))
+        for node, name, turn in zip(self.nodes, self.bodies, turns, strict=True):
+            node.position, node.wxyz = motion.position(name), turn
+
+    def stand_on(self, dark: bool):
+        """Change to the light or the dark ground."""
+        self.ground = ground(dark)
+        with self.server.atomic():
+            self.server.gui.configure_theme(dark_mode=dark, show_share_button=False)
+            self.server.scene.set_background_image(sky(self.ground), format="png")
+            self.floor.cell_color, self.floor.section_color = self.ground.cell, self.ground.section
+            self.floor.shadow_opacity = self.ground.shadow
+
+    def place_beside(self, other: "ViewerStage") -> np.ndarray:
+        """Displacement (3,) of another stage that puts its motion to the right of this one, on the same floor [m]."""
+        one, view = self.framing, other.framing
+        apart = (one.reach + view.reach) / 2 * one.right
+        return one.middle + apart - view.middle + ((one.floor - view.floor - one.middle + view.middle) @ one.up) * one.up
+
+    def make_room(self, beside: "ViewerStage | None", aside: float = ASIDE):
+        """Look at both stages, and a little to the right of the middle, where controls cover the picture."""
+        if beside is not None:
+            self.framing = joined(self.framing, beside.framing, self.place_beside(beside))
         view, camera = self.framing, self.server.initial_camera
         ahead = view.middle - view.eye
         right = np.cross(ahead, view.up)
-        aside = ASIDE * view.reach * right / np.linalg.norm(right)
-        camera.look_at, camera.position = tuple(view.middle + aside), tuple(view.eye + aside)
+        shift = aside * view.reach * right / np.linalg.norm(right)
+        camera.look_at, camera.position = tuple(view.middle + shift), tuple(view.eye + shift)
 
     def _surroundings(self):
         view, scene = self.framing, self.server.scene
         scene.set_up_direction(tuple(view.up))
         scene.configure_default_lights(enabled=True)
-        scene.set_background_image(_sky(), format="png")
+        self.server.gui.configure_theme(dark_mode=self.ground.dark, show_share_button=False)
+        scene.set_background_image(sky(self.ground), format="png")
         turn = _quaternions(np.stack([view.right, view.away, view.up], axis=1)[None, None])[0, 0]
         cell = 10.0 ** np.round(np.log10(view.reach / 10))
-        look = {"cell_size": cell, "section_size": 5 * cell, "fade_distance": 6 * view.reach, "shadow_opacity": 0.22}
-        scene.add_grid(
-            "/floor", plane="xy", infinite_grid=True, wxyz=turn, position=view.floor, **look, **LINES_OF_THE_FLOOR
-        )
+        look = {"cell_size": cell, "section_size": 5 * cell, "fade_distance": 6 * view.reach}
+        look |= {"shadow_opacity": self.ground.shadow, "cell_color": self.ground.cell}
+        look |= {"section_color": self.ground.section}
+        self.floor = scene.add_grid("/floor", plane="xy", infinite_grid=True, wxyz=turn, position=view.floor, **look)
         camera = self.server.initial_camera
         camera.look_at, camera.up, camera.position = tuple(view.middle), tuple(view.up), tuple(view.eye)
         camera.fov, camera.near, camera.far = FIELD, 0.01 * view.reach, 100 * view.reach
 
     def _bodies(self, visuals):
         scene = self.server.scene
-        self.nodes = [scene.add_frame(f"/bodies/{name}", show_axes=False) for name in map(_path, self.bodies)]
+        bodies = f"{self.root}/bodies"
+        self.nodes = [scene.add_frame(f"{bodies}/{name}", show_axes=False) for name in map(_path, self.bodies)]
+        self.solids: list[tuple[str, Any]] = []  # meshes of bodies, which a pointer can drag
         self.parts: dict[str, list] = {role: [] for role in ROLES}
         for number, form in enumerate(forms(self.trajectory.system, visuals)):
-            parent = "/ground" if form.body == GROUND else f"/bodies/{_path(form.body)}"
+            parent = f"{self.root}/ground" if form.body == GROUND else f"{bodies}/{_path(form.body)}"
             role = {"joint": STEEL, "contact": CONTACT}.get(form.role)
             colour = form.colour or role or self.colours.get(form.body, STEEL)
             faces, vertices = np.asarray(form.mesh.faces, np.uint32), np.asarray(form.mesh.vertices, np.float32)
             handle = scene.add_mesh_simple(f"{parent}/{form.role} {number}", vertices, faces, color=colour, side="double")
             self.parts[form.role].append(handle)
+            self.solids += [(form.body, handle)] if form.body != GROUND else []
         look = {"axes_length": 0.12 * self.size, "axes_radius": 0.006 * self.size, "visible": False}
         for name, frame in self.trajectory.system.frames.items():
             if frame.body < 0 or name == GROUND:
@@ -100,20 +142,23 @@ class ViewerStage:
             own = self.trajectory.system.frames[self.bodies[frame.body]]
             turn = _quaternions((own.R.T @ frame.R)[None, None])[0, 0]
             place = {"wxyz": turn, "position": own.R.T @ (frame.p - own.p)}
-            node = f"/bodies/{_path(self.bodies[frame.body])}/frame {_path(name)}"
+            node = f"{bodies}/{_path(self.bodies[frame.body])}/frame {_path(name)}"
             self.parts["frame"].append(scene.add_frame(node, **place, **look))
 
-    def _paths(self, traces):
-        """Paths of centres of mass, and of origins of frames."""
-        if len(self.trajectory) < 2:
+    def _paths(self, shown: Shown):
+        """Paths of centres of mass, and of origins of frames, smoother than the pictures."""
+        if len(self.trajectory) < 2 or not shown.traces:
             return
-        for name in traces:
-            moved = self.trajectory.body(name)
+        fine = resampled(shown.motion, min(FINEST_PATH, SMOOTHNESS * len(self.trajectory)))
+        for name in shown.traces:
+            moved = fine.body(name)
             carrier = name if name in self.bodies else self.bodies[self.trajectory.system.frames[name].body]
             points = np.asarray(moved.com if name in self.bodies else moved.position, np.float32)
             segments = np.stack([points[:-1], points[1:]], axis=1)
             look = {"thickness": 0.006 * self.size}
-            handle = self.server.scene.add_line_segments(f"/paths/{_path(name)}", segments, self.colours[carrier], **look)
+            handle = self.server.scene.add_line_segments(
+                f"{self.root}/paths/{_path(name)}", segments, self.colours[carrier], **look
+            )
             self.parts["path"].append(handle)
 
     def _arrows(self, k: int) -> dict:
@@ -140,17 +185,21 @@ class ContactMarks:
         The places.
     size : float
         Size of the mechanism [m].
+    root : str
+        Node of the stage.
     """
 
-    def __init__(self, server, places: list, size: float):
+    def __init__(self, server, places: list, size: float, root: str = ""):
         self.places, self.visible = places, True
         self.largest = max((float(np.linalg.norm(place.forces, axis=1).max()) for place in places), default=0.0)
         self.scale = ARROW * size / self.largest if self.largest else 0.0
         look = {"shaft_radius": 0.008 * size, "head_radius": 0.02 * size, "head_length": 0.05 * size, "colors": ORANGE}
-        self.handles = []
+        self.handles, self.node = [], f"{root}/contacts"
+        if places:
+            server.scene.add_frame(self.node, show_axes=False)
         for number, place in enumerate(places):
-            ball = server.scene.add_icosphere(f"/contacts/point {number}", radius=POINT * size, color=ORANGE)
-            arrow = server.scene.add_arrows(f"/contacts/force {number}", self._points(place, 0), **look)
+            ball = server.scene.add_icosphere(f"{root}/contacts/point {number}", radius=POINT * size, color=ORANGE)
+            arrow = server.scene.add_arrows(f"{root}/contacts/force {number}", self._points(place, 0), **look)
             self.handles.append((ball, arrow))
 
     def to(self, k: int):
@@ -164,12 +213,6 @@ class ContactMarks:
 
     def _points(self, place, k: int) -> np.ndarray:
         return np.stack([place.points[k], place.points[k] + self.scale * place.forces[k]])[None].astype(np.float32)
-
-
-def _sky() -> np.ndarray:
-    """Background from top to bottom, (height, 1, 3)."""
-    share = np.linspace(0.0, 1.0, 256)[:, None, None]
-    return np.broadcast_to((1 - share) * TOP + share * BOTTOM, (256, 8, 3)).astype(np.uint8)
 
 
 def _path(name: str) -> str:

@@ -1,0 +1,63 @@
+"""Poses that meet all position constraints φ(q) = 0, near a pose that nearly does, by compiled Newton steps: J ξ = −φ.
+
+ξ is least in the units of the coordinates. Where Newton's method does not converge at once, damped steps follow
+(:mod:`gauss.dynamics.projection`).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.analysis.tangents import RANK_TOLERANCE, Tangents
+from gauss.codegen import Kernel, write
+from gauss.dynamics.assembly_search import RESIDUAL_TOLERANCE
+from gauss.dynamics.mechanism import loop_residual
+from gauss.dynamics.projection import position_residual_of, project_positions, project_rates, relative
+from gauss.dynamics.store import cached
+from gauss.system import State, System, retract, whole
+
+NEWTON_STEPS = 8
+LONGEST_STEP = 0.2  # in units of the coordinates; longer ones are left to damped steps
+CONVERGED = 1e-10  # step in units, after which the next one, quadratically smaller, is round-off
+POSITION_STEPS = 30  # damped Gauss–Newton steps
+
+
+def closed(system: System, state: State, held=()) -> tuple[State, bool]:
+    """State near another one that meets the position constraints, and whether it does; entries ``held`` of v are fixed."""
+    if not system.has_closures:
+        return state, True
+    kernel = cached(system, (closed,), lambda: _kernel(system))
+    free = np.setdiff1d(np.arange(system.n_v), list(held))
+    units, found = system.scale.coordinates[free], state
+    for _ in range(NEWTON_STEPS):
+        phi = kernel(np.concatenate([[found.t], found.q]))
+        J = Tangents(system, found).position_rows[:, free] * units
+        xi = np.zeros(system.n_v)
+        xi[free] = -units * np.linalg.lstsq(J, phi, rcond=RANK_TOLERANCE)[0]
+        longest = np.abs(xi / system.scale.coordinates).max(initial=0.0)
+        if not longest <= LONGEST_STEP:
+            break
+        found = replace(found, q=retract(system, found.q, xi))
+        if longest <= CONVERGED:
+            return found, True
+    found = project_positions(system, state, POSITION_STEPS, held)
+    return found, relative(system, position_residual_of(system, found)) <= RESIDUAL_TOLERANCE
+
+
+def with_rates(system: System, state: State, held=()) -> State:
+    """State with rates that meet the velocity constraints, and keep the entries ``held``; the others follow."""
+    if system.relations.placed:
+        return project_rates(system, state, held)
+    N, places = Tangents(system, state).rate, list(held)  # joints and couplings allow rest
+    return replace(state, v=N @ np.linalg.lstsq(N[places], state.v[places], rcond=RANK_TOLERANCE)[0])
+
+
+def _kernel(system: System) -> Kernel:
+    """(t, q) → position residuals, those of the coordinates of loop joints included."""
+    unreduced = (whole(system),)
+
+    def residual(t, q):
+        rows, slack = loop_residual(system, q, t[0], unreduced)
+        return np.concatenate([rows, *(part for parts in slack for part in parts)])
+
+    return Kernel(write(residual, 1, system.n_q, name="position residual"), batch=False)

@@ -1,0 +1,91 @@
+"""Whether an opaque law reads the time: it is called with a number that records its uses.
+
+A law that does not read the time at a state has one value there at all times.
+"""
+
+from collections.abc import Callable
+from sys import getrefcount
+
+from gauss.dynamics.kinematics import Kinematics
+from gauss.scene.stateful_laws import preserved
+from gauss.system import State
+
+BARE = {"__new__", "__getattribute__"}  # methods of a float that say nothing of its value
+
+
+class RecordedTime:
+    """Time that behaves as the number it is, and records whether it was read.
+
+    Parameters
+    ----------
+    t : float
+        Time [s].
+
+    Attributes
+    ----------
+    is_read : bool
+        Whether its value, its text or its type was asked for.
+    """
+
+    __slots__ = "is_read", "value"
+
+    def __init__(self, t: float):
+        self.value, self.is_read = t, False
+
+    @property  # type: ignore[misc]  # asked for by isinstance
+    def __class__(self) -> type:
+        self.is_read = True
+        return float
+
+    def __getattr__(self, name: str):
+        self.is_read = True
+        return getattr(self.value, name)
+
+
+def _recorded(name: str) -> Callable:
+    """Method of a float that records its call."""
+
+    def method(self: RecordedTime, *arguments):
+        self.is_read = True
+        return getattr(self.value, name)(*arguments)
+
+    return method
+
+
+for _name, _method in vars(float).items():
+    if callable(_method) and _name not in BARE:
+        setattr(RecordedTime, _name, _recorded(_name))
+
+
+def reads_time(law: Callable, motion: Kinematics) -> tuple[bool, bool]:
+    """Whether a law reads its first argument, and the time of its second one, at a state.
+
+    A law that keeps one of them, or returns it, or raises an exception, reads it.
+
+    Parameters
+    ----------
+    law : callable
+        Of (t, motion).
+    motion : Kinematics
+        Kinematics of the state.
+    """
+    own, of_motion = RecordedTime(motion.state.t), RecordedTime(motion.state.t)
+    given = at_time(motion, of_motion)
+    of_motion.is_read = False  # a checker of types may have asked for it
+    unread = getrefcount(own), getrefcount(of_motion)
+    try:
+        with preserved(law):
+            value = law(own, given)  # it may be the time itself
+            kept = getrefcount(own) > unread[0], getrefcount(of_motion) > unread[1]
+            del value
+    except Exception:  # whatever it does with the time
+        return True, True
+    return own.is_read or kept[0], of_motion.is_read or kept[1]
+
+
+def at_time(motion: Kinematics, t) -> Kinematics:
+    """Kinematics of the same coordinates and rates at another time."""
+    found = Kinematics.__new__(Kinematics)
+    found.__dict__.update(motion.__dict__)
+    found.state = State(t, motion.state.q, motion.state.v)
+    return found

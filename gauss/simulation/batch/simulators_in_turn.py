@@ -1,0 +1,82 @@
+"""Batch of motions with contacts of many pairs of shapes: one simulator makes the steps of each, in turn."""
+
+from typing import Any
+
+import numpy as np
+
+from gauss.codegen.kernels import WORST_RECORD
+from gauss.dynamics.initial_states import constraint_residual
+from gauss.errors import SimulationError
+from gauss.simulation.simulator import Simulator, SimulatorState
+from gauss.system import State
+
+
+class SimulatorsInTurn:
+    """Points of motions, one column each, in the form of :class:`gauss.simulation.batch.fixed_step_batch.FixedStepBatch`.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        A simulator of kernels of pairs of shapes.
+    starts : ndarray, shape (n_q + n_v, batch)
+        Initial states, at t = 0.
+    """
+
+    def __init__(self, simulator: Simulator, starts: np.ndarray):
+        self.simulator, self.size = simulator, starts.shape[1]
+        self.states, self.worst = slice(1, 1 + len(starts)), np.zeros((len(WORST_RECORD), self.size))
+        self.contacts: list[Any] = []
+        points = []
+        for k, start in enumerate(starts.T):
+            state = State(0.0, *np.split(start, [simulator.system.n_q]))
+            self.worst[1, k] = constraint_residual(simulator.system, state) if simulator.system.has_closures else 0.0
+            simulator.reset(state)
+            begun = simulator.snapshot()
+            self.contacts.append(begun.contacts)
+            points.append(np.frombuffer(begun.point))
+        self.control, self.points = begun.control, np.array(points).T
+
+    @property
+    def error(self) -> np.ndarray:
+        """Largest error of the accelerations, relative: the simulator checks each start itself."""
+        return self.worst[0]
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Constraint residual of the initial states, relative to the sizes of the constraints."""
+        return self.worst[1]
+
+    @property
+    def unseen(self) -> np.ndarray:
+        """Zero: the simulator warns itself of conditions of laws that a step may have passed."""
+        return self.worst[2]
+
+    @property
+    def unsolved(self) -> np.ndarray:
+        """Zero: the simulator repeats steps whose equations are not solved."""
+        return self.worst[3]
+
+    @property
+    def reached(self) -> np.ndarray:
+        """States (n_q + n_v, batch) so far, NaN of motions that cannot continue."""
+        return self.points[self.states]
+
+    def take(self, chosen: np.ndarray, fresh: "SimulatorsInTurn"):
+        """Continue some motions from the points of another batch."""
+        self.points[:, chosen] = fresh.points
+        for k, contacts in zip(chosen, fresh.contacts, strict=True):
+            self.contacts[k] = contacts
+
+    def advance(self, done: int, n: int, h: float, threads: int, control: np.ndarray | None = None):
+        """Make n steps of length h [s] after the first ``done``, under inputs (batch, 1, n_u), without samples."""
+        for k in np.flatnonzero(np.isfinite(self.reached).all(axis=0)):
+            point, simulator = self.points[:, k].copy(), self.simulator
+            point[0] = done * h
+            simulator.restore(SimulatorState(point.tobytes(), self.control, 0.0, done, self.contacts[k]))
+            try:
+                simulator.step(None if control is None else control[k, 0], n)
+            except SimulationError:
+                self.points[1:, k] = np.nan
+                continue
+            reached = simulator.snapshot()
+            self.points[:, k], self.contacts[k] = np.frombuffer(reached.point), reached.contacts
