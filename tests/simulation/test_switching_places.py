@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import gauss
 from gauss import math as gm
@@ -98,3 +99,26 @@ def test_an_opaque_law_that_jumps_at_a_place_is_crossed():
     for _ in range(2):
         with pytest.warns(SwitchingWarning, match="drive of y"):
             gauss.simulate(system, 5.0, progress=False)
+
+
+# Narrow smooth forces of u, the distance from a place in widths of 0.05 m: quotients, powers, differences of steps.
+NARROW = {
+    "cubed": lambda u: 1.0 / (1.0 + u * u) ** 3,
+    "twentieth power": lambda u: 1.0 / (1.0 + u * u) ** 20,
+    "power of a quotient": lambda u: (1.0 / (1.0 + u * u)) ** 30,
+    "root": lambda u: 1.0 / np.sqrt(1.0 + u * u) ** 6,
+    "steps that cancel": lambda u: (u + 1) / np.sqrt((u + 1) ** 2 + 1e-4) - (u - 1) / np.sqrt((u - 1) ** 2 + 1e-4),
+}
+
+
+@pytest.mark.parametrize("shape", NARROW)
+def test_narrow_quotients_are_never_flown_past(shape):
+    """The place varies, for samples may lie on the peak by chance; half of v² is the work, by quadrature."""
+    for at in 50.0 + 5.0 * np.sin(1.7 * np.arange(3)):
+        scene = slider(lambda t, m, at=at: 10.0 * NARROW[shape]((m.coordinate("x") - at) / 0.05), rate=3.0)
+        motion = gauss.simulate(scene, 20.0, rtol=1e-10, atol=1e-10, progress=False)
+        points = [at + d for d in (-1.0, -0.1, -0.06, -0.05, -0.04, 0.0, 0.04, 0.05, 0.06, 0.1, 1.0)]
+        work = quad(lambda x, at=at: 10.0 * NARROW[shape]((x - at) / 0.05), 0.0, motion.q[-1, 0], points=points, limit=500)[
+            0
+        ]
+        assert motion.v[-1, 0] == pytest.approx(np.sqrt(9.0 + 2.0 * work), rel=1e-8)

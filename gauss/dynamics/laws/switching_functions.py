@@ -15,8 +15,10 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
+from gauss.codegen.kernels import CheckedSwitch
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.products import Products
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
@@ -72,10 +74,11 @@ class SwitchingFunctions:
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
         self.jumps = [_jumps(x) for x in (*starmap(sub, self.pairs), *self.steps)]
         self.peaks = [x for x in _exponents(outputs) if x.index not in timed]
-        self.names = _names(laws, {node.index for node in (*nodes, *self.peaks)})
+        self.products = Products(outputs, timed)
+        self.names = _names(laws, {node.index for node in (*nodes, *self.peaks, *self.products.nodes)})
 
     def __bool__(self):
-        return bool(self.pairs or self.steps or self.peaks)
+        return bool(self.pairs or self.steps or self.peaks or self.products)
 
     def judged(self, ends: tuple[Point, Point], error, factor, refused, smallest) -> tuple[Scalar, Scalar]:
         """Error and step-size factor of a step, corrected for crossings that its error estimate may miss.
@@ -124,10 +127,12 @@ class SwitchingFunctions:
         first, last : ndarray, shape (n_v,)
             Accelerations there.
         """
+        crossings, distinct, crossed = 0.0, 0.0, 1.0
+        hidden = self._without_narrow_peaks(begin, first, end, last)
+        if not any(self._groups):
+            return hidden, 0.0
         nodes, parts = self._parts(begin, first, end, last)
         ends = [list(self._values(node)) for node in nodes]
-        crossings, distinct, crossed = 0.0, 0.0, 1.0
-        hidden: Scalar = 1.0
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
         enclosed = [_divided(_intervals(self._enclosures(np.ravel(part))), *self._counts) for part in parts]
         tops = [
@@ -153,6 +158,11 @@ class SwitchingFunctions:
                 unclear = straddles * turns * (1.0 - changes)
                 hidden = math.where(unclear > 0.0, math.minimum(hidden, middle), hidden)
         return math.minimum(hidden, math.where(distinct > 1.5, crossed, 1.0)), crossings
+
+    def _without_narrow_peaks(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> Scalar:
+        """Share of a step before its first narrow peak of a product, 1 where there is none."""
+        given = ([begin.t], begin.q, begin.v, first, [end.t], end.q, end.v, last)
+        return self._narrow(*given)[0] if self.products else 1.0
 
     def _beyond_rounding(self, k: int, changes: Scalar, before: Scalar, after: Scalar) -> Scalar:
         """Changes of the sign of a function, 0 where its values at both ends of a subinterval are rounding."""
@@ -212,6 +222,41 @@ class SwitchingFunctions:
             return list(self.share(State(t[0], q, v), first, State(t_end[0], q_end, v_end), last))
 
         return Kernel(write(share, *sizes, *sizes, name="unseen"), batch=False)
+
+    @cached_property
+    def _narrow(self) -> CheckedSwitch:
+        """Ends of a step, as for :attr:`machine_code` → share before its first narrow peak of a product.
+
+        Few steps are divided: the others have no peak by one enclosure of the whole step.
+        """
+        symbols, bases = [*self._symbols, *self._acceleration], self.products.bases
+        rates = self._slopes(bases)
+        sizes = (1, self.system.n_q, self.system.n_v, self.system.n_v)
+
+        def values(state):
+            given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, state, strict=True)}
+            return [value.low for value in enclose(bases, given)]
+
+        def enclosures(ends):
+            given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
+            return [end for value in enclose([*bases, *rates], given) for end in value]
+
+        at = write(values, len(self._symbols), name="bases")
+        around = write(enclosures, 2 * len(symbols), name="base_enclosures")
+
+        def seen(count, t, q, v, first, t_end, q_end, v_end, last):
+            nodes, parts = self._parts(State(t[0], q, v), first, State(t_end[0], q_end, v_end), last, count)
+            found = [_divided(_intervals(around(np.ravel(part))), len(bases), len(rates)) for part in parts]
+            return [list(at(node)) for node in nodes], *map(list, zip(*found, strict=True)), (t_end[0] - t[0]) / count
+
+        def whole(*ends):
+            return [1.0, self.products.is_flat(*seen(1, *ends))]
+
+        def divided(*ends):
+            return [self.products.hidden(*seen(PARTS, *ends))]
+
+        flat, parted = write(whole, *sizes, *sizes, name="flat"), write(divided, *sizes, *sizes, name="narrow")
+        return CheckedSwitch(flat, parted, 0.5)
 
     @cached_property
     def _groups(self) -> tuple[list, list, list, list]:
@@ -275,7 +320,7 @@ class SwitchingFunctions:
     def _acceleration(self) -> np.ndarray:
         return self._clock.graph.symbols("a", self.system.n_v)
 
-    def _parts(self, begin: State, first, end: State, last) -> tuple[list, list[list[Interval]]]:
+    def _parts(self, begin: State, first, end: State, last, count: int = PARTS) -> tuple[list, list[list[Interval]]]:
         """Values of (t, q, v) at the ends of the subintervals of a step, and enclosures of (t, q, v, q̈) on each."""
         h = end.t - begin.t
         value = [np.concatenate([[s.t], s.q, s.v]) for s in (begin, end)]
@@ -283,8 +328,8 @@ class SwitchingFunctions:
             np.concatenate([[1.0], coordinate_rates(self.system, s.q, s.v), a]) for s, a in ((begin, first), (end, last))
         ]
         change = value[1] - value[0]
-        nodes, slopes, tau = [], [], h / PARTS
-        for s in np.arange(PARTS + 1) / PARTS:  # Hermite's polynomial and its derivative
+        nodes, slopes, tau = [], [], h / count
+        for s in np.arange(count + 1) / count:  # Hermite's polynomial and its derivative
             bump = s * (1.0 - s)
             nodes.append(value[0] + s * s * (3.0 - 2.0 * s) * change + h * bump * ((1.0 - s) * slope[0] - s * slope[1]))
             inner = (1.0 - s) * (1.0 - 3.0 * s) * slope[0] - s * (2.0 - 3.0 * s) * slope[1]
@@ -292,7 +337,7 @@ class SwitchingFunctions:
         symbols, n = self._symbols, self.system.n_v
         nodes[-1] = value[1]
         parts = []
-        for j in range(PARTS):
+        for j in range(count):
             points = [nodes[j], nodes[j] + tau / 3.0 * slopes[j], nodes[j + 1] - tau / 3.0 * slopes[j + 1], nodes[j + 1]]
             part = [_hull([point[k] for point in points]) for k in range(len(symbols))]
             between = [3.0 * (points[i + 1] - points[i]) / tau for i in range(3)]  # Bernstein coefficients of the derivative
