@@ -279,9 +279,12 @@ class _Point:
         return (y * (LONGEST_STEP / longest) if longest > LONGEST_STEP else y), longest
 
     def moved(self, y: np.ndarray) -> "_Point":
-        """Point after a step, on the constraints."""
-        system = self.problem.system
-        return _Point(self.problem, *closed(system, replace(self.state, q=retract(system, self.state.q, self.N @ y))))
+        """Point after a step, on the constraints, or within limits to the last digit where there are none."""
+        problem, system = self.problem, self.problem.system
+        state = replace(self.state, q=retract(system, self.state.q, self.N @ y))
+        if not system.has_closures:
+            return _Point(problem, clipped(system, state, problem.lowest, problem.highest))
+        return _Point(problem, *closed(system, state))
 
     def merit(self, level: int) -> float:
         """Costs of a level, and the violation of limits."""
