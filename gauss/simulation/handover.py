@@ -6,6 +6,7 @@ import numpy as np
 
 from gauss.codegen.kernels import LoopStatus
 from gauss.errors import SimulationError
+from gauss.integrators import Point
 from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.step_limits import unsolved
 from gauss.simulation.trajectory import Stats, Trajectory
@@ -33,7 +34,7 @@ def finished(run: CompiledRun, fallback: Callable[[State, np.ndarray | None], Tr
         rest, failure = fallback(begin.state, samples), None
     except (SimulationError, KeyboardInterrupt) as error:
         rest, failure = getattr(error, "trajectory", None), error
-    whole = first if rest is None else _joined(first, rest, begin.work, run.samples is None)
+    whole = first if rest is None else _joined(first, rest, begin, run.samples is None)
     if isinstance(failure, KeyboardInterrupt):
         failure.trajectory = whole  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the motion so far
         raise failure
@@ -44,8 +45,8 @@ def finished(run: CompiledRun, fallback: Callable[[State, np.ndarray | None], Tr
     return whole
 
 
-def _joined(first: Trajectory, rest: Trajectory, work: np.ndarray, repeated: bool) -> Trajectory:
-    """Concatenation of two trajectories; the second may repeat the last sample of the first."""
+def _joined(first: Trajectory, rest: Trajectory, begin: Point, repeated: bool) -> Trajectory:
+    """Concatenation of two trajectories, the second from a point on; it may repeat the last sample of the first."""
     skip = slice(1 if repeated else 0, None)
     t, q, v = (np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v"))
     one, two = first.stats, rest.stats
@@ -63,7 +64,7 @@ def _joined(first: Trajectory, rest: Trajectory, work: np.ndarray, repeated: boo
         two.rescued,
         unseen=one.unseen + two.unseen,
         opaque=two.opaque,
-        handed_over=float(first.t[-1]) if len(first) else float(rest.t[0]),
+        handed_over=float(first.t[-1]) if len(first) else begin.state.t,
     )
-    whole_work = np.concatenate([first.work, rest.work[skip] + work])
+    whole_work = np.concatenate([first.work, rest.work[skip] + begin.work])
     return Trajectory(first.system, t, q, v, whole_work, stats, (*first.events, *rest.events))

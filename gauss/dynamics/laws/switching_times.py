@@ -255,14 +255,15 @@ def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) 
     middle, looks = 0.5 * (low + high), cells[0] + LOOKS[:, None] * (cells[1] - cells[0])
 
     def values(asked, time: Interval) -> np.ndarray:
-        found = enclose(asked, given | {clock.index: time})
+        with np.errstate(over="ignore", invalid="ignore"):  # an infinite slope bounds nothing
+            found = enclose(asked, given | {clock.index: time})
         return np.array([[np.broadcast_to(end, time.low.shape) for end in value] for value in found]).transpose(1, 0, 2, 3)
 
     lowest, highest = values(nodes, Interval(low, high))
     if slopes:
         reach = 0.5 * (high - low) * np.abs(values(slopes, Interval(low, high))).max(axis=0)
         between = values(nodes, Interval.point(middle))[0]
-        lowest, highest = np.maximum(lowest, between - reach), np.minimum(highest, between + reach)
+        lowest, highest = np.fmax(lowest, between - reach), np.fmin(highest, between + reach)
     samples, borders = values(nodes, Interval.point(looks))[0], values(nodes, Interval.point(cells))[0]
     extent, widest = np.ptp(samples, axis=1), (highest - lowest).max(axis=1)
     lowest, highest = lowest.min(axis=1), highest.max(axis=1)
