@@ -38,7 +38,9 @@ MENDED = {
     385: "impacts and contacts did not end where rounding turned a rate that slides",
     428: "a limited drive could not hold against a prescribed motion",
     601: "impacts and contacts did not end where loops lock a joint with friction",
+    7626: "bounds of a law of time overflowed",
 }
+REFUSED = {3291: "neither the motion nor its continuation had a sample"}
 
 
 @pytest.mark.slow
@@ -47,6 +49,14 @@ MENDED = {
 def test_scenes_that_once_failed_move(number):
     row = examine_motion(0, number)
     assert row["verdict"] == "agree", row
+
+
+@pytest.mark.slow
+@needs_clock
+@pytest.mark.parametrize("number", REFUSED)
+def test_scenes_that_cannot_move_are_refused(number):
+    row = examine_motion(0, number)
+    assert row["verdict"] == "refused", row
 
 
 def test_random_scenes_have_elements_of_many_kinds():
