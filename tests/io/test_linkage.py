@@ -12,6 +12,7 @@ from gauss.io import linkages
 from gauss.linkages import table
 from gauss.view import animate_linkage, plot_linkage
 from gauss.view.linkage_drawing import Drawing
+from gauss.view.linkages import coupler_points
 from tests.support import mechanisms
 from tests.support.files import call
 
@@ -77,7 +78,7 @@ def test_figures_show_the_numbers(tmp_path, name):
     found, path = _cycle(name), tmp_path / "figure.png"
     figure = plot_linkage(found, path)
     assert path.read_bytes().startswith(b"\x89PNG")
-    drawing, torque, reactions, bearings = figure.axes
+    drawing, torque, reactions, bearings, transmission, curves = figure.axes
     assert drawing.get_aspect() == 1.0
     assert torque.lines[0].get_ydata() == pytest.approx(found.torque)
     assert torque.get_ylabel() == "driving torque [N m]" and torque.get_xlabel() == "crank angle [°]"
@@ -85,6 +86,10 @@ def test_figures_show_the_numbers(tmp_path, name):
         assert line.get_ydata() == pytest.approx(np.hypot(*found.reaction(joint.name).force.T))
     angle, size = bearings.lines[0].get_data()
     assert size * np.exp(1j * angle) == pytest.approx(-found.reaction("A").force @ [1, 1j])
+    for line, angle in zip(transmission.lines, found.transmission().values(), strict=True):
+        assert line.get_ydata() == pytest.approx(np.degrees(angle))
+    for line, (link, point) in zip(curves.lines, coupler_points(found), strict=True):
+        assert line.get_xydata().ravel() == pytest.approx(found.link(link).point(complex(*point)).view(float).ravel())
 
 
 @pytest.mark.parametrize("name", linkages())
