@@ -1,5 +1,7 @@
 """Integrators of other libraries: SciPy and CVODE for ODEs y' = f(t, y), IDA for DAEs F(t, y, y') = 0."""
 
+import signal
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -100,6 +102,8 @@ def _values(method: str, times: np.ndarray, y0: np.ndarray, steps: list[tuple]) 
 class _Interruptible:
     """A callback (…, out) of compiled code, which loses its steps where a callback raises: after Ctrl-C it gives NaN.
 
+    As a context it takes care of Ctrl-C within the compiled code, which Python would raise at the first line of a callback.
+
     Parameters
     ----------
     function : callable
@@ -107,16 +111,34 @@ class _Interruptible:
     """
 
     def __init__(self, function: Callable):
-        self.function = function
+        self.function, self.inside = function, False
         self.interruption: KeyboardInterrupt | None = None
+
+    def __enter__(self):
+        main = threading.current_thread() is threading.main_thread()
+        self.replaced = main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if self.replaced:
+            signal.signal(signal.SIGINT, self._pressed)
+        return self
+
+    def __exit__(self, *_):
+        if self.replaced:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def _pressed(self, number: int, frame):
+        if self.inside:
+            raise KeyboardInterrupt
+        self.interruption = KeyboardInterrupt()
 
     def __call__(self, *given):
         """Call the function, before the interruption."""
         if self.interruption is None:
             try:
+                self.inside = True
                 self.function(*given)
+                self.inside = False
             except KeyboardInterrupt as error:
-                self.interruption = error
+                self.inside, self.interruption = False, error
         if self.interruption is not None:
             given[-1][:] = np.nan
 
@@ -143,7 +165,8 @@ def _cvode(method: str) -> Callable:
         largest = 0.0 if np.isinf(largest) else largest
         options = {"method": method, "rtol": max(rtol, 1e-15), "atol": atol, "max_step": largest}
         callback = _Interruptible(rate)
-        found = CVODE(lambda t, y, out: callback(t, y, out), max_num_steps=MOST_STEPS, **options).solve(times, y0)
+        with callback:
+            found = CVODE(lambda t, y, out: callback(t, y, out), max_num_steps=MOST_STEPS, **options).solve(times, y0)
         steps = len(found.t) - 1 if len(times) == 2 else 0
         return callback.solution(found, steps, None if found.success else str(found.message))
 
@@ -158,15 +181,16 @@ def _ida(residual, times, start, rtol, atol, largest, algebraic) -> LibrarySolut
     options = {"rtol": max(rtol, 1e-15), "atol": atol, "max_step": 0.0 if np.isinf(largest) else largest}
     monitor = _StallMonitor(times[0], times[-1])
 
-    callback = _Interruptible(residual)
-
     def watched(t, y, slope, out):
-        callback(t, y, slope, out)
+        residual(t, y, slope, out)
         if monitor.stalls(t):
             out[:] = np.nan  # ends the integration
 
-    solver = IDA(watched, algebraic_idx=list(algebraic) or None, max_num_steps=MOST_STEPS, **options)
-    found = solver.solve(times, *start)
+    callback, index = _Interruptible(watched), list(algebraic) or None
+    with callback:
+        options |= {"algebraic_idx": index, "max_num_steps": MOST_STEPS}
+        solver = IDA(lambda t, y, slope, out: callback(t, y, slope, out), **options)
+        found = solver.solve(times, *start)
     steps = len(found.t) - 1 if len(times) == 2 else 0
     failure = None if found.success else monitor.reason or str(found.message)
     return callback.solution(found, steps, failure)
