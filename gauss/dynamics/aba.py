@@ -31,28 +31,6 @@ class Elimination(NamedTuple):
     projected: tuple | None = None
 
 
-class InwardForces(NamedTuple):
-    """Result of the inward recursion: what the outward recursion needs beside the elimination.
-
-    Attributes
-    ----------
-    u : dict
-        Joint forces u = τ − Sᵀ p, by the first body of each cluster; missing ones are zero.
-    biases : dict
-        Accelerations (6,) across joints at rates that stay, by body.
-    ground : ndarray, shape (6,), or None
-        Acceleration of the ground; None where only u and the biases act.
-    """
-
-    u: dict[int, np.ndarray]
-    biases: dict[int, np.ndarray]
-    ground: np.ndarray | None
-
-    def plus(self, more: dict[int, np.ndarray]) -> "InwardForces":
-        """The same with further joint forces."""
-        return self._replace(u=self.u | {body: self.u[body] + own if body in self.u else own for body, own in more.items()})
-
-
 class ArticulatedBody:
     """Forward dynamics of an open tree in one state: M q̈ + h = τ.
 
@@ -109,46 +87,36 @@ class ArticulatedBody:
 
     def motion(self, tau, wrenches=None):
         """Accelerations by joint and by body under gravity, generalised forces (n_v,) and wrenches {body: (6,)} on links."""
-        return self.outward_recursion(self.inward_motion(tau, wrenches))
-
-    def inward_motion(self, tau, wrenches=None) -> InwardForces:
-        """Inward recursion of :meth:`motion`."""
         tree = self.tree
         forces = {body: gyroscopic(tree.links[body], tree.omegas[body]) for body in tree.joint_kinematics}
         for body, wrench in (wrenches or {}).items():
             forces[body] = forces[body] - wrench
-        biases = {body: kin.bias for body, kin in tree.joint_kinematics.items()}
-        return InwardForces(self._inward(forces, biases, tau), biases, tree.ground)
+        return self._solve(forces, {body: kin.bias for body, kin in tree.joint_kinematics.items()}, tree.ground, tau)
 
     def response(self, tau, wrenches=None, biases=None):
         """Accelerations by joint and by body that forces alone cause, without gravity and velocities; zeros are left out.
 
         ``biases`` {body: (6,)} are added to the accelerations across the joints.
         """
-        return self.outward_recursion(self.inward_response(tau, wrenches, biases))
-
-    def inward_response(self, tau, wrenches=None, biases=None) -> InwardForces:
-        """Inward recursion of :meth:`response`."""
-        forces = {body: -wrench for body, wrench in (wrenches or {}).items()}
-        return InwardForces(self._inward(forces, biases or {}, tau), biases or {}, None)
+        return self._solve({body: -wrench for body, wrench in (wrenches or {}).items()}, biases or {}, None, tau)
 
     def half_response(self, tau, wrenches=None) -> np.ndarray:
         """Vector w = D^{-½} u (n,), joint by joint, such that wᵀ w′ = fᵀ M⁻¹ f′.
 
         Small responses keep their digits, which differences of whole responses lose.
         """
-        u = self.inward_response(tau, wrenches).u
+        u, _ = self._inward({body: -wrench for body, wrench in (wrenches or {}).items()}, {}, tau)
         found = []
         for (edge, _), *_ in self.clusters:
             D_inverse = self.eliminations[edge.outer].D_inverse
             found.append(_root(D_inverse) @ u[edge.outer] if edge.outer in u else np.zeros(len(D_inverse)))
         return np.concatenate(found)
 
-    def outward_recursion(self, inward: InwardForces) -> tuple[dict, dict]:
-        """Accelerations by joint and by body; missing entries are zero."""
-        u, biases, ground = inward
-        accelerations, rates = {} if ground is None else {-1: ground}, {}
-        moved = self._outward_of({self.places[body] for body in u} if ground is None else range(len(self.clusters)))
+    def _solve(self, forces, biases, base, tau):
+        """Accelerations by joint and by body; missing entries, given or found, are zero."""
+        u, loaded = self._inward(forces, biases, tau)
+        accelerations, rates = {} if base is None else {-1: base}, {}
+        moved = self._outward_of(loaded if base is None else range(len(self.clusters)))
         for cluster in (self.clusters[place] for place in sorted(moved)):
             first = cluster[0][0]
             own_u = u.get(first.outer, np.zeros(1))
@@ -174,8 +142,8 @@ class ArticulatedBody:
                     accelerations[body] = carried[body] + kin.S @ rates[edge.constraint]
         return rates, accelerations
 
-    def _inward(self, forces, biases, tau) -> dict:
-        """Forces u = τ − Sᵀ p by the first body of each cluster that forces or biases reach."""
+    def _inward(self, forces, biases, tau) -> tuple[dict, set[int]]:
+        """Forces u = τ − Sᵀ p by the first body of each cluster, and places of clusters that forces or biases reach."""
         joints, u = self.tree.subsystem.joints, {}
         forces = dict(forces)
         loaded = self._loaded(forces, biases, tau)
@@ -192,7 +160,7 @@ class ArticulatedBody:
             if first.inner >= 0:
                 for edge, _ in cluster:
                     forces[edge.inner] = forces.get(edge.inner, ZERO) + self._to_inner(edge, passed[edge.outer])
-        return u
+        return u, loaded
 
     def _loaded(self, forces, biases, tau) -> set[int]:
         """Places of the clusters with a force or bias, on them or further out."""

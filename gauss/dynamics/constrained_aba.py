@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import LDLT, as_number, entered
-from gauss.dynamics.aba import ArticulatedBody, InwardForces
+from gauss.dynamics.aba import ArticulatedBody
 from gauss.dynamics.coupling_constraints import Couplings, RelationRows
 from gauss.dynamics.loop_joints import LoopJoint
 from gauss.dynamics.rnea import KinematicTree
@@ -92,24 +92,18 @@ class ConstrainedArticulatedBody:
         return self
 
     @cached_property
-    def joint_forces(self) -> list[dict[int, np.ndarray]]:
-        """Joint forces u of the inward recursion under a unit multiplier of each row, by the first body of each cluster."""
-        inward = self.articulated.inward_response
-        return [inward(tau, self._with_loop_forces(wrenches, tau)).u for wrenches, tau in self.unit_forces]
+    def responses(self) -> list:
+        """Accelerations M⁻¹ Kᵀ of joints and links under a unit multiplier of each row."""
+        return [self.articulated.response(tau, self._with_loop_forces(wrenches, tau)) for wrenches, tau in self.unit_forces]
 
     @cached_property
     def S(self) -> np.ndarray:
-        """K M⁻¹ Kᵀ = Σ u D⁻¹ uᵀ of the scaled rows, over the joints."""
-        m, eliminations = len(self.joint_forces), self.articulated.eliminations
-        S = np.zeros((m, m), dtype=object)
-        for i, one in enumerate(self.joint_forces):
-            rates = {body: eliminations[body].D_inverse @ u for body, u in one.items()}
-            for j, other in enumerate(self.joint_forces[: i + 1]):
-                shared = [
-                    rates[body] @ u for body, u in other.items() if body in rates
-                ]  # sparse: most loops share no branch
-                if shared:
-                    S[i, j] = S[j, i] = self.scale[i] * sum(shared) * self.scale[j]
+        """K M⁻¹ Kᵀ of the scaled rows."""
+        rows = np.array([self._rows(rates, links, still=True) for rates, links in self.responses]).T
+        S = np.zeros(rows.shape, dtype=object)
+        for i, row in enumerate(rows):
+            others = np.flatnonzero(row != 0)  # sparse: most loops share no branch
+            S[i, others] = self.scale[i] * row[others] * self.scale[others]
         return S
 
     @cached_property
@@ -134,8 +128,9 @@ class ConstrainedArticulatedBody:
         feedback : BaumgarteFeedback, optional
             Stabilisation.
         """
-        inward = self.articulated.inward_motion(tau, self._external_wrenches(tau, forces))
-        found, multipliers = self._constrained(inward, still=False, target=0.0 if feedback is None else feedback.rows)
+        rates, accelerations = self.articulated.motion(tau, self._external_wrenches(tau, forces))
+        target = 0.0 if feedback is None else feedback.rows
+        found, multipliers = self._constrained(rates, accelerations, still=False, target=target)
         return found if feedback is None else found + feedback.rates, multipliers
 
     def velocity_residual(self) -> np.ndarray:
@@ -184,15 +179,13 @@ class ConstrainedArticulatedBody:
 
     def response(self, tau, target) -> tuple[np.ndarray, np.ndarray]:
         """Rates (n_v,) x and multipliers y with M x + Kᵀ y = tau and K x = target."""
-        inward = self.articulated.inward_response(tau, self._with_loop_forces({}, tau))
-        return self._constrained(inward, still=True, target=target)
+        rates, accelerations = self.articulated.response(tau, self._with_loop_forces({}, tau))
+        return self._constrained(rates, accelerations, still=True, target=target)
 
     def released(self, tau, multipliers) -> np.ndarray:
         """Rates (n_v,) x with M x + Kᵀ y = tau for given multipliers y."""
-        inward = self.articulated.inward_response(tau, self._with_loop_forces({}, tau))
-        return self._all_rates(
-            *self.articulated.outward_recursion(inward.plus(self._reaction_forces(multipliers))), still=True
-        )
+        rates, accelerations = self.articulated.response(tau, self._with_loop_forces({}, tau))
+        return self._all_rates(*self.under_multipliers(rates, accelerations, multipliers), still=True)
 
     def determined(self, multipliers) -> np.ndarray:
         """Multipliers without their part along redundant rows, which is undetermined: S (S + ν)⁻¹ y if scaled."""
@@ -221,11 +214,7 @@ class ConstrainedArticulatedBody:
 
     def nearest(self, v, target) -> np.ndarray:
         """Rates x (n_v,) nearest to v in the mass metric with K x = target."""
-        rates, accelerations = self._by_joint(v), self.tree.carried(v)
-        if self.unit_forces:
-            multipliers = self._multipliers(rates, accelerations, still=True, target=target)
-            rates, accelerations = self.under_multipliers(rates, accelerations, multipliers)
-        return self._all_rates(rates, accelerations, still=True)
+        return self._constrained(self._by_joint(v), self.tree.carried(v), still=True, target=target)[0]
 
     def position_correction(self, phi, slack) -> np.ndarray:
         """Newton step (n_v,), the least in the mass metric, on the position residual.
@@ -244,23 +233,12 @@ class ConstrainedArticulatedBody:
 
     def under_multipliers(self, rates, accelerations, multipliers) -> tuple[dict, dict]:
         """Accelerations of tree joints and of links with the constraint forces −Kᵀ y added."""
-        found = dict(rates), dict(accelerations)
-        for total, change in zip(
-            found,
-            self.articulated.outward_recursion(InwardForces(self._reaction_forces(multipliers), {}, None)),
-            strict=True,
-        ):
-            for key, own in change.items():
-                total[key] = total[key] + own if key in total else own
-        return found
-
-    def _reaction_forces(self, multipliers) -> dict[int, np.ndarray]:
-        """Joint forces u of the inward recursion under the constraint forces −Kᵀ y."""
-        found: dict[int, np.ndarray] = {}
-        for multiplier, forces in zip(multipliers, self.joint_forces if self.unit_forces else (), strict=True):
-            for body, u in forces.items():
-                found[body] = found[body] - multiplier * u if body in found else -multiplier * u
-        return found
+        rates, accelerations = dict(rates), dict(accelerations)
+        for multiplier, (more_rates, more) in zip(multipliers, self.responses if self.unit_forces else (), strict=True):
+            for total, change in ((rates, more_rates), (accelerations, more)):
+                for key, own in change.items():
+                    total[key] = total.get(key, 0.0) - multiplier * own
+        return rates, accelerations
 
     def _less_constraint_forces(self, tau, wrenches: dict, multipliers) -> np.ndarray:
         """Generalised forces less the constraint forces Kᵀ y; their wrenches on links are subtracted in place."""
@@ -285,19 +263,15 @@ class ConstrainedArticulatedBody:
                     add_to(wrenches, loop_joint.wrench(direction), force)
         return wrenches
 
-    def _constrained(self, inward: InwardForces, still: bool, target):
+    def _constrained(self, rates, accelerations, still: bool, target):
         """Joint accelerations (n_v,) that meet the loop constraints, and the multipliers."""
-        multipliers, (rates, accelerations) = np.zeros(0), self.articulated.outward_recursion(inward)
+        multipliers = np.zeros(0)
         if self.unit_forces:
-            multipliers = self._multipliers(rates, accelerations, still, target)
-            rates, accelerations = self.articulated.outward_recursion(inward.plus(self._reaction_forces(multipliers)))
-        return self._all_rates(rates, accelerations, still), multipliers
+            residual = self._rows(rates, accelerations, still) - target
+            multipliers = self.scale * self._multipliers(self.scale * residual)
+        return self._all_rates(*self.under_multipliers(rates, accelerations, multipliers), still), multipliers
 
-    def _multipliers(self, rates, accelerations, still: bool, target):
-        """Multipliers of the constraint forces that accelerations without them need to meet the loop constraints."""
-        return self.scale * self._proximal(self.scale * (self._rows(rates, accelerations, still) - target))
-
-    def _proximal(self, residual):
+    def _multipliers(self, residual):
         """Proximal iterations for S y = residual."""
         y, columns = self.factor.solve(residual), [np.flatnonzero(row != 0) for row in self.S]
         for _ in range(ITERATIONS - 1):
