@@ -11,7 +11,8 @@ from gauss.analysis.reactions import (
     set_valued_forces,
     unique_reactions,
 )
-from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget, Target
+from gauss.analysis.target import Target
+from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget
 from gauss.simulation.energy import Energy, energy
 from gauss.simulation.energy_balance import warn_of_balance
 

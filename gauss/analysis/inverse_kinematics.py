@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import nnls
 
 from gauss.analysis.loop_closure import closed
-from gauss.analysis.target_levels import NEAR_SINGULAR, LevelRows, lexicographic, solver_of
+from gauss.analysis.obstacles import obstacles
+from gauss.analysis.target import Target
+from gauss.analysis.target_levels import LevelRows, lexicographic, solver_of
 from gauss.analysis.target_problem import TargetProblem, bounds, positive_values
-from gauss.analysis.targets import Target
 from gauss.arguments import named_arguments
 from gauss.dynamics import compile_scene
 from gauss.dynamics.projection import clipped, project_rates
@@ -34,8 +34,6 @@ RESTORATIONS = 5  # steps on the levels before, after a step on a level
 KEPT_COST = 1e-7  # relative increase of the costs of the levels before that a step may leave
 ROUNDED_MERIT = 1e-14  # relative increase of the merit that is round-off
 KICK = 0.05  # standard deviation of a displacement from where the errors are stationary, in units
-AT_LIMIT = 1e-7  # distance from a limit in units, below which it is active
-LEAST_SHARE, LEAST_PART = 1e-6, 1e-3  # of the pull of a target, above which a limit, or a target, stands against it
 
 
 @dataclass(frozen=True)
@@ -375,46 +373,8 @@ def _result(point: _Point, iterations: int, tolerance: float) -> InverseKinemati
     problem, rows = point.problem, point.rows
     names = [target.label for target in problem.targets]
     unmet = [k for k, off in enumerate(_off(rows)) if not off <= tolerance]
-    pulls = _pulls(point)
-    found = {names[k]: _obstacles(point, pulls, k) for k in unmet}
+    found = {names[k]: obstacles(problem, point.state, rows, point.N, k) for k in unmet}
     errors = {name: one.error for name, one in zip(names, rows, strict=True)}
     return InverseKinematics(
         point.state, errors, tuple(names[k] for k in unmet), found, _is_met(point, tolerance), iterations
     )
-
-
-def _pulls(point: _Point) -> list[np.ndarray]:
-    """Gradient (k,) along which each target pulls."""
-    return [(one.jacobian @ point.N).T @ (one.weights / one.units**2 * one.error) for one in point.rows]
-
-
-def _obstacles(point: _Point, gradients: list[np.ndarray], k: int) -> tuple[str, ...]:
-    """Limits and targets against the pull g of a target: g = Σ λ n + rest with λ ≥ 0 and the outward normals n of limits."""
-    problem, N, pull, size = point.problem, point.N, gradients[k], np.linalg.norm(gradients[k])
-    own = float(np.sqrt(sum(np.sum(gradient**2) for gradient in gradients)))
-    if size <= LEAST_SHARE * max(own, LEAST_SHARE):
-        return ()
-    active = problem.at_limits(point.state, AT_LIMIT)
-    rest, found = pull, []
-    if active:
-        normals = np.array([side * N[column] / problem.system.scale.coordinates[column] for column, side in active]).T
-        forces, _ = nnls(normals, pull)
-        rest = pull - normals @ forces
-        found = [
-            problem.limit_name(*limit) for limit, force in zip(active, forces, strict=True) if force > LEAST_SHARE * size
-        ]
-    for other, rows, gradient in zip(problem.targets, point.rows, gradients, strict=True):
-        if other.level < problem.targets[k].level:  # it is met: its own pull is round-off
-            against = np.linalg.norm(_within_rows(rows.jacobian @ N / rows.units[:, None], rest)) > LEAST_PART * size
-        else:
-            against = gradient @ rest < -LEAST_SHARE * size * np.linalg.norm(gradient)
-        if against and np.linalg.norm(rest) > LEAST_PART * size and other.level <= problem.targets[k].level:
-            found.append(other.label)
-    return tuple(found)
-
-
-def _within_rows(rows: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Projection of a vector (k,) on the row space of a matrix (m, k)."""
-    _, sizes, Vt = np.linalg.svd(rows, full_matrices=False)
-    basis = Vt[sizes > NEAR_SINGULAR * sizes.max(initial=0.0)]
-    return basis.T @ (basis @ vector)

@@ -15,8 +15,9 @@ from gauss import rotations
 from gauss.analysis.inverse_kinematics import differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.loop_closure import closed
 from gauss.analysis.planned_motion import PlannedMotion
+from gauss.analysis.target import Target
 from gauss.analysis.target_problem import positive_values
-from gauss.analysis.targets import PointTarget, PoseTarget, Target
+from gauss.analysis.targets import PointTarget, PoseTarget
 from gauss.analysis.time_scaling import phases, rested, stretch, stretched
 from gauss.arguments import named_arguments
 from gauss.dynamics import compile_scene

@@ -10,8 +10,8 @@ from numbers import Real
 import numpy as np
 
 from gauss.analysis.tangents import Tangents
+from gauss.analysis.target import Target, TargetRows
 from gauss.analysis.target_levels import LevelRows
-from gauss.analysis.targets import Target, TargetRows
 from gauss.dynamics.projection import limits as joint_limits
 from gauss.dynamics.projection import scalar_coordinates
 from gauss.dynamics.store import cached

@@ -1,4 +1,4 @@
-"""Targets of inverse kinematics: errors e(q) and their Jacobians A, ė = −A v, for poses, points, distances, coordinates.
+"""Targets of inverse kinematics for poses, points, distances, the centre of mass and coordinates.
 
 The error of a rotation is the rotation vector θ = log(R_target Rᵀ) in world axes; its Jacobian is J_r⁻¹(θ) J_ω with the
 right Jacobian of the rotation group, and A ξ = e is a step of Gauss–Newton (Siciliano, Sciavicco, Villani, Oriolo,
@@ -8,102 +8,17 @@ Robotics, 2009, sec. 3.7; Solà, Deray, Atchuthan, A micro Lie theory for state 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import NamedTuple
 
 import numpy as np
 
 from gauss import rotations
+from gauss.analysis.target import PositionTarget, Target, TargetRows
 from gauss.arguments import named_arguments
 from gauss.errors import ArgumentError, StateError
 from gauss.scene import values
 from gauss.system import State, System
 
-ALL_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 COINCIDENT = 1e-12  # distance of two points relative to the length of the scene, below which it has no direction
-
-
-class TargetRows(NamedTuple):
-    """Rows of a target in one state.
-
-    Attributes
-    ----------
-    error : ndarray, shape (m,)
-        Target less actual value [rad, m].
-    jacobian : ndarray, shape (m, n_v)
-        A in ė = −A v.
-    units : ndarray, shape (m,)
-        1 rad, or the length of the scene [m].
-    weights : ndarray, shape (m,)
-        Weights of the squared errors in these units.
-    """
-
-    error: np.ndarray
-    jacobian: np.ndarray
-    units: np.ndarray
-    weights: np.ndarray
-
-
-@dataclass(frozen=True, kw_only=True)
-class Target:
-    """What all targets share.
-
-    Parameters
-    ----------
-    weight : float
-        Weight of the squared error among the targets of its level, for errors in radians and lengths of the scene
-        (``System.scale.length``).
-    level : int
-        Priority: targets of level 1 have no influence on those of level 0, and so on.
-    gain : float
-        Share of the error that one step of :func:`gauss.differential_inverse_kinematics` takes away, 0 to 1.
-    name : str, optional
-        Name in results; made from the frame when not given.
-    """
-
-    weight: float = 1.0
-    level: int = 0
-    gain: float = 1.0
-    name: str = ""
-
-    def __post_init__(self):
-        """Check every value."""
-        what = self.label
-        values.keep(self, weight=values.number(self.weight, f"{what}: weight", "1", positive=True))
-        values.keep(self, gain=values.number(self.gain, f"{what}: gain", "1"))
-        if not 0.0 <= self.gain <= 1.0:
-            raise ArgumentError(f"{what}: gain: expected a share from 0 to 1, got {self.gain}.")
-        if isinstance(self.level, bool) or not isinstance(self.level, (int, np.integer)) or self.level < 0:
-            raise ArgumentError(f"{what}: level: expected a whole number, 0 for the first, got {self.level!r}.")
-        self.check()
-
-    def check(self):
-        """Check the values of this kind of target."""
-
-    @property
-    def subject(self) -> str:
-        """What it is a target of, in words."""
-        raise NotImplementedError
-
-    @property
-    def label(self) -> str:
-        """Its name in results and messages."""
-        return self.name or self.subject
-
-    def functions(self, system: System) -> tuple[str, ...]:
-        """Names of the functions of the state that its rows are made of; unknown names are refused."""
-        raise NotImplementedError
-
-    def rows(self, system: System, q: np.ndarray, found: dict) -> TargetRows:
-        """Rows at coordinates q, from the results of its functions."""
-        raise NotImplementedError
-
-    def of_lengths(self, system: System, error: np.ndarray, jacobian: np.ndarray) -> TargetRows:
-        """Rows whose errors are lengths [m]."""
-        return TargetRows(error, jacobian, np.full(error.size, system.scale.length), np.full(error.size, self.weight))
-
-    def rate(self, errors: np.ndarray) -> np.ndarray:
-        """Rate (m,) of the target itself; at rest."""
-        return np.zeros(errors.size)
 
 
 @named_arguments
@@ -193,7 +108,7 @@ class PoseTarget(Target):
 
 @named_arguments
 @dataclass(frozen=True)
-class PointTarget(Target):
+class PointTarget(PositionTarget):
     """Target of the position of a point of a body.
 
     Parameters
@@ -220,14 +135,10 @@ class PointTarget(Target):
     frame: str
     position: tuple
     at: tuple = (0.0, 0.0, 0.0)
-    along: tuple = field(default=ALL_AXES, kw_only=True)
-    velocity: tuple = field(default=(0.0, 0.0, 0.0), kw_only=True)
 
     def check(self):
         """Check the values of this kind of target."""
-        for key in ("position", "at", "velocity"):
-            values.keep(self, **{key: values.vector(getattr(self, key), f"{self.label}: {key}", "m")})
-        values.keep(self, along=_directions(self))
+        self.check_vectors("position", "at")
 
     @property
     def subject(self) -> str:
@@ -241,12 +152,7 @@ class PointTarget(Target):
     def rows(self, system: System, q: np.ndarray, found: dict) -> TargetRows:
         """Rows along the directions."""
         place, J = _point(found, self.frame, self.at)
-        along = np.array(self.along)
-        return self.of_lengths(system, along @ (np.array(self.position) - place), along @ J)
-
-    def rate(self, errors: np.ndarray) -> np.ndarray:
-        """Rate (m,) of the target itself."""
-        return np.array(self.along) @ np.array(self.velocity)
+        return self.rows_along(system, np.array(self.position) - place, J)
 
 
 @named_arguments
@@ -305,7 +211,7 @@ class DistanceTarget(Target):
 
 @named_arguments
 @dataclass(frozen=True)
-class CenterOfMassTarget(Target):
+class CenterOfMassTarget(PositionTarget):
     """Target of the centre of mass of all bodies.
 
     Parameters
@@ -326,14 +232,10 @@ class CenterOfMassTarget(Target):
     """
 
     position: tuple
-    along: tuple = field(default=ALL_AXES, kw_only=True)
-    velocity: tuple = field(default=(0.0, 0.0, 0.0), kw_only=True)
 
     def check(self):
         """Check the values of this kind of target."""
-        for key in ("position", "velocity"):
-            values.keep(self, **{key: values.vector(getattr(self, key), f"{self.label}: {key}", "m")})
-        values.keep(self, along=_directions(self))
+        self.check_vectors("position")
 
     @property
     def subject(self) -> str:
@@ -348,14 +250,8 @@ class CenterOfMassTarget(Target):
 
     def rows(self, system: System, q: np.ndarray, found: dict) -> TargetRows:
         """Rows along the directions: the momentum over the mass is the velocity of the centre of mass."""
-        along = np.array(self.along)
         J = found["momentum_matrix"][3:] / system.Phi[3::6].sum()
-        error = np.array(self.position) - found["center_of_mass"]
-        return self.of_lengths(system, along @ error, along @ J)
-
-    def rate(self, errors: np.ndarray) -> np.ndarray:
-        """Rate (m,) of the target itself."""
-        return np.array(self.along) @ np.array(self.velocity)
+        return self.rows_along(system, np.array(self.position) - found["center_of_mass"], J)
 
 
 @named_arguments
@@ -428,13 +324,6 @@ class PostureTarget(Target):
         ]
         weights = np.full(len(columns), self.weight)
         return TargetRows(np.array(apart), np.eye(system.n_v)[columns], system.scale.coordinates[columns], weights)
-
-
-def _directions(target: PointTarget | CenterOfMassTarget) -> tuple:
-    """Unit rows (k, 3) of ``along``."""
-    rows = np.atleast_2d(np.asarray(target.along, dtype=object))
-    found = [values.unit(values.direction(tuple(row), f"{target.label}: along")) for row in rows]
-    return tuple(tuple(map(float, row)) for row in found)
 
 
 def _of_frame(system: System, frame: str) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
 from gauss.codegen.kernels import CheckedSwitch
 from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.products import Products
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
@@ -25,7 +26,6 @@ from gauss.dynamics.store import cached
 from gauss.integrators import Point
 from gauss.system import State, System, coordinate_rates, coordinate_units
 
-PARTS = 8  # subintervals of a step
 JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
 STEEP, NEGLIGIBLE = 2.5, -50.0  # rise of an exponent within a subinterval, and the exponent of a negligible value
 POINTS = 5  # random points at which switching functions are compared
@@ -131,7 +131,7 @@ class SwitchingFunctions:
         hidden = self._without_narrow_peaks(begin, first, end, last)
         if not any(self._groups):
             return hidden, 0.0
-        nodes, parts = self._parts(begin, first, end, last)
+        nodes, parts = enclosed_parts(self.system, begin, first, end, last)
         ends = [list(self._values(node)) for node in nodes]
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
         enclosed = [_divided(_intervals(self._enclosures(np.ravel(part))), *self._counts) for part in parts]
@@ -245,7 +245,7 @@ class SwitchingFunctions:
         around = write(enclosures, 2 * len(symbols), name="base_enclosures")
 
         def seen(count, t, q, v, first, t_end, q_end, v_end, last):
-            nodes, parts = self._parts(State(t[0], q, v), first, State(t_end[0], q_end, v_end), last, count)
+            nodes, parts = enclosed_parts(self.system, State(t[0], q, v), first, State(t_end[0], q_end, v_end), last, count)
             found = [_divided(_intervals(around(np.ravel(part))), len(bases), len(rates)) for part in parts]
             return [list(at(node)) for node in nodes], *map(list, zip(*found, strict=True)), (t_end[0] - t[0]) / count
 
@@ -320,31 +320,6 @@ class SwitchingFunctions:
     def _acceleration(self) -> np.ndarray:
         return self._clock.graph.symbols("a", self.system.n_v)
 
-    def _parts(self, begin: State, first, end: State, last, count: int = PARTS) -> tuple[list, list[list[Interval]]]:
-        """Values of (t, q, v) at the ends of the subintervals of a step, and enclosures of (t, q, v, q̈) on each."""
-        h = end.t - begin.t
-        value = [np.concatenate([[s.t], s.q, s.v]) for s in (begin, end)]
-        slope = [
-            np.concatenate([[1.0], coordinate_rates(self.system, s.q, s.v), a]) for s, a in ((begin, first), (end, last))
-        ]
-        change = value[1] - value[0]
-        nodes, slopes, tau = [], [], h / count
-        for s in np.arange(count + 1) / count:  # Hermite's polynomial and its derivative
-            bump = s * (1.0 - s)
-            nodes.append(value[0] + s * s * (3.0 - 2.0 * s) * change + h * bump * ((1.0 - s) * slope[0] - s * slope[1]))
-            inner = (1.0 - s) * (1.0 - 3.0 * s) * slope[0] - s * (2.0 - 3.0 * s) * slope[1]
-            slopes.append(6.0 * bump * change / h + inner)
-        symbols, n = self._symbols, self.system.n_v
-        nodes[-1] = value[1]
-        parts = []
-        for j in range(count):
-            points = [nodes[j], nodes[j] + tau / 3.0 * slopes[j], nodes[j + 1] - tau / 3.0 * slopes[j + 1], nodes[j + 1]]
-            part = [_hull([point[k] for point in points]) for k in range(len(symbols))]
-            between = [3.0 * (points[i + 1] - points[i]) / tau for i in range(3)]  # Bernstein coefficients of the derivative
-            part += [_hull([point[len(symbols) - n + k] for point in between]) for k in range(n)]
-            parts.append(part)
-        return nodes, parts
-
 
 def _compared(nodes: list[Expression]) -> list:
     """Sides of every comparison, each pair once."""
@@ -412,10 +387,6 @@ def _divided(values: list, *counts: int) -> list[list]:
 def onward(share: Scalar, shortest: Scalar) -> Scalar:
     """Share of a step to be tried next, no less than half of the shortest resolvable step."""
     return math.maximum(share, 0.5 * shortest)
-
-
-def _hull(values) -> Interval:
-    return reduce(Interval.hull, map(Interval.point, values))
 
 
 def _exponents(outputs) -> list[Expression]:
