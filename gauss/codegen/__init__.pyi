@@ -13,7 +13,7 @@ from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.graph import Graph
 from gauss.codegen.intrinsics import copy, external, intrinsic
 from gauss.codegen.ir_blocks import BODY, POINTER, Buffers, constant_array, counted_loop, endless_loop
-from gauss.codegen.kernel import Kernel, trace
+from gauss.codegen.kernel import CallingKernel, Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
 from gauss.codegen.native_function import NativeFunction
@@ -29,6 +29,7 @@ from gauss.codegen.taylor_series import Series
 from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
+    "CallingKernel",
     "DeviceModule",
     "vector_width",
     "BODY",

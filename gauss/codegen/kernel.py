@@ -8,8 +8,10 @@ from gauss.codegen import machine
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function, write
 from gauss.codegen.native_function import NativeFunction
+from gauss.codegen.python_callback import HOLDING
 
-SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
+ARGUMENTS = ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64
+SIGNATURE, HOLDING_SIGNATURE = ctypes.CFUNCTYPE(None, *ARGUMENTS), HOLDING(None, *ARGUMENTS)
 
 
 class Kernel:
@@ -28,6 +30,8 @@ class Kernel:
         Number of operations of each kind.
     """
 
+    signature = SIGNATURE
+
     def __init__(self, function: Function | NativeFunction, batch: bool = True):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
@@ -37,7 +41,7 @@ class Kernel:
         self._bind()
 
     def _bind(self):
-        self._run = self.code.entry("run", SIGNATURE)
+        self._run = self.code.entry("run", self.signature)
 
     def address(self) -> int:
         """Address of ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, in the present tier."""
@@ -76,6 +80,12 @@ class Kernel:
         columns = given.shape[1] if given.ndim == 2 else 1
         self._run.call(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
         return result
+
+
+class CallingKernel(Kernel):
+    """Compiled function that calls Python, within a :class:`gauss.codegen.Receiver`."""
+
+    signature = HOLDING_SIGNATURE
 
 
 def _has_rows(array: np.ndarray) -> bool:

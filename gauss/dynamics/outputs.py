@@ -58,7 +58,7 @@ def output_function(program: Program, scene: Scene, of_step: bool = False) -> Fu
     joints, gaps = program.system.structure.constraints, [side.name for side in sides(scene)]
     loaded = any(output.kind in OF_JOINTS for output in outputs)
     for output in outputs:
-        _refuse_unknown(output, program.system, of_step)
+        _refuse_unknown(output, program, of_step)
 
     def value(output: Output, motion: Kinematics, acceleration, multipliers, contacts):
         if output.kind in OF_JOINTS:
@@ -78,12 +78,14 @@ def output_function(program: Program, scene: Scene, of_step: bool = False) -> Fu
     return write(values, program.layout.size, name="outputs")
 
 
-def _refuse_unknown(output: Output, system: System, of_step: bool):
+def _refuse_unknown(output: Output, program: Program, of_step: bool):
     """Raise a SimulationError for forces that are not unique, or that a motion of this kind does not know."""
     if output.kind in OF_JOINTS:
         if of_step:
             raise SimulationError(f"output {output.name!r}: beside contacts, forces of joints come from gauss.reactions.")
-        if not are_unique(system):
+        if program.laws.called:
+            raise SimulationError(f"output {output.name!r}: beside opaque laws, forces of joints come from gauss.reactions.")
+        if not are_unique(program.system):
             raise SimulationError(f"output {output.name!r}: redundant constraints leave the force of {output.of!r} open.")
     elif output.kind == "contact_force" and not of_step:
         raise SimulationError(f"output {output.name!r}: steps of integrator='time_stepping' alone know forces of contacts.")

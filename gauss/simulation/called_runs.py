@@ -10,16 +10,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen import Receiver
-from gauss.codegen.kernels import CallingLoop, Control, Loop, LoopStatus, address
+from gauss.codegen.kernels import CallingLoop, Control, Loop, LoopStatus
+from gauss.codegen.tiers import EntryPoint
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT
 from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
+from gauss.integrators import Rates
 from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_run import CompiledRun
+from gauss.simulation.load_receiver import LoadReceiver
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import PROGRESS_TRIALS, SMALLEST_STEP
 from gauss.simulation.trajectory import Trajectory
@@ -35,34 +37,7 @@ from gauss.system import State
 LAST_STEP_SHARE = 1.0 - 1e-12  # share of the remaining time above which the loop stretches a step to the end
 UNLIMITED = 1e150  # tolerances of a step that is accepted whatever its error
 OWN = "samples", "sample", "rows", "rtol", "atol", "atol_rates"  # settings of a single step that are not those of the motion
-NUMBER = 8  # bytes
 NEVER = np.array([np.inf])  # samples of a step that has none [s]
-
-
-class LoadReceiver(Receiver):
-    """Loads with opaque laws as machine code calls them: (t, q, v) → (generalised forces (n_v,), power (3,)).
-
-    Parameters
-    ----------
-    forces : LoadForces
-        The loads.
-    """
-
-    def __init__(self, forces: LoadForces):
-        self.forces, system = forces, forces.system
-        self.n_q, self.given = 1 + system.n_q, np.empty(1 + system.n_q + system.n_v)
-        self.found = np.empty(system.n_v + 3)
-        self.places = address(self.given), address(self.found)
-        self.sizes = NUMBER * self.given.size, NUMBER * self.found.size
-
-    def __call__(self, given: int, found: int):
-        """Evaluate the loads of a state."""
-        own, results = self.places
-        ctypes.memmove(own, given, self.sizes[0])
-        numbers = self.given.copy()  # a law may keep it
-        state = State(float(numbers[0]), numbers[1 : self.n_q], numbers[self.n_q :])
-        self.found[:-3], self.found[-3:] = self.forces(state)
-        ctypes.memmove(found, results, self.sizes[1])
 
 
 class CalledRun(CompiledRun):
@@ -78,9 +53,18 @@ class CalledRun(CompiledRun):
 
     def __init__(self, problem: Problem, program: type[Program] = CalledProgram):
         super().__init__(problem, program)
-        names = tuple(bound.load.name for bound in problem.laws.called)
-        self.key = (*self.key, names)  # a law that was traced before has other machine code
-        self.receiver, self.longest = LoadReceiver(LoadForces(self.system, problem.laws.called)), 0.0
+        self._receive()
+
+    def _receive(self):
+        """Make the object that machine code calls."""
+        called = self.problem.laws.called
+        self.key = (*self.key, tuple(bound.load.name for bound in called))  # a law traced before has other machine code
+        self.receiver, self.longest = LoadReceiver(LoadForces(self.system, called)), 0.0
+
+    def evaluated(self, state: State) -> Rates:
+        """Rates by machine code."""
+        with self.receiver:
+            return super().evaluated(state)
 
     def _loop_of(self, kind: Hashable, make) -> Loop:
         self.loop = CallingLoop(super()._loop_of(kind, make))
@@ -117,10 +101,55 @@ class CalledRun(CompiledRun):
 class CalledFixedRun(CalledRun, CompiledFixedRun):
     """One motion by a fixed-step method in machine code that calls opaque laws."""
 
+    def arrays(self, point: np.ndarray, confirmed: np.ndarray, grid: np.ndarray, out: np.ndarray) -> tuple:
+        """Arguments of the steps, before their number; the first two are kept for a law that raises."""
+        self.reached = point, confirmed
+        return super().arrays(point, confirmed, grid, out)
+
+    def prepared_steps(self) -> "CalledSteps":
+        """Machine code of the steps, within which it calls the laws."""
+        return CalledSteps(self, super().prepared_steps())
+
     def run(self):
         """Run until the end."""
         self.longest = self.step
         self._called(super().run)
+
+
+class CalledSteps:
+    """Steps of a run in machine code that calls opaque laws; a law that raises leaves the state as it was before.
+
+    Parameters
+    ----------
+    run : CalledFixedRun
+        The run, whose ``arrays`` the steps change.
+    entry : EntryPoint
+        Machine code of the steps.
+    """
+
+    def __init__(self, run: CalledFixedRun, entry: EntryPoint):
+        self.run, self.entry = run, entry
+
+    def call(self, *given):
+        """Make steps.
+
+        Raises
+        ------
+        SimulationError
+            If a law raises, or returns no finite numbers.
+        """
+        control, before = self.run.control, [array.copy() for array in self.run.reached]
+        record = bytes(control)
+        try:
+            with self.run.receiver:
+                self.entry.call(*given)
+        except BaseException as error:
+            for array, old in zip(self.run.reached, before, strict=True):
+                array[:] = old
+            ctypes.memmove(ctypes.byref(control), record, len(record))
+            if isinstance(error, GaussError) and not isinstance(error, SimulationError):
+                raise SimulationError(str(error)) from error
+            raise
 
 
 class CalledAdaptiveRun(CalledRun, CompiledAdaptiveRun):

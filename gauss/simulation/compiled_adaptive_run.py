@@ -1,18 +1,20 @@
 """A motion by a compiled loop of adaptive steps, which end at the switching times of the laws."""
 
-from dataclasses import replace
+import ctypes
+from operator import is_
 from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
 
-from gauss.codegen.kernels import Loop, LoopStatus
+from gauss.codegen.kernels import Loop, LoopStatus, address
 from gauss.dynamics.laws.switching import endless
 from gauss.dynamics.laws.switching_times import APART, NO_TIMES, Timetable
 from gauss.dynamics.plan import method_key
+from gauss.dynamics.point_layout import PointLayout
 from gauss.errors import SimulationError
-from gauss.integrators import Controlled, Taylor, crossed_time
-from gauss.simulation.compiled_run import CompiledRun
+from gauss.integrators import Controlled, Taylor, Tolerance, crossed_time
+from gauss.simulation.compiled_run import HELD_SAMPLES, CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import single
 from gauss.simulation.step_limits import (
     CHATTERING_PROGRESS,
@@ -26,8 +28,39 @@ SLIDING_PROGRESS = 1e-5  # relative to the duration, per PROGRESS_TRIALS, below 
 SLIDING_STEPS = 64  # over which crossings of switching surfaces are counted
 
 
+class FirstSteps:
+    """Machine code of the packed point of a state, its check, and its first step, on arrays of its own.
+
+    Parameters
+    ----------
+    loop : Loop
+        Machine code of the steps.
+    layout : PointLayout
+        Places in a point.
+    tolerance : Tolerance
+        Local error of the steps.
+    """
+
+    def __init__(self, loop: Loop, layout: PointLayout, tolerance: Tolerance):
+        self.loop, ends = loop, np.cumsum([1, layout.n_q, layout.n_v, 3])
+        self.given, self.found = (np.empty(size) for size in loop.arities["start"])
+        self.q, self.v, allowed, self.inputs = np.split(self.given, ends)[1:]
+        allowed[:] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
+        self.addresses = address(self.given), address(self.found)
+
+    def __call__(self, t: float, q: np.ndarray, v: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Outputs, which the next call overwrites."""
+        self.given[0], self.q[:], self.v[:], self.inputs[:] = t, q, v, inputs
+        self.loop.function("start").call(*self.addresses)
+        return self.found
+
+
 class CompiledAdaptiveRun(CompiledRun):
     """One motion by an adaptive method in machine code."""
+
+    _start: FirstSteps | None = None
+    _bound: tuple = (None,) * 4  # arrays whose addresses are known
+    _addresses: tuple = ()
 
     def prepared(self) -> Loop:
         """Machine code of the steps; the control record has the settings of the method."""
@@ -57,7 +90,7 @@ class CompiledAdaptiveRun(CompiledRun):
         self._begin(begun[:size], begun[size:-1])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
-        out = np.empty((grid.size if control.samples else self.budget, self.layout.row))
+        out = np.empty((grid.size if control.samples else 2 * self.budget, self.layout.row))
         samples = NO_TIMES if self.held is None else Timetable(NO_TIMES.switches, self.held.times[1:])
         times = self.switching.times.join(samples) if samples else self.switching.times
         stops = iter(times.stops(self.start.t, self.end)) if times else iter([(self.end,) * 2])
@@ -65,22 +98,30 @@ class CompiledAdaptiveRun(CompiledRun):
         self.trials, self.measured_from, self.next_sample = 0.0, self.start.t, 1
 
         def advance():
-            if self.point[0] >= control.end:
-                if self.after > control.end:
-                    self._cross(self.after)
-                if self.held is not None:
-                    self._renew()
-                control.end, self.after = next(stops)
-            self._steps(grid, out)
-            self._refuse_chatter(grid, out)
-            if control.status == LoopStatus.DONE and control.end < self.end:
+            begun = control.steps
+            for _ in range(HELD_SAMPLES if self.held is not None and not self.switching_laws else 1):
+                if self.point[0] >= control.end:
+                    if self.after > control.end:
+                        self._cross(self.after)
+                    if self.held is not None:
+                        self._renew()
+                    control.end, self.after = next(stops)
+                self._steps(grid, out)
+                self._refuse_chatter(grid, out)
+                if control.status != LoopStatus.DONE or control.end >= self.end:
+                    return
                 control.status = LoopStatus.PAUSED
+                if max(control.rows, control.steps - begun) > self.budget:
+                    return
 
         self._drive(advance, out)
 
     def _steps(self, grid: np.ndarray, out: np.ndarray):
         """Make the steps of one budget."""
-        self.loop(self.control, self.point, self.confirmed, grid, out, self.budget)
+        arrays = self.point, self.confirmed, grid, out
+        if not all(map(is_, arrays, self._bound)):
+            self._bound, self._addresses = arrays, tuple(map(address, arrays))
+        self.loop.entry.call(ctypes.byref(self.control), *self._addresses, self.budget)
 
     @property
     def switching_laws(self) -> tuple[str, ...]:
@@ -112,12 +153,10 @@ class CompiledAdaptiveRun(CompiledRun):
         return crossings > SLIDING_CROSSINGS * SLIDING_STEPS
 
     def _started(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Packed point of a state, its check, and its first step, by machine code."""
-        tolerance, given = self.problem.tolerance, np.empty(4 + q.size + v.size + len(self.inputs))
-        end = 1 + q.size + v.size
-        given[0], given[1 : 1 + q.size], given[1 + q.size : end], given[end + 3 :] = t, q, v, self.inputs
-        given[end], given[end + 1], given[end + 2] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
-        return self.loop.evaluate("start", given)
+        """Packed point of a state, its check, and its first step, by machine code; overwritten by the next call."""
+        if self._start is None:
+            self._start = FirstSteps(self.loop, self.layout, self.problem.tolerance)
+        return self._start(t, q, v, self.inputs)
 
     def _renew(self):
         """Set the inputs of a sample of the control law that begins at the present point, and the rates under them."""
@@ -127,10 +166,11 @@ class CompiledAdaptiveRun(CompiledRun):
             return
         self._hold(k)
         self.next_sample += 1
-        point = self.layout.point(self.point)
-        self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
-        first = self._started(point.state.t, point.state.q, point.state.v)[-1]
-        self.control.h = max(float(first), self.control.h)
+        layout, point = self.layout, self.point
+        begin, end = 1 + layout.n_q, layout.row + layout.n_v + 3
+        begun = self._started(float(point[0]), point[1:begin], point[begin : begin + layout.n_v])
+        point[layout.row : end] = begun[layout.row : end]  # the rates
+        self.control.h = max(float(begun[-1]), self.control.h)
 
     def _cross(self, t: float):
         """Continue just after a switching time, with the rates there."""

@@ -3,19 +3,19 @@
 import ctypes
 from bisect import bisect_right
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus, address
 from gauss.dynamics.plan import method_key
 from gauss.integrators import FixedStep, Point
-from gauss.simulation.compiled_run import CompiledRun
+from gauss.simulation.compiled_run import HELD_SAMPLES, CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import fixed
 from gauss.simulation.grid import grid_of, with_samples
 from gauss.simulation.step_limits import steps_per_check
 from gauss.system import State
 
-HELD_SAMPLES = 256  # samples of a control law between two looks at the progress
 PAIR_BYTES = 16  # of a time of the grid and its :class:`Due`
 
 
@@ -37,6 +37,10 @@ class CompiledFixedRun(CompiledRun):
     def prepared(self) -> Loop:
         """Machine code of the steps."""
         return self._loop_of(method_key(self.method), lambda: self._functions().compile())
+
+    def prepared_steps(self) -> Any:
+        """Machine code of the steps, or what is called as it is: ``call(*arrays(…), n)``."""
+        return self.prepared().entry
 
     def arrays(self, point: np.ndarray, confirmed: np.ndarray, grid: np.ndarray, out: np.ndarray) -> tuple:
         """Arguments of the machine code of the steps, before their number: the record and arrays by their addresses."""

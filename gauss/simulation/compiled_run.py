@@ -31,6 +31,7 @@ from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
 from gauss.system import State
 
 recorded_energies = attrgetter(*ENERGY_RECORD)
+HELD_SAMPLES = 256  # samples of a control law between two looks at the progress
 CHECK_ERRORS = 2  # entries of a check before those of the energies
 # rates² · evaluations of a step up to which BUDGET steps take less than about a tenth of a second
 BUDGET_WORK = 16 * 16 * 12
@@ -123,9 +124,9 @@ class CompiledRun:
     def _hold(self, k: int):
         """Set the inputs of the sample k of the control law, at the present point."""
         assert self.held is not None
-        n_q, point = 1 + self.layout.n_q, self.point
-        self.inputs = self.held.at(k, float(point[0]), point[1:n_q].copy(), point[n_q : n_q + self.layout.n_v].copy())
-        point[-self.inputs.size :] = self.inputs
+        point, n_q, n_v = self.point, 1 + self.layout.n_q, self.layout.n_v
+        self.inputs = self.held.at(k, point.item(0), point[1:n_q].copy(), point[n_q : n_q + n_v].copy())
+        point[-len(self.inputs) :] = self.inputs
 
     def _certified_rates(self, state: State, inputs: np.ndarray) -> Rates:
         """Rates by the certified recursion; the power of the inputs is counted."""

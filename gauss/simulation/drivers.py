@@ -135,6 +135,10 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
         from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 
         return CompiledMoreauRun(problem, smooth_question(problem.question).laws).collect()
+    if plan.dynamics == "callbacks":
+        from gauss.simulation.moreau.called_run import CalledMoreauRun
+
+        return CalledMoreauRun(problem, smooth_question(problem.question).laws).collect()
     if plan.dynamics == "pair kernels":
         from gauss.simulation.moreau.pair_kernel_run import PairKernelRun
 

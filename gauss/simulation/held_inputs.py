@@ -12,6 +12,7 @@ from gauss.dynamics.scene_compilation import compile_scene
 from gauss.errors import GaussError, SimulationError
 from gauss.system import System
 
+FLOAT = np.dtype(float)
 MOST_SAMPLES = 1e9  # of one motion: their times fill the memory
 EQUAL_SAMPLES = 1e-9  # relative to the time from one sample to the next: closer times are one
 
@@ -81,17 +82,14 @@ class HeldInputs:
             If the law raises an exception, or does not return a finite number for each input.
         """
         if k == len(self.values):
-            self.values.append(checked_inputs(self._called(t, q, v), self.names, t))
+            try:
+                value = self.law(t, q, v)
+            except GaussError:
+                raise
+            except Exception as error:  # whatever it does
+                raise SimulationError(f"control: at t = {t:.6g} s the law raised {type(error).__name__}: {error}") from error
+            self.values.append(checked_inputs(value, self.names, t))
         return self.values[k]
-
-    def _called(self, t: Scalar, q: np.ndarray, v: np.ndarray):
-        """Values that the law returns."""
-        try:
-            return self.law(t, q, v)
-        except GaussError:
-            raise
-        except Exception as error:  # whatever it does
-            raise SimulationError(f"control: at t = {t:.6g} s the law raised {type(error).__name__}: {error}") from error
 
     def hold_end(self, k: int) -> float:
         """Time at which sample k ends [s]."""
@@ -134,7 +132,7 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     SimulationError
         If they are not a finite number for each input.
     """
-    if type(value) is np.ndarray and value.dtype == float and value.shape == (len(names),) and isfinite(value @ value):
+    if type(value) is np.ndarray and value.dtype is FLOAT and value.shape == (len(names),) and isfinite(value.dot(value)):
         return value.copy()  # the usual case, quickly
     found = real_numbers(value)
     if found is None or found.size != len(names):

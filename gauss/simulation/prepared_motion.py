@@ -12,11 +12,14 @@ from gauss.codegen import one_tier
 from gauss.codegen.kernels import Control, LoopStatus, address
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.plan import plan_of
+from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
 from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+from gauss.simulation.drivers import DRIVERS
+from gauss.simulation.problem import Problem
 from gauss.simulation.simulate import simulate
 from gauss.simulation.step_limits import BUDGET
 from gauss.simulation.trajectory import Trajectory
@@ -44,19 +47,24 @@ class PreparedMotion:
             )
             self.system, self.duration, plan = problem.system, float(duration), plan_of(problem.question)
             name = self.system.scene.name
-            if plan.driver != "compiled loop" or problem.laws.called or isinstance(problem.method, FixedStep):
+            if plan.driver != "compiled loop" or isinstance(problem.method, FixedStep):
                 fixed = "the integrator has fixed steps, which gauss.Simulator makes"
                 why = fixed if isinstance(problem.method, FixedStep) else f"its driver is {plan.driver!r}"
                 why = "; ".join(map(str, plan.rejected)) or why
                 raise SimulationError(f"a motion of {name!r} cannot be prepared: {why}.")
+            samples = np.asarray(problem.samples, dtype=float)
+            self._origin, self.times = problem.start, samples - problem.start.t
+            self._calling = (problem._replace(progress=False), plan) if problem.laws.called else None
+            if self._calling is not None:
+                self._given = np.empty(1 + self.system.n_q + self.system.n_v)
+                self._q, self._v = np.split(self._given[1:], [self.system.n_q])
+                return
             if problem.switching.times or problem.switching.conditional:
                 raise SimulationError(f"a motion of {name!r} cannot be prepared: laws switch; use gauss.simulate.")
             run = CompiledAdaptiveRun(problem)
             loop = run.prepared()
             simulate(self.system, duration, times=end, progress=False, **options)  # confirms the accelerations of the loop
-        self._origin, self._layout, self._first = problem.start, run.layout, loop.function("start")
-        samples = np.asarray(problem.samples, dtype=float)
-        self.times, self._begins = samples - problem.start.t, bool(samples[0] == problem.start.t)
+        self._layout, self._first, self._begins = run.layout, loop.function("start"), bool(samples[0] == problem.start.t)
         self._later = np.ascontiguousarray(samples[int(self._begins) :])
         self._rows = np.empty((samples.size, run.layout.row))
         run.control.samples, self._control = float(self._later.size), Control()
@@ -105,11 +113,22 @@ class PreparedMotion:
             fits = False
         if not fits:
             raise StateError(f"expected {self._q.size} coordinates and {self._v.size} rates, got {q!r} and {v!r}.")
+        if self._calling is not None:
+            found = self._called(*self._calling)
+            return found.q, found.v
         if not self._is_done():
             found = self.trajectory(self._q.copy(), self._v.copy())
             return found.q, found.v
         n_q = self._q.size
         return self._rows[:, 1 : 1 + n_q], self._rows[:, 1 + n_q : 1 + n_q + self._v.size]
+
+    def _called(self, problem: Problem, plan: Plan) -> Trajectory:
+        """Motion whose machine code calls opaque laws, which may switch: its steps are tried one by one."""
+        if not np.isfinite(self._given[1:]).all():
+            return self.trajectory(self._q.copy(), self._v.copy())  # refuses it
+        start = State(self._origin.t, self._q.copy(), self._v.copy())
+        with one_tier():
+            return DRIVERS[plan.driver](problem._replace(start=start), plan)
 
     def _is_done(self) -> bool:
         """Make the motion; whether it is confirmed to its end."""
@@ -151,7 +170,8 @@ def prepare(
     Parameters
     ----------
     scene : Scene or System
-        Smooth scene, or a compiled one, whose loads are traced and do not switch.
+        Smooth scene, or a compiled one, whose traced loads do not switch. Opaque laws are called by the machine code; these
+        motions take some hundred microseconds besides, and may switch.
     duration : float
         Simulated time [s].
     times : array_like, optional

@@ -13,21 +13,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gauss.arguments import named_arguments
-from gauss.codegen import Kernel, one_tier
+from gauss.codegen import one_tier
 from gauss.codegen.kernels import Due, LoopStatus
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.laws.switching import Switching
-from gauss.dynamics.outputs import output_function, shape_of, split
+from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.plan import plan_of
-from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
+from gauss.simulation.called_runs import CalledFixedRun
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.held_inputs import HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
+from gauss.simulation.load_receiver import output_kernel
+from gauss.simulation.moreau.called_run import CalledMoreauRun
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
 from gauss.simulation.problem import Problem
@@ -43,7 +45,13 @@ FAILURES = {
 }
 
 
-STEPS = ("compiled loop", "compiled"), ("time stepping", "compiled"), ("time stepping", "pair kernels")
+STEPS = {
+    ("compiled loop", "compiled"),
+    ("compiled loop", "callbacks"),
+    ("time stepping", "compiled"),
+    ("time stepping", "pair kernels"),
+    ("time stepping", "callbacks"),
+}
 
 
 class SimulatorState(NamedTuple):
@@ -72,6 +80,7 @@ class Simulator:
     """Motion of a scene in fixed steps, one call after the other.
 
     Steps do not end where laws switch, and say so where they may have passed over it; prescribed velocities must not jump.
+    Opaque laws are called by the machine code of the steps; nothing is known of them between its calls.
 
     Parameters
     ----------
@@ -136,7 +145,7 @@ class Simulator:
             warn_of_short_features(whole.name, problem.laws, self.step_size)
             problem = problem._replace(switching=Switching())
             self._run = run = _run_of(problem, plan.dynamics)
-            self._loop: Any = run.prepared().entry  # machine code, or steps that are called as it is
+            self._loop: Any = run.prepared_steps()  # machine code, or steps that are called as it is
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
         n_u = len(self.inputs)
@@ -145,7 +154,7 @@ class Simulator:
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps, self._methods = 0.0, 0, (integrator, stabilisation)
         self._switches, self._warned = bool(run.program.watch), False
-        self._measure: Kernel | None = None
+        self._measure: Callable[[np.ndarray], np.ndarray] | None = None
         self._bind()
         self.reset()
 
@@ -232,7 +241,11 @@ class Simulator:
             self._times[0] = self._begun + self._steps * self.step_size
         else:
             self._plan_steps(n)
-        self._loop.call(*self._given, n)
+        try:
+            self._loop.call(*self._given, n)
+        except BaseException:  # of an opaque law: the point is that before
+            self._steps -= n
+            raise
         if self._run.control.status:
             self._recover(n)
         if self._switches and self._run.control.unseen:
@@ -310,7 +323,8 @@ class Simulator:
     def output_vector(self) -> np.ndarray:
         """Values (m,) of all outputs in a row."""
         if self._measure is None:
-            self._measure = _output_kernel(self._run, self.system)
+            # mean accelerations over a step of contacts, those of impacts included
+            self._measure = output_kernel(self._run.program, self.system, self._run.method.nonsmooth, batch=False)
         return self._measure(self._point)
 
     def snapshot(self) -> SimulatorState:
@@ -348,9 +362,10 @@ def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSte
     assert isinstance(problem.method, FixedStep)
     if dynamics == "pair kernels":
         return PairKernelSteps(problem)
-    if problem.method.nonsmooth:
-        return CompiledMoreauRun(problem, smooth_question(problem.question).laws)
-    return CompiledFixedRun(problem)
+    laws = smooth_question(problem.question).laws if problem.method.nonsmooth else problem.laws
+    if dynamics == "callbacks":
+        return CalledMoreauRun(problem, laws) if problem.method.nonsmooth else CalledFixedRun(problem)
+    return CompiledMoreauRun(problem, laws) if problem.method.nonsmooth else CompiledFixedRun(problem)
 
 
 def _unchecked(n: int) -> np.ndarray:
@@ -384,10 +399,3 @@ def _floats(u) -> np.ndarray | None:
 def _zero(count: int) -> Callable:
     """Control law of zero inputs."""
     return lambda t, q, v: np.zeros(count)
-
-
-def _output_kernel(run: CompiledFixedRun | PairKernelSteps, system: System) -> Kernel:
-    """Machine code of a point → values of all outputs."""
-    program, of_step = run.program, run.method.nonsmooth  # mean accelerations over the step, those of impacts included
-    make = lambda: Kernel(output_function(program, system.scene, of_step), batch=False)  # noqa: E731
-    return cached_on_disk(program.system, (_output_kernel, run.kind, run.key), make, system)

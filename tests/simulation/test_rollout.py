@@ -113,7 +113,7 @@ def test_what_cannot_be_rolled_out_says_why():
     scene = mechanisms.rods(1)
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.1 else 0.0)
     with pytest.raises(SimulationError, match="'drive of J1' cannot be traced"):
-        gauss.rollout(gauss.compile_scene(scene), [[0.0]], [[0.0]], steps=1, step=1e-3)
+        gauss.rollout(gauss.compile_scene(scene), [[0.0]], [[0.0]], steps=1, step=1e-3, device="lanes")
 
 
 @pytest.mark.parametrize(

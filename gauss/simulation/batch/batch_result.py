@@ -7,11 +7,10 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.codegen import Kernel
+from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.outputs import FORCES, INERTIAL, output_function, shape_of, split
-from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.outputs import FORCES, INERTIAL, shape_of, split
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean
 from gauss.integrators import FixedStep
@@ -20,6 +19,7 @@ from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.machine_code import fixed_step_code
 from gauss.simulation.held_inputs import RecordedInput, driven_as
 from gauss.simulation.integrators import INTEGRATORS
+from gauss.simulation.load_receiver import output_kernel
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import System
@@ -56,6 +56,8 @@ class Rollout:
         Largest relative error of the accelerations of each motion.
     settings : dict
         Arguments of the simulation by name.
+    reasons : dict of int to str
+        Why motions of ``diverged`` cannot continue, where a step or a law says it.
     again : dict of int to Trajectory
         The repeated motions.
     """
@@ -72,6 +74,7 @@ class Rollout:
     work: Shaped[np.ndarray, "batch k 3"] | None = field(default=None, repr=False)
     errors: np.ndarray | None = field(default=None, repr=False, compare=False)
     settings: dict = field(default_factory=dict, repr=False)
+    reasons: dict[int, str] = field(default_factory=dict, repr=False, compare=False)
     again: dict[int, Trajectory] = field(default_factory=dict, repr=False, compare=False)
 
     def __len__(self):
@@ -151,9 +154,8 @@ class Rollout:
         """Values (batch, k, m) of all outputs, in SIMD code."""
         held, system = self.control is not None, smooth_system(self.system) if self.system.nonsmooth else self.system
         laws = Laws(system)
-        program = Program(system, laws, inputs=held)
-        make = lambda: Kernel(output_function(program, self.system.scene, bool(self.system.nonsmooth)))  # noqa: E731
-        measure = cached_on_disk(system, (output_function, laws.key, held, self.system.nonsmooth), make)
+        program = (CalledProgram if laws.called else Program)(system, laws, inputs=held)
+        measure = output_kernel(program, self.system, bool(self.system.nonsmooth), batch=True)
         (batch, samples, _), layout = self.q.shape, program.layout
         points = np.zeros((layout.size, batch, samples))
         points[0] = self.t

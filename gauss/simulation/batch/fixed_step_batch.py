@@ -79,6 +79,10 @@ class FixedStepBatch:
         """States (n_q + n_v, batch) so far."""
         return self.points[self.states, : self.size]
 
+    def found_reasons(self) -> dict[int, str]:
+        """Nothing: numbers of motions that diverge are not finite."""
+        return {}
+
     def take(self, chosen: np.ndarray, fresh: "FixedStepBatch"):
         """Continue some motions from the points of another batch."""
         self.points[:, chosen] = fresh.points[:, : fresh.size]

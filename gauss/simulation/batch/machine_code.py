@@ -7,7 +7,7 @@ from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import BATCHES, method_key, plan_of
+from gauss.dynamics.plan import BATCHES, is_time_stepping, method_key, plan_of
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
@@ -31,11 +31,16 @@ def contact_state_size(system: System) -> int:
     return method_state_size(moreau_stepper(system))
 
 
-def has_pair_kernels(system: System, method: FixedStep, held: bool) -> bool:
-    """Whether motions are made by kernels of pairs of shapes, one after the other."""
-    if not method.nonsmooth:
-        return False
-    return plan_of(Question(system, Laws(system), method=method, held=held)).dynamics == "pair kernels"
+ONE_BY_ONE = "pair kernels", "callbacks"  # dynamics of motions that are made one after the other
+
+
+def one_by_one(system: System, method: Integrator, held: bool) -> str:
+    """Dynamics of motions that are made one after the other; empty where they share vector registers."""
+    laws = Laws(system)
+    if not (laws.called or is_time_stepping(Question(system, laws, method=method))):
+        return ""
+    plan = plan_of(Question(system, laws, method=method, held=held))
+    return plan.dynamics if plan.dynamics in ONE_BY_ONE else ""
 
 
 def fixed_step_code(

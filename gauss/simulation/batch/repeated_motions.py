@@ -11,11 +11,11 @@ from gauss.system import State, System
 
 def repeat(
     system: System, starts, samples: np.ndarray, share: np.ndarray, doubtful, duration: float, run: dict, control=None
-) -> tuple[list[int], dict[int, Trajectory]]:
+) -> tuple[dict[int, str], dict[int, Trajectory]]:
     """Repeat motions by :func:`gauss.simulate` with the settings ``run``, and warn of energy balances.
 
-    Samples and imbalances are changed. Returned are the motions with inputs that cannot continue, whose samples are NaN, and
-    the trajectories of the others.
+    Samples and imbalances are changed. Returned are why motions with inputs cannot continue, whose samples are NaN, and the
+    trajectories of the others.
 
     Warns
     -----
@@ -27,7 +27,7 @@ def repeat(
     SimulationError
         If a motion without inputs cannot continue.
     """
-    failed: list[int] = []
+    failed: dict[int, str] = {}
     trajectories: dict[int, Trajectory] = {}
     for k in map(int, doubtful):
         start = State(0.0, *np.split(starts[:, k], [system.n_q]))
@@ -38,7 +38,7 @@ def repeat(
         except SimulationError as error:
             if control is None:
                 raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
-            failed.append(k)
+            failed[k] = str(error)
             samples[k], share[k] = np.nan, 0.0
             continue
         samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share

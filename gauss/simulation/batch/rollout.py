@@ -12,6 +12,7 @@ from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
+from gauss.dynamics.initial_states import constraint_residual
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
@@ -23,7 +24,7 @@ from gauss.simulation.batch.batch_result import Rollout
 from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
-from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, has_pair_kernels, machine_code
+from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, machine_code, one_by_one
 from gauss.simulation.batch.repeated_motions import repeat
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
@@ -59,14 +60,14 @@ def rollout(
     With "rk4", "semi_implicit_euler" and "time_stepping" all motions make ``steps`` steps of one length; with "dop853" and
     "dopri5" each has step-size control of its own, by ``rtol`` and ``atol``, and samples at the same ``times`` by dense
     output. Contacts, stops and friction take "time_stepping", whose motions follow one another in scalar code; with many
-    contacts of shapes each of them is made by :func:`gauss.simulate`. The
+    contacts of shapes, or with opaque laws, each of them is made by :func:`gauss.simulate`. The
     accelerations are checked on the way by inverse dynamics, and loops by their constraint residuals. A motion that fails a
     check, or with a contact problem that machine code does not solve, is repeated by :func:`gauss.simulate`.
 
     Parameters
     ----------
     system : System
-        System that can be compiled: its loads are constants, springs, or laws written with :mod:`gauss.math`.
+        System that can be compiled; loads that are constants, springs, or laws written with :mod:`gauss.math` are fast.
     q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
         Initial states, at t = 0.
     integrator : str
@@ -158,12 +159,12 @@ def _fixed(
     t = step * every * np.arange(steps // every + 1)
     run = {"integrator": method.name, "step": step, "times": t}
     settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
-    if device is None and has_pair_kernels(system, method, control is not None):
-        return _singly(system, starts, steps, run, settings, control)
+    if device is None and one_by_one(system, method, control is not None):
+        return _singly(system, starts, run, settings, control)
     batch = _begun(system, starts, method, control is not None, device)
     times = _switching(system, starts, steps * step).times
     if times.switches.size:  # steps of a batch cannot end there
-        return _singly(system, starts, steps, run, settings, control)
+        return _singly(system, starts, run, settings, control)
     samples = batch.run(steps, step, every, threads, control)
     finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
     if control is None:
@@ -176,10 +177,10 @@ def _fixed(
     share = np.where(finite & solved, share, 0.0)
     failed, again = repeat(system, starts, samples, share, doubtful, steps * step, run, control)
     finite[doubtful] = True
-    finite[failed] = False
+    finite[list(failed)] = False
     counts = {"steps": np.full(batch.size, steps), "rejected": np.zeros(batch.size, int)}
     lost, repeated = tuple(map(int, np.flatnonzero(~finite))), tuple(map(int, doubtful))
-    marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again}
+    marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again, "reasons": failed}
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
 
 
@@ -260,6 +261,10 @@ def _adaptive(
     starts = columns(system, q0, v0)
     if not system.n_v:
         return _constant(system, starts, t, 0)
+    run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
+    settings = run | {"duration": t[-1], "evaluations": method.evaluations}
+    if device is None and one_by_one(system, method, False):
+        return _singly(system, starts, run, settings)
     allowed = tolerance(system, rtol, atol)
     make = lambda laws: AdaptiveBatchCode(  # noqa: E731
         Program(system, laws, memory=method_state_size(system)), method, allowed.shares, device
@@ -269,10 +274,8 @@ def _adaptive(
     switched = _switching(system, starts, t[-1])
     found = batch.run(t, step, threads, switched.times)
     doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(switched.jumps))
-    run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     share = shares(system, found.energies, starts, found.samples[:, :, : len(starts)], t[-1])
     _, again = repeat(system, starts, found.samples[:, :, : len(starts)], share, doubtful, t[-1], run)
-    settings = run | {"duration": t[-1], "evaluations": method.evaluations}
     counts = {"repeated": tuple(map(int, doubtful)), "steps": found.steps, "rejected": found.rejected}
     marks = {"errors": found.error, "work": found.samples[:, :, len(starts) :], "again": again}
     return _result(system, t, found.samples[:, :, : len(starts)], settings=settings, **counts, **marks)
@@ -291,13 +294,17 @@ def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
     return switched
 
 
-def _singly(system: System, starts: np.ndarray, steps: int, run: dict, settings: dict, control) -> Rollout:
+def _singly(system: System, starts: np.ndarray, run: dict, settings: dict, control=None) -> Rollout:
     """Motions by :func:`gauss.simulate`, one after the other."""
     batch, t = starts.shape[1], run["times"]
+    if system.has_closures:
+        states = (State(0.0, *np.split(start, [system.n_q])) for start in starts.T)
+        refuse_inconsistent(system, starts, np.array([constraint_residual(system, state) for state in states]))
     samples, share = np.empty((batch, t.size, len(starts))), np.zeros(batch)
     failed, again = repeat(system, starts, samples, share, np.arange(batch), settings["duration"], run, control)
-    counts = {"repeated": tuple(range(batch)), "steps": np.full(batch, steps), "rejected": np.zeros(batch, int)}
-    marks = {"diverged": tuple(failed), "again": again}
+    stats = [again[k].stats if k in again else None for k in range(batch)]
+    counts = {name: np.array([0 if one is None else getattr(one, name) for one in stats]) for name in ("steps", "rejected")}
+    marks = {"repeated": tuple(range(batch)), "diverged": tuple(failed), "reasons": failed, "again": again}
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
 
 

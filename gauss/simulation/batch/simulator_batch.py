@@ -6,25 +6,25 @@ from functools import partial
 import numpy as np
 
 from gauss.arguments import named_arguments
-from gauss.codegen import Kernel, one_tier
+from gauss.codegen import one_tier
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.outputs import output_function, shape_of, split
+from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.rules import Question
 from gauss.dynamics.scene_compilation import compile_scene
-from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
-from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code, has_pair_kernels
+from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code, one_by_one
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.integrators import usual_fixed_step
+from gauss.simulation.load_receiver import output_kernel
 from gauss.simulation.simulator import Simulator, SimulatorState, random_changes
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import refuse_jumps, warn_of_passages, warn_of_short_features
@@ -34,7 +34,8 @@ from gauss.system import State, System, retract
 class SimulatorBatch:
     """Motions of a scene in fixed steps, all in one call; see :class:`gauss.Simulator`.
 
-    Motions are advanced side by side in vector registers; those with contacts of many pairs of shapes one after the other.
+    Motions are advanced side by side in vector registers; those with contacts of many pairs of shapes, or with opaque laws,
+    one after the other.
 
     Parameters
     ----------
@@ -62,6 +63,9 @@ class SimulatorBatch:
         Motions that diverged or cannot continue; their states are not finite until they begin anew.
     unconfirmed : ndarray of bool, shape (batch,)
         Motions whose accelerations or loop constraints a check did not confirm: the step is too long for them.
+
+    reasons : dict of int to str
+        Why motions of ``diverged`` cannot continue, where a step or a law says it.
 
     Raises
     ------
@@ -101,22 +105,23 @@ class SimulatorBatch:
         self._alone: Simulator | None = None
         self.reset()
 
-    def _compiled(self, method: FixedStep) -> tuple[Callable, Kernel]:
+    def _compiled(self, method: FixedStep) -> tuple[Callable, Callable[[np.ndarray], np.ndarray]]:
         """Maker of a batch at some initial states, and machine code of the outputs."""
         system, held = self.system, bool(self.inputs)
-        if has_pair_kernels(system, method, held):
+        if one_by_one(system, method, held):
             alone = Simulator(system, self.step_size, self.integrator)
-            return partial(SimulatorsInTurn, alone), _outputs(alone.program, system, True)
+            return partial(SimulatorsInTurn, alone), output_kernel(alone.program, system, method.nonsmooth, batch=True)
         ask = smooth_question(Question(system, Laws(system))) if method.nonsmooth else Question(system, Laws(system))
         memory = contact_state_size(system) if method.nonsmooth else 0
         program = Program(ask.system, ask.laws, memory=memory, inputs=held)
         loop = fixed_step_code(system, method, held)
-        return partial(FixedStepBatch, loop), _outputs(program, system, method.nonsmooth)
+        return partial(FixedStepBatch, loop), output_kernel(program, system, method.nonsmooth, batch=True)
 
     @property
     def has_time_laws(self) -> bool:
         """Whether loads or constraints of the scene have laws, which may depend on time."""
-        return bool(Laws(self.system).functions) or self.system.relations.asks_time
+        laws = Laws(self.system)
+        return bool(laws.functions or laws.called) or self.system.relations.asks_time
 
     def __len__(self):
         return self._size
@@ -148,6 +153,7 @@ class SimulatorBatch:
         refuse_inconsistent(self.system, starts, self._batch.residual)
         self._u[:] = 0.0
         self.diverged, self.unconfirmed = np.zeros((2, self._size), dtype=bool)
+        self.reasons: dict[int, str] = {}
 
     def restart(self, which, q, v):
         """Begin some motions anew, of a scene without laws of time.
@@ -176,6 +182,7 @@ class SimulatorBatch:
         fresh.points[0] = self.t
         self._batch.take(chosen, fresh)
         self.diverged[chosen] = self.unconfirmed[chosen] = False
+        self.reasons = {k: why for k, why in self.reasons.items() if k not in chosen}
 
     def _changed(self, start: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Neighbour (n_q + n_v,) of a state by a displacement and a change of rates, which meets the constraints."""
@@ -221,6 +228,7 @@ class SimulatorBatch:
             for k in map(int, np.flatnonzero((finite & ~confirmed) | ~solved)):
                 finite[k] = not self.diverged[k] and self._repeated(k, before[:, k], n)
         self.diverged |= ~finite
+        self.reasons |= batch.found_reasons()
 
     def _set(self, u):
         given, shape = real_numbers(u), (self._size, len(self.inputs))
@@ -238,8 +246,8 @@ class SimulatorBatch:
         alone.restore(SimulatorState(before.tobytes(), alone.snapshot().control, 0.0, self._steps - n))
         try:
             alone.step(self._u[k, 0] if self.inputs else None, n)
-        except SimulationError:
-            self._batch.points[1:, k] = np.nan
+        except SimulationError as error:
+            self._batch.points[1:, k], self.reasons[k] = np.nan, str(error)
             return False
         self._batch.points[:, k] = np.frombuffer(alone.snapshot().point)
         return True
@@ -290,10 +298,3 @@ def _chosen(which, batch: int) -> np.ndarray:
 
 def _tiled(own: np.ndarray, given, batch: int):
     return np.tile(own, (batch, 1)) if given is None else given
-
-
-def _outputs(program: Program, system: System, nonsmooth: bool) -> Kernel:
-    """Machine code of points → values of all outputs; accelerations of contacts are means over the last step."""
-    key = _outputs, program.laws.key, len(program.inputs), program.layout.size, nonsmooth
-    make = lambda: Kernel(output_function(program, system.scene, nonsmooth))  # noqa: E731
-    return cached_on_disk(program.system, key, make, system)

@@ -1,4 +1,4 @@
-"""Batch of motions with contacts of many pairs of shapes: one simulator makes the steps of each, in turn."""
+"""Batch of motions with contacts of many pairs of shapes, or opaque laws: one simulator makes the steps of each, in turn."""
 
 from typing import Any
 
@@ -17,7 +17,7 @@ class SimulatorsInTurn:
     Parameters
     ----------
     simulator : Simulator
-        A simulator of kernels of pairs of shapes.
+        A simulator of these motions.
     starts : ndarray, shape (n_q + n_v, batch)
         Initial states, at t = 0.
     """
@@ -26,6 +26,7 @@ class SimulatorsInTurn:
         self.simulator, self.size = simulator, starts.shape[1]
         self.states, self.worst = slice(1, 1 + len(starts)), np.zeros((len(WORST_RECORD), self.size))
         self.contacts: list[Any] = []
+        self._reasons: dict[int, str] = {}
         points = []
         for k, start in enumerate(starts.T):
             state = State(0.0, *np.split(start, [simulator.system.n_q]))
@@ -61,6 +62,11 @@ class SimulatorsInTurn:
         """States (n_q + n_v, batch) so far, NaN of motions that cannot continue."""
         return self.points[self.states]
 
+    def found_reasons(self) -> dict[int, str]:
+        """Why motions could not continue since the last time, and forget it."""
+        found, self._reasons = self._reasons, {}
+        return found
+
     def take(self, chosen: np.ndarray, fresh: "SimulatorsInTurn"):
         """Continue some motions from the points of another batch."""
         self.points[:, chosen] = fresh.points
@@ -75,8 +81,8 @@ class SimulatorsInTurn:
             simulator.restore(SimulatorState(point.tobytes(), self.control, 0.0, done, self.contacts[k]))
             try:
                 simulator.step(None if control is None else control[k, 0], n)
-            except SimulationError:
-                self.points[1:, k] = np.nan
+            except SimulationError as error:
+                self.points[1:, k], self._reasons[int(k)] = np.nan, str(error)
                 continue
             reached = simulator.snapshot()
             self.points[:, k], self.contacts[k] = np.frombuffer(reached.point), reached.contacts

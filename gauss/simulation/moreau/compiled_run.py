@@ -13,6 +13,7 @@ from gauss.codegen.kernels import Due, Fixed, LoopStatus
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
+from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
@@ -34,13 +35,15 @@ class CompiledMoreauRun(CompiledFixedRun):
     problem : Problem
         Initial value problem of a system with unilateral or set-valued elements, from a start without penetration.
     laws : Laws
-        Loads of the system without these elements, all of which are traced.
+        Loads of the system without these elements.
+    program : type
+        Makes the functions of that system.
     """
 
-    def __init__(self, problem: Problem, laws: Laws):
+    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program):
         self.whole, self.stepper = problem, moreau_stepper(problem.system)
         self.stepper.refuse_penetration(problem.start)
-        super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()))
+        super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()), program)
 
     def _beside(self) -> tuple:
         return (self.whole.system,)  # with the elements that the stepper adds

@@ -47,13 +47,8 @@ class PairKernelSteps:
         self.layout, self.key = self.program.layout, (ask.laws.key, held, self.gaps)
         self.inputs = np.zeros(len(self.layout.parameters))
 
-    @property
-    def entry(self) -> "PairKernelSteps":
+    def prepared_steps(self) -> "PairKernelSteps":
         """The steps themselves: they are called as machine code is."""
-        return self
-
-    def prepared(self) -> "PairKernelSteps":
-        """The steps themselves."""
         return self
 
     def arrays(self, point: np.ndarray, confirmed: np.ndarray, grid: np.ndarray, out: np.ndarray) -> tuple:

@@ -1,0 +1,77 @@
+"""What machine code calls for the forces of opaque laws, and functions within which it does."""
+
+import ctypes
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from gauss.codegen import CallingKernel, Kernel, Receiver
+from gauss.codegen.kernels import address
+from gauss.dynamics.load_forces import LoadForces
+from gauss.dynamics.outputs import output_function
+from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.traced_system import Program
+from gauss.system import State, System
+
+T = TypeVar("T")
+NUMBER = 8  # bytes
+
+
+class LoadReceiver(Receiver):
+    """Loads with opaque laws as machine code calls them: (t, q, v) → (generalised forces (n_v,), power (3,)).
+
+    Parameters
+    ----------
+    forces : LoadForces
+        The loads.
+    """
+
+    def __init__(self, forces: LoadForces):
+        self.forces, system = forces, forces.system
+        self.n_q, self.given = 1 + system.n_q, np.empty(1 + system.n_q + system.n_v)
+        self.found = np.empty(system.n_v + 3)
+        self.places = address(self.given), address(self.found)
+        self.sizes = NUMBER * self.given.size, NUMBER * self.found.size
+
+    def __call__(self, given: int, found: int):
+        """Evaluate the loads of a state."""
+        own, results = self.places
+        ctypes.memmove(own, given, self.sizes[0])
+        numbers = self.given.copy()  # a law may keep it
+        state = State(float(numbers[0]), numbers[1 : self.n_q], numbers[self.n_q :])
+        self.found[:-3], self.found[-3:] = self.forces(state)
+        ctypes.memmove(found, results, self.sizes[1])
+
+
+def received(function: Callable[..., T], receiver: LoadReceiver) -> Callable[..., T]:
+    """Function within which machine code calls opaque laws."""
+
+    def receiving(*given):
+        with receiver:
+            return function(*given)
+
+    return receiving
+
+
+def output_kernel(program: Program, system: System, of_step: bool, batch: bool) -> Callable[[np.ndarray], np.ndarray]:
+    """Machine code of points → values of all outputs, within which it calls opaque laws where there are some.
+
+    Parameters
+    ----------
+    program : Program
+        Functions of the system; a :class:`gauss.dynamics.called_program.CalledProgram` if it has opaque laws.
+    system : System
+        System whose scene has the outputs; the program may be that of its smooth part.
+    of_step : bool
+        As of :func:`gauss.dynamics.outputs.output_function`.
+    batch : bool
+        Whether many points will be given at once.
+    """
+    called = program.laws.called
+    kind = CallingKernel if called else Kernel
+    names = tuple(bound.load.name for bound in called)
+    key = output_kernel, program.drift, program.laws.key, names, program.inputs, program.layout.size
+    make = lambda: kind(output_function(program, system.scene, of_step), batch=batch and not called)  # noqa: E731
+    kernel = cached_on_disk(program.system, (*key, of_step, batch), make, system)
+    return received(kernel, LoadReceiver(LoadForces(program.system, called))) if called else kernel

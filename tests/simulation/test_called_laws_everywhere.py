@@ -1,0 +1,150 @@
+"""Opaque laws beside held inputs, in simulators, prepared motions, batches: the results of the same laws, traced."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.errors import SceneError, SimulationError, StateError
+
+SAME = 1e-12  # of coordinates, rates, outputs: the same operations in another order
+DURATION, RATE, STEP = 0.2, 50.0, 1e-3
+LIMIT = 5.0  # N, N m
+MODELS = ("cart_pole", "four_bar")
+pytestmark = pytest.mark.filterwarnings("ignore::gauss.errors.SwitchingWarning")  # opaque laws are evaluated at few points
+SMOOTH = ("rk4", "semi_implicit_euler", "time_stepping")
+CASES = [(model, method) for model in MODELS for method in SMOOTH] + [("friction_oscillator", "time_stepping")]
+
+
+def systems(model: str) -> list[gauss.System]:
+    """A system with an opaque law of a rate, and that with the same law, traced."""
+
+    def made(number) -> gauss.System:
+        scene = gauss.load(model)
+        hinges = [name for name, joint in scene.joints.items() if joint.pair.n_v == 1]
+        scene.input("u", hinges[0], limits=LIMIT)
+        scene.drive(hinges[-1], torque=lambda t, at: -0.3 * number(at.rate(hinges[-1])) + 0.1 * number(t))
+        body = list(scene.bodies)[-1]
+        scene.output("felt", "accelerometer", body)
+        scene.output("place", "position", body)
+        return gauss.compile_scene(scene)
+
+    opaque, traced = made(float), made(lambda value: value)
+    assert Laws(opaque).called and not Laws(traced).called
+    return [opaque, traced]
+
+
+def same(one, other):
+    np.testing.assert_allclose(one, other, rtol=SAME, atol=SAME * max(1.0, np.abs(other).max()))
+
+
+@pytest.mark.parametrize("model, method", CASES)
+def test_held_inputs(model, method):
+    for how in (
+        ({"integrator": method, "step": STEP}, {"rtol": 1e-10})
+        if method == "rk4"
+        else [{"integrator": method, "step": STEP}]
+    ):
+        run = {"control": lambda t, q, v: 3.0 * np.sin(7.0 * t), "rate": RATE, "times": np.linspace(0.0, DURATION, 5)}
+        found, expected = (gauss.simulate(one, DURATION, progress=False, **run, **how) for one in systems(model))
+        assert found.stats.plan.dynamics == "callbacks" and expected.stats.plan.dynamics == "compiled"
+        for part in ("q", "v", "work"):
+            same(getattr(found, part), getattr(expected, part))
+
+
+@pytest.mark.parametrize("model, method", CASES)
+def test_simulators_batches_and_rollouts(model, method):
+    simulators, batches, rollouts = [], [], []
+    inputs = np.array([[1.0], [-2.0], [9.0]])
+    for system in systems(model):
+        simulator = gauss.Simulator(system, step=STEP, integrator=method)
+        for k in range(20):
+            simulator.step([np.sin(k)])
+        simulator.step([2.0], n=30)
+        simulators.append([*simulator.coordinates, simulator.output_vector()])
+        batch = gauss.SimulatorBatch(system, step=STEP, batch=3, integrator=method)
+        batch.step(inputs, n=50)
+        batches.append([batch.q, batch.v, batch.output_vectors()])
+        start = system.initial_state()
+        tiled = np.tile(start.q, (3, 1)), np.tile(start.v, (3, 1))
+        found = gauss.rollout(system, *tiled, steps=50, step=STEP, integrator=method, control=inputs[:, None])
+        rollouts.append([found.q, found.v, found.output("place")])
+        if not system.nonsmooth:
+            rollouts[-1].append(found.output("felt"))
+        same(found.q[:, -1], batch.q)
+        assert len(found.trajectory(1)) == 51
+    for kind in (simulators, batches, rollouts):
+        for one, other in zip(*kind, strict=True):
+            same(one, other)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_prepared_motions_and_adaptive_rollouts(model):
+    run = {"integrator": "dop853", "rtol": 1e-10, "times": [0.0, 0.07, DURATION]}
+    opaque, traced = systems(model)
+    q, v = (part.copy() for part in gauss.prepare(opaque, DURATION, **run)())
+    expected = gauss.simulate(opaque, DURATION, progress=False, **run)
+    np.testing.assert_array_equal(q, expected.q)
+    np.testing.assert_array_equal(v, expected.v)
+    start = traced.initial_state()
+    batch = [gauss.rollout(system, [start.q] * 2, [start.v] * 2, **run) for system in (opaque, traced)]
+    same(batch[0].q, batch[1].q)
+    same(batch[0].q[0], q)
+    with pytest.raises(StateError, match="finite"):
+        gauss.prepare(opaque, DURATION)(np.full(opaque.n_q, np.nan), start.v)
+
+
+def _ending(last: float) -> gauss.System:
+    """Cart-pole whose law fails beyond a place of the cart."""
+    scene = gauss.load("cart_pole")
+    scene.input("push", "rail")
+
+    def law(t, at):
+        if float(at.coordinate("rail")) > last:
+            raise ValueError("no more")
+        return 0.0
+
+    scene.drive("pin", torque=law)
+    return gauss.compile_scene(scene)
+
+
+def test_a_law_that_raises_leaves_a_simulator_as_it_was():
+    simulator = gauss.Simulator(_ending(0.1), step=1e-2)
+    simulator.step([50.0], n=5)
+    before = simulator.snapshot()
+    with pytest.raises(SimulationError, match="no more"):
+        simulator.step(n=200)
+    assert simulator.snapshot() == before and simulator.t == pytest.approx(0.05, rel=SAME)
+    simulator.step([-500.0], n=5)
+    assert simulator.t == pytest.approx(0.1, rel=SAME)
+
+
+@pytest.mark.parametrize("method", ["rk4", "time_stepping"])
+def test_a_law_that_raises_ends_its_own_motion_of_a_batch(method):
+    system, steps = _ending(0.1), 50
+    inputs = np.array([[50.0], [0.0]])
+    batch = gauss.SimulatorBatch(system, step=1e-2, batch=2, integrator=method)
+    batch.step(inputs, n=steps)
+    assert batch.diverged.tolist() == [True, False] and "no more" in batch.reasons[0]
+    start = batch.system.initial_state()
+    tiled = np.tile(start.q, (2, 1)), np.tile(start.v, (2, 1))
+    found = gauss.rollout(system, *tiled, steps=steps, step=1e-2, integrator=method, control=inputs[:, None])
+    assert found.diverged == (0,) and list(found.reasons) == [0] and "no more" in found.reasons[0]
+    same(found.q[1, -1], batch.q[1])
+    batch.reset()
+    assert not batch.reasons and not batch.diverged.any()
+    with pytest.raises(SimulationError, match="laws of time or state"):
+        batch.restart([0], *(part[:1] for part in tiled))
+
+
+def test_a_start_where_a_law_raises_is_refused():
+    simulator = gauss.Simulator(_ending(0.1), step=1e-2)
+    with pytest.raises(SceneError, match="no more"):
+        simulator.reset(gauss.State(0.0, np.array([0.5, 0.0]), np.zeros(2)))
+
+
+def test_forces_of_joints_beside_opaque_laws_come_from_reactions():
+    opaque, _ = systems("four_bar")
+    opaque.scene.output("pull", "joint_force", next(iter(opaque.scene.joints)))
+    with pytest.raises(SimulationError, match="opaque laws"):
+        gauss.Simulator(gauss.compile_scene(opaque.scene), step=STEP).output_vector()
