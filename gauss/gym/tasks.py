@@ -1,4 +1,6 @@
-"""Tasks that are ready: cart-pole swing-up, acrobot, four-bar press."""
+"""Tasks that are ready: cart-pole swing-up, acrobot, four-bar press; their functions have names, so that they pickle."""
+
+from functools import partial
 
 import numpy as np
 
@@ -25,10 +27,15 @@ def cart_pole_swing_up(force: float = 20.0, track: float = 3.0) -> Task:
     scene.output("speed", "rate", "rail")
     scene.output("turn", "rate", "pin")
 
-    def reward(q, v, u, y):
-        return np.cos(q[..., 1]) - 0.05 * q[..., 0] ** 2 - 1e-3 * (u[..., 0] / force) ** 2
+    return Task(scene, partial(_balanced, force), partial(_beyond, track))
 
-    return Task(scene, reward, lambda q, v, u, y: np.abs(q[..., 0]) > track)
+
+def _balanced(force: float, q, v, u, y):
+    return np.cos(q[..., 1]) - 0.05 * q[..., 0] ** 2 - 1e-3 * (u[..., 0] / force) ** 2
+
+
+def _beyond(track: float, q, v, u, y):
+    return np.abs(q[..., 0]) > track
 
 
 def acrobot(torque: float = 10.0) -> Task:
@@ -48,10 +55,11 @@ def acrobot(torque: float = 10.0) -> Task:
     for joint in ("A", "B"):
         scene.output(f"rate of {joint}", "rate", joint)
 
-    def reward(q, v, u, y):
-        return 0.5 * y["tip"][..., 1] - 1e-3 * (u[..., 0] / torque) ** 2
+    return Task(scene, partial(_height, torque))
 
-    return Task(scene, reward)
+
+def _height(torque: float, q, v, u, y):
+    return 0.5 * y["tip"][..., 1] - 1e-3 * (u[..., 0] / torque) ** 2
 
 
 def four_bar_press(torque: float = 200.0, speed: float = 10.0, stiffness: float = 50.0) -> Task:
@@ -73,7 +81,8 @@ def four_bar_press(torque: float = 200.0, speed: float = 10.0, stiffness: float 
         for joint in ("A", "D"):
             scene.output(f"{kind} of {joint}", kind, joint)
 
-    def reward(q, v, u, y):
-        return -(((v[..., 0] - speed) / speed) ** 2) - 1e-2 * (u[..., 0] / torque) ** 2
+    return Task(scene, partial(_regularity, torque, speed), duration=4.0)
 
-    return Task(scene, reward, duration=4.0)
+
+def _regularity(torque: float, speed: float, q, v, u, y):
+    return -(((v[..., 0] - speed) / speed) ** 2) - 1e-2 * (u[..., 0] / torque) ** 2

@@ -79,6 +79,14 @@ class FixedStepBatch:
         """States (n_q + n_v, batch) so far."""
         return self.points[self.states, : self.size]
 
+    def kept(self) -> tuple:
+        """What motions continue from."""
+        return (self.points,)
+
+    def keep(self, points: np.ndarray):
+        """Continue from what another batch of this form kept."""
+        self.points[:] = points
+
     def found_reasons(self) -> dict[int, str]:
         """Nothing: numbers of motions that diverge are not finite."""
         return {}

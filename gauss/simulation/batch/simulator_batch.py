@@ -105,6 +105,11 @@ class SimulatorBatch:
         self._alone: Simulator | None = None
         self.reset()
 
+    def __reduce__(self):
+        given = self.system, self.step_size, self._size, self.integrator, self.threads
+        flags = self._steps, self._warned, self._u.copy(), self.diverged.copy(), self.unconfirmed.copy(), dict(self.reasons)
+        return _again, (given, self._batch.kept(), flags)
+
     def _compiled(self, method: FixedStep) -> tuple[Callable, Callable[[np.ndarray], np.ndarray]]:
         """Maker of a batch at some initial states, and machine code of the outputs."""
         system, held = self.system, bool(self.inputs)
@@ -294,6 +299,14 @@ def _chosen(which, batch: int) -> np.ndarray:
         raise StateError(
             f"which: expected numbers of motions below {batch}, or {batch} truths, got {which!r:.80}."
         ) from error
+
+
+def _again(given: tuple, kept: tuple, flags: tuple) -> SimulatorBatch:
+    """Batch of the same arguments in the same states, in another process."""
+    many = SimulatorBatch(*given)
+    many._batch.keep(*kept)
+    many._steps, many._warned, many._u[:], many.diverged[:], many.unconfirmed[:], many.reasons = flags
+    return many
 
 
 def _tiled(own: np.ndarray, given, batch: int):

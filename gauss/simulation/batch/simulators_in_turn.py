@@ -62,6 +62,14 @@ class SimulatorsInTurn:
         """States (n_q + n_v, batch) so far, NaN of motions that cannot continue."""
         return self.points[self.states]
 
+    def kept(self) -> tuple:
+        """What motions continue from."""
+        return self.points, self.contacts
+
+    def keep(self, points: np.ndarray, contacts: list):
+        """Continue from what another batch of this form kept."""
+        self.points[:], self.contacts = points, list(contacts)
+
     def found_reasons(self) -> dict[int, str]:
         """Why motions could not continue since the last time, and forget it."""
         found, self._reasons = self._reasons, {}
