@@ -7,6 +7,7 @@ from gauss.dynamics.outputs import split
 from gauss.errors import ArgumentError, SimulationError
 from gauss.gym.task import Task
 from gauss.simulation import Simulator
+from gauss.simulation.held_inputs import real_numbers
 
 
 class MechanismEnv(gymnasium.Env):
@@ -51,8 +52,8 @@ class MechanismEnv(gymnasium.Env):
         ArgumentError
             If the action is not a finite number for each input.
         """
-        simulator, given = self.simulator, np.asarray(action, dtype=float)
-        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+        simulator, given = self.simulator, real_numbers(action)
+        if given is None or given.shape != self.action_space.shape or not np.isfinite(given).all():
             raise ArgumentError(f"step: expected {len(simulator.inputs)} finite numbers, one an input, got {action!r}.")
         try:
             simulator.step(given, n=self.task.hold)

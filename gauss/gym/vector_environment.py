@@ -5,7 +5,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from gauss.dynamics.outputs import split
-from gauss.errors import SimulationError
+from gauss.errors import ArgumentError, SimulationError
 from gauss.gym.task import Task
 from gauss.simulation import SimulatorBatch
 from gauss.system import State, retract
@@ -57,8 +57,16 @@ class MechanismVectorEnv(VectorEnv):
         return self._observed(), {}
 
     def step(self, actions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
-        """Hold the actions (num_envs, n_u): (observations, rewards, terminated, truncated, info)."""
+        """Hold the actions (num_envs, n_u): (observations, rewards, terminated, truncated, info).
+
+        Raises
+        ------
+        ArgumentError, SimulationError
+            If the actions are not a finite number for each input of each motion.
+        """
         began, many = self._ended.copy(), self.simulators
+        if actions is None:
+            raise ArgumentError(f"step: expected finite numbers of shape {self.action_space.shape}, got None.")
         many.step(actions, n=self.task.hold)
         u = np.asarray(actions, dtype=float)
         diverged = many.diverged & ~began

@@ -7,6 +7,7 @@ The mechanics itself is in :mod:`gauss.dynamics`, above this room; it is handed 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import isfinite
 
 import numpy as np
 
@@ -243,7 +244,7 @@ class System(StateFunctions):
         Raises
         ------
         StateError
-            If a size does not fit, a number is not finite, or a quaternion is not unit.
+            If a size does not fit, a number or the time is not finite, or a quaternion is not unit.
         """
         q = self._array(q, self.reference.q, "q", "coordinates")
         v = self._array(v, self.reference.v, "v", "rates")
@@ -252,7 +253,13 @@ class System(StateFunctions):
             if abs(length - 1.0) > UNIT_QUATERNION:
                 raise StateError(f"q: the quaternion (w, x, y, z) of joint {name!r} has length {length:.6g}, not 1.")
             q[place] /= length
-        return State(float(t), q, v)  # type: ignore[arg-type]  # a traced time is refused by float()
+        try:
+            time = float(t)  # type: ignore[arg-type]  # a traced time is refused by float()
+        except (TypeError, ValueError) as error:
+            raise StateError(f"t: expected a time [s], got {t!r}.") from error
+        if not isfinite(time):
+            raise StateError(f"t: expected a finite time [s], got {time}.")
+        return State(time, q, v)
 
     def _array(self, given, default, name: str, what: str) -> np.ndarray:
         if given is None:

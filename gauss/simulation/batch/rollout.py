@@ -35,6 +35,7 @@ from gauss.system import State, System, refuse_changed
 
 ADAPTIVE = {method.name: method for method in EXPLICIT}
 LARGE_BATCH = 1_000_000  # steps of all motions that take about as long as optimising the code of a robot arm
+RTOL = 1e-12  # when not given
 ADAPTIVE_STEPS = 100  # number of steps that an adaptive motion is taken to make
 
 
@@ -49,7 +50,7 @@ def rollout(
     step: float | None = None,
     every: int | None = None,
     times=None,
-    rtol: float = 1e-12,
+    rtol: float = RTOL,
     atol: float | tuple[float, float] | dict | None = None,
     threads: int | None = 1,
     control=None,
@@ -126,7 +127,8 @@ def rollout(
         raise SimulationError(
             f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, STEPPED | ADAPTIVE)}"
         )
-    _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
+    given = {"times": times, "rtol": None if rtol == RTOL else rtol, "atol": atol}
+    _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", **given)
     with one_tier(_tier(q0, steps)):
         keep = 1 if every is None else every
         return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)

@@ -295,7 +295,7 @@ def _chosen(which, batch: int) -> np.ndarray:
     """
     try:
         return np.ravel(np.arange(batch)[which])
-    except IndexError as error:
+    except (IndexError, ValueError, TypeError) as error:
         raise StateError(
             f"which: expected numbers of motions below {batch}, or {batch} truths, got {which!r:.80}."
         ) from error
