@@ -17,7 +17,7 @@ os.environ.setdefault("GAUSS_TIER", "optimised")
 import warnings  # noqa: E402
 from collections.abc import Callable, Iterator  # noqa: E402
 from statistics import median  # noqa: E402
-from typing import NamedTuple  # noqa: E402
+from typing import Any, NamedTuple  # noqa: E402
 
 import numpy as np  # noqa: E402
 
@@ -55,7 +55,7 @@ class Row(NamedTuple):
     name: str
     goal: float
     run: Callable
-    units: float = 1.0
+    units: int = 1
     without: Callable | None = None
     is_ratio: bool = False
 
@@ -84,19 +84,19 @@ def stepping() -> Iterator[Row]:
         simulator.step(zero, n=STEPS)
 
     def held(rate: float, **how):
-        run = {"control": lambda t, q, v: zero, "progress": False, "times": [0.0, STEPS * STEP]} | how
+        run: dict[str, Any] = {"control": lambda t, q, v: zero, "progress": False, "times": [0.0, STEPS * STEP]} | how
         return lambda: gauss.simulate(system, STEPS * STEP, rate=rate, **run)
 
     yield Row("`Simulator.step` of a Panda, RK4, in all", 4e-6, singly, STEPS)
     yield Row("the same, beyond the step in machine code", 3e-6, singly, STEPS, together)
-    rk4 = {"integrator": "rk4", "step": STEP}
+    rk4: dict[str, Any] = {"integrator": "rk4", "step": STEP}
     yield Row("a sample of held inputs, with its law, RK4", 5e-6, held(STEPS, **rk4), STEPS, held(1.0, **rk4))
     yield Row("a sample of held inputs at 1 kHz, with its law and its steps, DOP853", 3e-5, held(STEPS, rtol=1e-6), STEPS)
 
     def law(t, q, v):
         return system.inverse_dynamics(q, v, 100.0 * (POSE - q) - 20.0 * v)
 
-    run = {"control": law, "rate": 1000.0, "progress": False}
+    run: dict[str, Any] = {"control": law, "rate": 1000.0, "progress": False}
     yield Row("computed torque of a Panda, 5 s at 1 kHz, RK4", 0.5, lambda: gauss.simulate(system, 5.0, **run, **rk4))
     yield Row("the same, DOP853", 0.5, lambda: gauss.simulate(system, 5.0, rtol=1e-6, **run))
 
@@ -107,7 +107,7 @@ def laws_and_motions() -> Iterator[Row]:
     joint = next(name for name, one in scene.joints.items() if one.pair.n_v)
     scene.drive(joint, torque=lambda t, at: -0.3 * float(at.rate(joint)))
     system, simulator = gauss.compile_scene(scene), gauss.Simulator(scene, STEP)
-    run = {"integrator": "rk4", "step": STEP, "progress": False, "times": [0.0, STEPS * STEP]}
+    run: dict[str, Any] = {"integrator": "rk4", "step": STEP, "progress": False, "times": [0.0, STEPS * STEP]}
     opaque, stages = lambda: gauss.simulate(system, STEPS * STEP, **run), 4 * STEPS
     yield Row("an evaluation of a Panda with an opaque law, by `simulate`", 15e-6, opaque, stages)
     yield Row("the same, by `Simulator`", 15e-6, lambda: simulator.step(n=STEPS), stages)
@@ -124,10 +124,10 @@ def rollouts() -> Iterator[Row]:
         start, shape = system.initial_state(), (MOTIONS, 50, len(scene.inputs))
         starts = np.tile(start.q, (MOTIONS, 1)), np.tile(start.v, (MOTIONS, 1))
         control = np.random.default_rng(1).uniform(-1.0, 1.0, shape)
-        run = {"steps": 200, "step": STEP, "every": 200}
+        run: dict[str, Any] = {"steps": 200, "step": STEP, "every": 200}
         own = lambda s=system, x=starts, u=control, how=run: gauss.rollout(s, *x, control=u, **how)  # noqa: E731
         none = lambda s=system, x=starts, how=run: gauss.rollout(s, *x, **how)  # noqa: E731
-        yield Row(f"rollout of a {name} with inputs of each lane, over that without", 1.2, own, 1.0, none, is_ratio=True)
+        yield Row(f"rollout of a {name} with inputs of each lane, over that without", 1.2, own, 1, none, is_ratio=True)
     system = gauss.compile_scene(biped(FEET))
     start = system.initial_state()
     starts = np.tile(start.q, (256, 1)), np.tile(start.v, (256, 1))
@@ -153,7 +153,7 @@ def forces() -> Iterator[Row]:
 
     for question in (gauss.reactions, gauss.drive_forces):
         name = f"`{question.__name__}` of all legs of a Stewart platform, 10 000 samples"
-        yield Row(name, 0.2, lambda asked=question: ask(asked), 1.0, fresh)
+        yield Row(name, 0.2, lambda asked=question: ask(asked), 1, fresh)
 
 
 def derivatives() -> Iterator[Row]:
