@@ -64,7 +64,7 @@ class PreparedMotion:
             run = CompiledAdaptiveRun(problem)
             loop = run.prepared()
             simulate(self.system, duration, times=end, progress=False, **options)  # confirms the accelerations of the loop
-        self._layout, self._first, self._begins = run.layout, loop.function("start"), bool(samples[0] == problem.start.t)
+        self._first, self._begins = loop.function("start"), bool(samples[0] == problem.start.t)
         self._later = np.ascontiguousarray(samples[int(self._begins) :])
         self._rows = np.empty((samples.size, run.layout.row))
         run.control.samples, self._control = float(self._later.size), Control()
@@ -76,12 +76,17 @@ class PreparedMotion:
             [[problem.start.t], np.zeros(n), [tolerance.rtol, tolerance.atol, tolerance.atol_rates]]
         )
         self._q, self._v = np.split(self._given[1 : 1 + n], [self.system.n_q])
-        self._begun, self._point, self._confirmed = np.empty(size + 7), np.empty(size), np.empty(size)
+        self._begun, self._confirmed = np.empty(size + 7), np.empty(size)
+        self._point, self._first_check = np.split(self._begun, [size])
         self._start_arguments = ctypes.c_void_p(address(self._given)), ctypes.c_void_p(address(self._begun))
         out = self._rows[int(self._begins) :]
         arrays = self._point, self._confirmed, self._later, out
         self._arguments = ctypes.byref(self._control), *(ctypes.c_void_p(address(array)) for array in arrays)
         self._loop = loop.entry
+        ends = np.cumsum([1, self.system.n_q, self.system.n_v])
+        _, q, v, _ = np.split(self._rows, ends, axis=1)
+        self._found = q, v
+        self._row, self._first_row = self._point[: run.layout.row], self._rows[:1]
 
     def __reduce__(self):
         return PreparedMotion, (self.system, self.duration, self.times, self.options)
@@ -119,8 +124,7 @@ class PreparedMotion:
         if not self._is_done():
             found = self.trajectory(self._q.copy(), self._v.copy())
             return found.q, found.v
-        n_q = self._q.size
-        return self._rows[:, 1 : 1 + n_q], self._rows[:, 1 + n_q : 1 + n_q + self._v.size]
+        return self._found
 
     def _called(self, problem: Problem, plan: Plan) -> Trajectory:
         """Motion whose machine code calls opaque laws, which may switch: its steps are tried one by one."""
@@ -132,16 +136,15 @@ class PreparedMotion:
 
     def _is_done(self) -> bool:
         """Make the motion; whether it is confirmed to its end."""
-        size, begun, control = self._point.size, self._begun, self._control
+        control, checked = self._control, self._first_check
         self._first.call(*self._start_arguments)
-        self._point[:] = self._confirmed[:] = begun[:size]
-        self._numbers[:] = self._settings
-        error, _, control.kinetic, potential, control.initial, control.magnitude, control.h = begun[size:].tolist()
+        self._confirmed[:], self._numbers[:] = self._point, self._settings
+        error, _, control.kinetic, potential, control.initial, control.magnitude, control.h = checked.tolist()
         control.lowest = control.highest = potential
         if not error <= ACCELERATION_TOLERANCE:
             return False
         if self._begins:
-            self._rows[0] = self._point[: self._layout.row]
+            self._first_row[:] = self._row
         self._loop.call(*self._arguments, BUDGET)
         while control.status == LoopStatus.PAUSED:
             self._loop.call(*self._arguments, BUDGET)
