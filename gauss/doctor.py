@@ -16,8 +16,8 @@ from gauss.codegen.cpython_layout import is_known
 from gauss.codegen.gpu.batches import DeviceKernel
 from gauss.codegen.gpu.cuda_driver import device_names
 from gauss.codegen.gpu.devices import device
-from gauss.codegen.machine import width
 from gauss.codegen.optimiser import OPTIMISER
+from gauss.codegen.processor import width
 from gauss.errors import DeviceError, MissingPackageError
 from gauss.io import load
 from gauss.simulation import simulate
