@@ -12,6 +12,7 @@ from gauss.simulation import Rollout, Trajectory
 from gauss.simulation.provenance import library, made_by, plain, provenance, scene_text, written
 from gauss.system.coordinate_names import axis_labels
 
+RESIDUALS = "m, rad or rates of these"
 AXES, COMPONENTS = ("x", "y", "z"), ("w", "x", "y", "z")
 
 
@@ -54,7 +55,11 @@ def of_tracking(tracking: Tracking, joints=()):
     data = {
         "effort": (("time", "effort_name"), tracking.efforts, {"units": "N or N m", "long_name": "efforts of the servos"}),
         "effort_work": (("time", "effort_name"), tracking.work, {"units": "J", "long_name": "work of each effort"}),
-        "gap": (("time", "relation"), tracking.residuals, {"long_name": "residual of each relation, at its own level"}),
+        "gap": (
+            ("time", "relation"),
+            tracking.residuals,
+            {"units": RESIDUALS, "long_name": "residual of each relation, at its own level"},
+        ),
         "hold": ("time", tracking.smallest, {"units": "1", "long_name": "smallest singular value; 0 is none"}),
     }
     found = found.assign(data).assign_coords(effort_name=list(servo.efforts), relation=list(servo.held))
