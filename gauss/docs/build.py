@@ -51,7 +51,8 @@ def build(output: Path, program, gallery: bool = True, strict: bool = False) -> 
     command = ["-b", "html", "-q", "-j", str(min(2, os.cpu_count() or 1)), "-c", str(HERE), "-d", str(work / "doctrees")]
     command += ["-D", f"plot_gallery={int(gallery)}"] + (["-W", "--keep-going"] if strict else [])
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of what extensions call of Sphinx
+        for kind in (DeprecationWarning, PendingDeprecationWarning):  # of what extensions call of Sphinx
+            warnings.simplefilter("ignore", kind)
         failed = sphinx.main([*command, str(work / "pages"), str(output)])
     if failed:
         raise FileError(f"{output}: the documentation was not built; Sphinx says why above.")
