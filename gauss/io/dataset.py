@@ -4,12 +4,13 @@ import json
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from gauss.dynamics import Plan, compile_scene
-from gauss.errors import ArgumentError, FileError, require
+from gauss.errors import ArgumentError, FileError, MissingPackageError, require
 from gauss.io.columns import COLUMNS, as_dataset, columns
 from gauss.io.labelled import of_motion, of_rollout, of_rotors, of_tracking
 from gauss.rotors import RotorMotion
@@ -104,9 +105,23 @@ def write_zarr(thing, path: Path) -> Path:
 
 def _labelled(thing):
     """Dataset of a motion; of other results that of their columns, and a Dataset itself."""
+    if isinstance(thing, Trajectory | Tracking):
+        scene = (thing if isinstance(thing, Trajectory) else thing.motion).system.scene
+        return to_dataset(thing).assign(_meshes(scene))
     if isinstance(thing, tuple(MAKERS)):
         return to_dataset(thing)
     return as_dataset(columns(thing)) if isinstance(thing, tuple(COLUMNS)) else thing
+
+
+def _meshes(scene) -> dict:
+    """Meshes of the robot of a scene, as variables of its Dataset."""
+    if not scene.source:
+        return {}
+    try:
+        visuals = import_module("gauss.io.visuals")
+    except MissingPackageError:  # Pinocchio reads them
+        return {}
+    return visuals.as_arrays(visuals.visuals_of(scene))
 
 
 def load_motion(path) -> Trajectory:
