@@ -154,8 +154,10 @@ def _report_servo(tracking):
     typer.echo(f"{tracking!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
-    for name, u, work in zip(tracking.servo.efforts, tracking.efforts.T, tracking.work.T, strict=True):
-        typer.echo(f"  effort {name!r}: {u.min():.6g} … {u.max():.6g}, work {work[-1]:.6g} J")
+    servo = tracking.servo
+    units = import_module("gauss.servo.effort_units").effort_units(servo)
+    for name, unit, u, work in zip(servo.efforts, units, tracking.efforts.T, tracking.work.T, strict=True):
+        typer.echo(f"  effort {name!r}: {u.min():.6g} … {u.max():.6g} {unit}, work {work[-1]:.6g} J")
 
 
 def _report(trajectory):

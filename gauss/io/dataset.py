@@ -92,7 +92,9 @@ def to_table(result):
 def write_netcdf(thing, path: Path) -> Path:
     """Write a result as netCDF 4, which any netCDF or HDF5 reader reads."""
     library("h5netcdf")
-    _labelled(thing).to_netcdf(path, engine="h5netcdf")
+    found = _labelled(thing)
+    meshes = {name: {"zlib": True} for name in ("mesh_vertex", "mesh_triangle") if name in found}
+    found.to_netcdf(path, engine="h5netcdf", encoding=meshes)
     return path
 
 

@@ -112,7 +112,7 @@ def as_arrays(visuals) -> dict[str, tuple]:
         "mesh_vertices": ("mesh", np.array([len(visual.vertices) for visual in visuals])),
         "mesh_triangles": ("mesh", np.array([len(visual.faces) for visual in visuals])),
         "mesh_vertex": (("vertex", "axis"), np.concatenate([visual.vertices for visual in visuals]), about),
-        "mesh_triangle": (("triangle", "corner"), np.concatenate([visual.faces for visual in visuals])),
+        "mesh_triangle": (("triangle", "corner"), np.concatenate([visual.faces for visual in visuals]).astype(np.int32)),
     }
 
 

@@ -50,7 +50,7 @@ def report(motion: RotorMotion) -> str:
     lines += _more(reduced.names)
     lines += [
         "",
-        f"  {'link':20} {'torque at the end':>18} {'largest':>13} {'slip':>9} {'heat of slip':>14} {'of mesh':>13}",
+        f"  {'link':20} {'torque at the end':>18} {'largest':>13} {'slip [1]':>9} {'heat of slip':>14} {'of mesh':>13}",
     ]
     for b, link in enumerate(reduced.links[:LISTED]):
         largest, slip = np.abs(motion.torques[:, b]).max(), round(motion.slip(link)[-1], 4) + 0.0
@@ -164,7 +164,7 @@ def mode_table(modes: Modes) -> str:
         Lines to be printed.
     """
     shown = modes.names[:LISTED]
-    lines = ["", f"torsional modes, {modes.state}", f"  {'f [Hz]':>10}  amplitudes"]
+    lines = ["", f"torsional modes, {modes.state}", f"  {'f [Hz]':>10}  amplitudes, the largest 1"]
     for frequency, shape in zip(modes.frequencies[:LISTED], modes.shapes.T, strict=False):
         amplitudes = "  ".join(f"{name} {value:+.3f}" for name, value in zip(shown, shape, strict=False))
         lines.append(f"  {frequency:10.5g}  {amplitudes}")
