@@ -61,6 +61,12 @@ def minimum(x, y):
     -------
     float, ndarray or Expression
         Of their common shape.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> float(math.minimum(2.0, 3.0))
+    2.0
     """
     return _minimum(x, y) if _traced(x, y) else np.minimum(x, y)
 
@@ -77,6 +83,12 @@ def maximum(x, y):
     -------
     float, ndarray or Expression
         Of their common shape.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> float(math.maximum(2.0, 3.0))
+    3.0
     """
     return _maximum(x, y) if _traced(x, y) else np.maximum(x, y)
 
@@ -95,6 +107,14 @@ def where(condition, x, y):
     -------
     float, ndarray or Expression
         Of their common shape.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gauss import math
+    >>> t = np.array([0.0, 2.0])
+    >>> math.where(t < 1.0, 1.0, -1.0)
+    array([ 1., -1.])
     """
     return _where(condition, x, y) if _traced(condition, x, y) else np.where(condition, x, y)[()]
 
@@ -111,6 +131,12 @@ def clip(x, lowest, highest):
     -------
     float, ndarray or Expression
         Of the shape of x.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> float(math.clip(5.0, -2.0, 2.0))
+    2.0
     """
     return minimum(maximum(x, lowest), highest)
 
@@ -127,6 +153,12 @@ def abs(x):
     -------
     float, ndarray or Expression
         Of the shape of x.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> float(math.abs(-2.0))
+    2.0
     """
     return np.abs(x)
 
@@ -143,6 +175,12 @@ def sign(x):
     -------
     float, ndarray or Expression
         Of the shape of x.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> float(math.sign(-0.3))
+    -1.0
     """
     return where(x < 0.0, -1.0, where(x > 0.0, 1.0, 0.0))
 
@@ -159,6 +197,12 @@ def tanh(x):
     -------
     float, ndarray or Expression
         Of the shape of x.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> round(float(math.tanh(0.5)), 6)
+    0.462117
     """
     shrinking = exp(-2.0 * abs(x))
     return sign(x) * (1.0 - shrinking) / (1.0 + shrinking)
@@ -183,6 +227,12 @@ def interp(x, xp, fp):
     ------
     SceneError
         If the arguments do not increase, or the two differ in length.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> float(math.interp(0.5, [0.0, 1.0, 2.0], [0.0, 10.0, 0.0]))
+    5.0
     """
     xp, fp = np.asarray(xp, dtype=float), np.asarray(fp, dtype=float)
     if xp.ndim != 1 or xp.shape != fp.shape or not xp.size or not (np.diff(xp) > 0.0).all():

@@ -89,7 +89,7 @@ def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), 
     --------
     >>> import gauss
     >>> round(gauss.equilibrium(gauss.load("pendulum")).energy, 6)
-    -9.81
+    -4.905
     """
     system = _compiled(system, "equilibrium")
     start = system.initial_state() if start is None else start

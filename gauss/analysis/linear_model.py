@@ -186,7 +186,7 @@ def linearise(
     >>> import gauss
     >>> model = gauss.linearise(gauss.load("pendulum"))
     >>> model.states
-    ('pin', 'pin rate')
+    ('A', 'A rate')
     """
     require(system, (System, Scene), "linearise")
     system = compile_scene(system) if isinstance(system, Scene) else system

@@ -1,6 +1,7 @@
 """Arguments, loading, figures and conclusions of several commands."""
 
 from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -131,6 +132,21 @@ def as_far_as_it_came(make):
         kept = f"at t = {found.t[-1]:.6g} s; what was simulated until then is kept"
         typer.secho(f"interrupted {kept}.", fg="yellow", err=True)
         return found, True
+
+
+def check_files(kind: str, output: Path | None, *figures: Path | None):
+    """Refuse files of results and figures that cannot be written, before time is spent.
+
+    Raises
+    ------
+    FileError
+        If an ending does not fit, or there is no such folder.
+    """
+    if output is not None:
+        import_module("gauss.io.load").writer(output, kind)
+    for path in figures:
+        if path is not None:
+            import_module("gauss.view.style").check_format(path)
 
 
 def equally_spaced(duration: float, samples: int):

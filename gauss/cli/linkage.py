@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.cli.common import INTERRUPTED, as_far_as_it_came, view
+from gauss.cli.common import INTERRUPTED, as_far_as_it_came, check_files, view
 from gauss.errors import FileError, did_you_mean
 
 
@@ -19,7 +19,15 @@ def linkage(
     ],
     steps: Annotated[int, typer.Option(help="Number of steps of a turn of the crank.", min=2)] = 360,
     speed: Annotated[float | None, typer.Option(help="Speed of the crank [rad/s]; that of the file when not given.")] = None,
-    csv: Annotated[Path | None, typer.Option(help="Write torque, reactions and motion at every crank angle (.csv).")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "--csv",
+            help="Write torque, reactions and motion at every crank angle; with --run the motion of the crank in time "
+            "(.csv, .json, .npz, .nc, .h5, .zarr).",
+        ),
+    ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(help="Draw the mechanism, torque, forces, transmission angles and coupler curves (.png, .svg, .pdf)."),
@@ -27,7 +35,7 @@ def linkage(
     coupler: Annotated[
         list[str] | None,
         typer.Option(
-            help="Point LINK=X,Y of a link [m] whose curve is drawn by --plot and written by --csv; may be repeated."
+            help="Point LINK=X,Y of a link [m] whose curve is drawn by --plot and written by --output; may be repeated."
         ),
     ] = None,
     animation: Annotated[
@@ -43,6 +51,7 @@ def linkage(
     """Analyse a planar linkage by its Assur groups: torque, reactions, work, quality of motion."""
     from gauss.linkages import coupler_curves, report, table  # other commands need no linkages
 
+    check_files("cycle" if run is None else "crankrun", output, plot)
     mechanism = gauss.load_linkage(file)
     if speed is not None:
         mechanism.set_speed(speed)
@@ -52,8 +61,8 @@ def linkage(
     if fluctuation is not None:
         wheel = mechanism.flywheel(fluctuation)
         typer.echo(f"  flywheel       {wheel.inertia:.6g} kg m² for δ = {fluctuation:g}; ΔE = {wheel.excess_energy:.6g} J")
-    if csv is not None:
-        typer.echo(f"table written to {gauss.io.write_csv(table(cycle) | coupler_curves(cycle, points), csv)}")
+    if output is not None and run is None:
+        typer.echo(f"table written to {gauss.save(table(cycle) | coupler_curves(cycle, points), output)}")
     if plot is not None:
         view().plot_linkage(cycle, plot, points)
         typer.echo(f"figure written to {plot}")
@@ -62,6 +71,8 @@ def linkage(
     if run is not None:
         motion, interrupted = as_far_as_it_came(lambda: mechanism.run(run))
         typer.echo(f"run: {motion}")
+        if output is not None:
+            typer.echo(f"run written to {gauss.save(motion, output)}")
         if interrupted:
             raise typer.Exit(INTERRUPTED)
 

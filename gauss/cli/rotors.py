@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.cli.common import INTERRUPTED, as_far_as_it_came, equally_spaced, view
+from gauss.cli.common import INTERRUPTED, as_far_as_it_came, check_files, equally_spaced, view
 
 
 def rotors(
@@ -30,12 +30,16 @@ def rotors(
     explain: Annotated[bool, typer.Option("--explain", help="Say what the network is reduced to, in symbols.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw speeds, slips, torques and losses to this file.")] = None,
     network: Annotated[Path | None, typer.Option(help="Draw the network to this file (.png, .svg, .pdf).")] = None,
-    csv: Annotated[Path | None, typer.Option(help="Write the samples to this file (.csv).")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "--csv", help="Write the motion to this file (.csv, .json, .npz, .nc, .h5, .zarr)."),
+    ] = None,
 ):
     """Simulate a network of rotors: shafts, gears, friction drives, springs and clutches."""
     from gauss import rotors as package  # other commands need no rotors
 
     given = gauss.load_rotors(file)
+    check_files("rotormotion", output, plot, network)
     if explain:
         typer.echo(package.explain(given) + "\n")
     if network is not None:
@@ -57,7 +61,7 @@ def rotors(
     if plot is not None:
         view().plot_rotors(motion, plot)
         typer.echo(f"figure written to {plot}")
-    if csv is not None:
-        typer.echo(f"samples written to {gauss.io.write_csv(package.table(motion), csv)}")
+    if output is not None:
+        typer.echo(f"motion written to {gauss.save(motion, output)}")
     if interrupted:
         raise typer.Exit(INTERRUPTED)

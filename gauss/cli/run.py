@@ -17,6 +17,7 @@ from gauss.cli.common import (
     Root,
     SceneName,
     as_far_as_it_came,
+    check_files,
     conclude,
     equally_spaced,
     load,
@@ -52,7 +53,9 @@ def run(
         int | None,
         typer.Option(help=f"Number of equally spaced samples; if not given, {SMOOTH} for a figure, else every step.", min=2),
     ] = None,
-    output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz, .nc, .zarr, .csv).")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="Write the motion to this file (.npz, .csv, .json, .nc, .h5, .zarr).")
+    ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a figure to this file (.png, .svg, .pdf).")] = None,
     figure: Annotated[str, typer.Option(help=f"What is drawn: {', '.join(FIGURES)}.")] = "motion",
     check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
@@ -64,12 +67,7 @@ def run(
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {did_you_mean(figure, FIGURES)}")
     found, allowed = load(scene, root, read), tolerances(atol)
-    if output is not None:
-        import_module("gauss.io.load").writer(
-            output, "trajectory" if isinstance(found, gauss.Scene) else "tracking"
-        )  # refused before time is spent
-    if plot is not None:
-        import_module("gauss.view.style").check_format(plot)
+    check_files("trajectory" if isinstance(found, gauss.Scene) else "tracking", output, plot)
     samples = SMOOTH if samples is None and plot is not None else samples
     times = None if samples is None else equally_spaced(duration, samples)
     if not isinstance(found, gauss.Scene):
@@ -156,8 +154,10 @@ def _report_servo(tracking):
     typer.echo(f"{tracking!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
-    for name, u, work in zip(tracking.servo.efforts, tracking.efforts.T, tracking.work.T, strict=True):
-        typer.echo(f"  effort {name!r}: {u.min():.6g} … {u.max():.6g}, work {work[-1]:.6g} J")
+    servo = tracking.servo
+    units = import_module("gauss.servo.effort_units").effort_units(servo)
+    for name, unit, u, work in zip(servo.efforts, units, tracking.efforts.T, tracking.work.T, strict=True):
+        typer.echo(f"  effort {name!r}: {u.min():.6g} … {u.max():.6g} {unit}, work {work[-1]:.6g} J")
 
 
 def _report(trajectory):

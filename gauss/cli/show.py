@@ -47,8 +47,7 @@ def show(
     """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
     if Path(scene).suffix.lower() in import_module("gauss.io.load").LABELLED:
         thing = gauss.load_motion(scene)
-        made_from = thing.system.scene
-        visuals = import_module("gauss.io.visuals").visuals_of(made_from) if made_from.source else ()  # imports Pinocchio
+        visuals = _kept(scene, thing.system.scene)
     else:
         found = load(scene, root)
         found = found if isinstance(found, gauss.Scene) else found.system.scene
@@ -69,6 +68,14 @@ def show(
     running = viewer.show(thing, beside=second, dark=dark, port=port, browser=browser, **look)
     typer.echo(f"{running.url} (Ctrl+C ends it)")
     running.wait()
+
+
+def _kept(path: str, scene: gauss.Scene) -> list:
+    """Meshes kept with a motion; of a file without them those of its robot."""
+    if not scene.source:
+        return []
+    visuals = import_module("gauss.io.visuals")  # imports Pinocchio
+    return visuals.saved_visuals(path) or visuals.visuals_of(scene)
 
 
 def _joints(thing, reactions) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.cli.common import INTERRUPTED, Atol, Root, SceneName, load, tolerances
+from gauss.cli.common import INTERRUPTED, Atol, Root, SceneName, check_files, load, tolerances
 from gauss.errors import FileError, extra
 from gauss.simulation import INTEGRATORS
 
@@ -37,11 +37,16 @@ def sweep(
     workers: Annotated[int | None, typer.Option(help="Processes of this machine that share the work.", min=1)] = None,
     dask: Annotated[str | None, typer.Option(help="Address of the scheduler of a Dask cluster that does the work.")] = None,
     output: Annotated[
-        Path | None, typer.Option(help="Write the result to this folder (.zarr) as it is made; go on if it is there.")
+        Path | None,
+        typer.Option(
+            help="Write the result to this folder (.zarr) as it is made, go on if it is there; or at the end as .nc or .h5, "
+            "or a table with a row for each member (.csv, .json, .npz)."
+        ),
     ] = None,
     root: Root = "fixed",
 ):
     """Simulate a scene with many values of its masses, lengths, starts, …, and report their outcomes."""
+    check_files("dataset", output)
     found = load(scene, root)
     if not isinstance(found, gauss.Scene):
         raise FileError(f"{scene}: servos are not simulated in sweeps; sweep the scene without them.")
@@ -49,23 +54,32 @@ def sweep(
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol)}
     sweeps = import_module("gauss.simulation.sweeps")  # it takes long to import
     values = sweeps.ranges(vary)
-    chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
+    grows = output is not None and output.suffix.lower() == ".zarr"
+    chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output if grows else None}
     interrupted = False
     try:
         dataset = sweeps.sweep(found, values, duration, **settings, **chosen)
     except KeyboardInterrupt as error:
         dataset, interrupted = getattr(error, "dataset", None), True
-        goes_on = f"; the same command goes on from {output}" if output is not None else ""
+        goes_on = f"; the same command goes on from {output}" if grows else ""
         typer.secho(f"interrupted{goes_on}.", fg="yellow", err=True)
     finally:
         if client is not None:
             client.close()
     if dataset is not None:
         _report(dataset, time.perf_counter() - began)
-    if output is not None:
-        typer.echo(f"sweep written to {output}")
+    _write(dataset, output, grows)
     if interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _write(dataset, output: Path | None, is_there: bool):
+    """Write a sweep where asked for, unless it has been written as it was made."""
+    if output is None or dataset is None:
+        return
+    if not is_there:
+        gauss.save(dataset, output)
+    typer.echo(f"sweep written to {output}")
 
 
 def _client(address: str):

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import warnings
 from importlib import import_module
 from pathlib import Path
 
@@ -49,7 +50,11 @@ def build(output: Path, program, gallery: bool = True, strict: bool = False) -> 
         raise FileError(f"{output}: cannot be written: {error.strerror}.") from error
     command = ["-b", "html", "-q", "-j", str(min(2, os.cpu_count() or 1)), "-c", str(HERE), "-d", str(work / "doctrees")]
     command += ["-D", f"plot_gallery={int(gallery)}"] + (["-W", "--keep-going"] if strict else [])
-    if sphinx.main([*command, str(work / "pages"), str(output)]):
+    with warnings.catch_warnings():
+        for kind in (DeprecationWarning, PendingDeprecationWarning):  # of what extensions call of Sphinx
+            warnings.simplefilter("ignore", kind)
+        failed = sphinx.main([*command, str(work / "pages"), str(output)])
+    if failed:
         raise FileError(f"{output}: the documentation was not built; Sphinx says why above.")
     return output / "index.html"
 

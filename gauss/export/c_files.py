@@ -22,6 +22,14 @@ class CCode:
         Prefix of all names, and name of the files.
     header, source : str
         Texts of the files.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import to_c
+    >>> code = to_c(gauss.load("pendulum"), ["mass_matrix"])
+    >>> code.name, 'mass_matrix' in code.header
+    ('pendulum', True)
     """
 
     name: str

@@ -49,6 +49,14 @@ class ExportedFunction:
         Graph; its inputs and outputs are those of ``inputs`` and ``outputs``, flattened in their order.
     inputs, outputs : dict of str to tuple of int
         Shapes of the arguments and of the results; () is a number.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import exported_functions
+    >>> found = exported_functions(gauss.load("double_pendulum"), "mass_matrix")[0]
+    >>> found.name, found.inputs, found.outputs
+    ('mass_matrix', {'q': (2,), 't': ()}, {'result': (2, 2)})
     """
 
     name: str
@@ -92,6 +100,13 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
         If there is no such function, or two of them have the same name as code.
     SimulationError
         If the scene has elements that no smooth function describes, by their names.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import exported_functions
+    >>> [each.name for each in exported_functions(gauss.load("double_pendulum"), ["mass_matrix", "bias_forces"])]
+    ['mass_matrix', 'bias_forces']
     """
     require(system, (System, Scene), "export")
     system = compile_scene(system) if isinstance(system, Scene) else system

@@ -43,6 +43,14 @@ class Formulas:
         Value of each symbol that stands for a number of the scene.
     latex_names : dict
         LaTeX of symbols whose names alone do not give it.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import to_sympy
+    >>> found = to_sympy(gauss.load("pendulum"), "mass_matrix")
+    >>> found.results
+    {'result': Matrix([[J_rod_z + c_rod_x**2*m_rod]])}
     """
 
     arguments: dict[str, Any]
@@ -78,6 +86,13 @@ def to_sympy(system: System | Scene, name: str = "inverse_dynamics", simplify: b
         If there is no such function.
     SimulationError
         If the scene has elements that no smooth function describes, by their names; or if the formulas are too long.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import to_sympy
+    >>> list(to_sympy(gauss.load("pendulum"), "mass_matrix").results)
+    ['result']
     """
     with extra("symbolic"):
         import sympy
@@ -191,6 +206,14 @@ def latex_document(system: System | Scene, names: Sequence[str] | str | None = N
         If there is no such function.
     SimulationError
         As of :func:`to_sympy`.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import latex_document
+    >>> text = latex_document(gauss.load("pendulum"), "mass_matrix")
+    >>> "documentclass" in text.splitlines()[0]
+    True
     """
     with extra("symbolic"):
         import sympy

@@ -52,6 +52,14 @@ def to_jax(system: System | Scene, name: str = "forward_dynamics") -> Callable:
         If there is no such function.
     SimulationError
         If the scene has elements that no smooth function describes, by their names.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import to_jax
+    >>> inertia = to_jax(gauss.load("double_pendulum"), "mass_matrix")
+    >>> inertia([0.1, 0.2]).shape
+    (2, 2)
     """
     with extra("jax"):
         import jax  # noqa: F401  (the module that is written needs it)
@@ -77,6 +85,14 @@ def jax_source(system: System | Scene, names: Sequence[str] | str | None = None)
         If there is no such function.
     SimulationError
         If the scene has elements that no smooth function describes, by their names.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.export import jax_source
+    >>> source = jax_source(gauss.load("pendulum"), "mass_matrix")
+    >>> 'def mass_matrix' in source
+    True
     """
     return "\n".join(_module(exported_functions(system, names)))
 

@@ -41,6 +41,14 @@ def save_as(
         If the language needs a package that is not installed.
     SimulationError
         If the scene has elements that no smooth function describes, by their names.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import gauss
+    >>> from gauss.export import save_as
+    >>> [path.name for path in save_as(gauss.load("pendulum"), "c", tempfile.mkdtemp(), ["mass_matrix"])]
+    ['pendulum.h', 'pendulum.c']
     """
     if language not in WRITERS:
         raise ArgumentError(f"export: no language {language!r}. {did_you_mean(str(language), WRITERS)}")

@@ -22,6 +22,15 @@ class MechanismEnv(gymnasium.Env):
         Scene, reward and end of an episode.
     integrator : str, optional
         Fixed-step method, see :class:`gauss.Simulator`.
+
+    Examples
+    --------
+    >>> from gauss.gym import MechanismEnv, acrobot
+    >>> environment = MechanismEnv(acrobot())
+    >>> observation, info = environment.reset(seed=0)
+    >>> observation, reward, terminated, truncated, info = environment.step(environment.action_space.sample())
+    >>> terminated, truncated
+    (False, False)
     """
 
     metadata: dict = {"render_modes": []}  # noqa: RUF012 (as Gymnasium declares it)

@@ -45,6 +45,16 @@ class Task:
     ArgumentError
         If the scene has no inputs, or one without limits, a time is not positive, or the step does not divide that of an
         action.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.gym import Task
+    >>> scene = gauss.load("pendulum")
+    >>> torque = scene.input("torque", "A", limits=(-5.0, 5.0))
+    >>> task = Task(scene, reward=lambda q, v, u, y: -v[..., 0] ** 2, rate=50.0)
+    >>> task.actions, task.hold
+    (500, 10)
     """
 
     scene: Scene

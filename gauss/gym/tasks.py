@@ -45,6 +45,13 @@ def acrobot(torque: float = 10.0) -> Task:
     ----------
     torque : float
         Largest torque [N m].
+
+    Examples
+    --------
+    >>> from gauss.gym import acrobot
+    >>> task = acrobot(torque=10.0)
+    >>> task.action_space
+    Box(-10.0, 10.0, (1,), float64)
     """
     scene = load("double_pendulum")
     for joint in ("A", "B"):
@@ -73,6 +80,12 @@ def four_bar_press(torque: float = 200.0, speed: float = 10.0, stiffness: float 
         Speed of the crank [rad/s].
     stiffness : float
         Stiffness of the workpiece, at the bearing of the rocker [N m/rad].
+
+    Examples
+    --------
+    >>> from gauss.gym import four_bar_press
+    >>> list(four_bar_press().scene.inputs)
+    ['motor']
     """
     scene: Scene = load("four_bar")
     scene.joint_spring("workpiece", "D", stiffness=stiffness, damping=0.02 * stiffness)

@@ -4,21 +4,22 @@ import json
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from gauss.dynamics import Plan, compile_scene
-from gauss.errors import ArgumentError, FileError, require
-from gauss.io.labelled import energies, of_motion, of_rollout, of_rotors, of_tracking
-from gauss.io.results import write_csv
+from gauss.errors import ArgumentError, FileError, MissingPackageError, require
+from gauss.io.columns import COLUMNS, as_dataset, columns
+from gauss.io.labelled import of_motion, of_rollout, of_rotors, of_tracking
 from gauss.rotors import RotorMotion
 from gauss.scene.toml import from_tables
 from gauss.servo import Tracking
 from gauss.simulation import Rollout, Trajectory
 from gauss.simulation.provenance import library
 from gauss.simulation.trajectory import Event, Stats
-from gauss.system import System, coordinate_units, rate_units
+from gauss.system import System
 
 MAKERS: dict[type, Callable] = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}
 
@@ -64,55 +65,65 @@ def to_dataset(motion, joints=()):
     return make(motion, joints) if joints else make(motion)
 
 
-def to_table(trajectory: Trajectory):
-    """Motion as a pandas DataFrame: one row a sample, coordinates, rates and energies with their units in the names.
+def to_table(result):
+    """Result as a pandas DataFrame: one row a sample, columns with their units in the names.
 
     Parameters
     ----------
-    trajectory : Trajectory
-        The motion.
+    result : Trajectory, Tracking, RotorMotion, Rollout, Cycle or CrankRun
+        The motion: coordinates, rates and energies; of a linkage its cycle, or a run under its motor.
 
     Returns
     -------
     pandas.DataFrame
-        Indexed by time [s].
+        Indexed by time [s]; of many motions by their number and time, of a cycle by the angle of the crank [rad].
 
     Raises
     ------
     MissingPackageError
         If pandas is not installed.
     """
-    require(trajectory, (Trajectory,), "to_table")
-    table = library("pandas").DataFrame(columns(trajectory))
-    return table.set_index("t [s]")
+    kinds = tuple(kind for kind in COLUMNS if kind is not dict)
+    require(result, kinds, "to_table")
+    named = columns(result)
+    return library("pandas").DataFrame(named).set_index(list(named)[: 1 + isinstance(result, Rollout)])
 
 
-def columns(trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """Times, coordinates, rates and energies of a motion by name and unit."""
-    system = trajectory.system
-    found = {"t [s]": trajectory.t}
-    for letter, units, values in (("q", coordinate_units(system), trajectory.q), ("v", rate_units(system), trajectory.v)):
-        found |= {f"{letter} {name} [{units[name]}]": column for name, column in zip(units, values.T, strict=True)}
-    return found | {f"{name} [J]": row for name, row in energies(trajectory).items()}
-
-
-def write_table(trajectory: Trajectory, path: Path) -> Path:
-    """Write the columns of a motion as CSV."""
-    return write_csv(columns(trajectory), path)
-
-
-def write_netcdf(motion, path: Path) -> Path:
-    """Write the Dataset of a motion as netCDF 4, which any netCDF or HDF5 reader reads."""
+def write_netcdf(thing, path: Path) -> Path:
+    """Write a result as netCDF 4, which any netCDF or HDF5 reader reads."""
     library("h5netcdf")
-    to_dataset(motion).to_netcdf(path, engine="h5netcdf")
+    found = _labelled(thing)
+    meshes = {name: {"zlib": True} for name in ("mesh_vertex", "mesh_triangle") if name in found}
+    found.to_netcdf(path, engine="h5netcdf", encoding=meshes)
     return path
 
 
-def write_zarr(motion, path: Path) -> Path:
-    """Write the Dataset of a motion as a Zarr folder."""
+def write_zarr(thing, path: Path) -> Path:
+    """Write a result as a Zarr folder."""
     library("zarr")
-    to_dataset(motion).to_zarr(path, mode="w", zarr_format=2, consolidated=True)
+    _labelled(thing).to_zarr(path, mode="w", zarr_format=2, consolidated=True)
     return path
+
+
+def _labelled(thing):
+    """Dataset of a motion; of other results that of their columns, and a Dataset itself."""
+    if isinstance(thing, Trajectory | Tracking):
+        scene = (thing if isinstance(thing, Trajectory) else thing.motion).system.scene
+        return to_dataset(thing).assign(_meshes(scene))
+    if isinstance(thing, tuple(MAKERS)):
+        return to_dataset(thing)
+    return as_dataset(columns(thing)) if isinstance(thing, tuple(COLUMNS)) else thing
+
+
+def _meshes(scene) -> dict:
+    """Meshes of the robot of a scene, as variables of its Dataset."""
+    if not scene.source:
+        return {}
+    try:
+        visuals = import_module("gauss.io.visuals")
+    except MissingPackageError:  # Pinocchio reads them
+        return {}
+    return visuals.as_arrays(visuals.visuals_of(scene))
 
 
 def load_motion(path) -> Trajectory:
@@ -140,7 +151,7 @@ def load_motion(path) -> Trajectory:
         with library("xarray").open_dataset(path, engine=engine) as file:
             found = file.load()
         about = found.attrs
-        columns = _columns(found, "time", "q", "v")
+        parts = _columns(found, "time", "q", "v")
         work = np.stack(_columns(found, "drives", "loads", "dissipated"), axis=1)
         stats, events = _stats(about), _events(found)
         text, names = about["scene_toml"], found["rate"].values.tolist()
@@ -155,9 +166,9 @@ def load_motion(path) -> Trajectory:
     if not text:
         raise FileError(f"{path}: holds numbers but no scene: {about.get('scene_remark', 'none was written')}.")
     system = compile_scene(replace(from_tables(tomllib.loads(text)), source=str(about.get("source", ""))))
-    _require_own(path, system, names, columns[1])
+    _require_own(path, system, names, parts[1])
     settings = {key.removeprefix("setting_"): _read(value) for key, value in about.items() if key.startswith("setting_")}
-    t, q, v = columns
+    t, q, v = parts
     return Trajectory(system, t, q, v, work, stats, events, settings=settings)
 
 

@@ -8,10 +8,13 @@ from gauss.analysis import energy, reactions
 from gauss.io.rotors import toml_text
 from gauss.rotors import RotorMotion
 from gauss.servo import Tracking
+from gauss.servo.effort_units import effort_units
 from gauss.simulation import Rollout, Trajectory
 from gauss.simulation.provenance import library, made_by, plain, provenance, scene_text, written
 from gauss.system.coordinate_names import axis_labels
 
+RESIDUALS = "m, rad or rates of these"
+RELATION = "residual of each relation, at its own level"
 AXES, COMPONENTS = ("x", "y", "z"), ("w", "x", "y", "z")
 
 
@@ -52,12 +55,24 @@ def of_tracking(tracking: Tracking, joints=()):
     """Dataset of a motion under servos: that of its motion, efforts, their work, what is left of the relations, the hold."""
     found, servo = of_motion(tracking.motion, joints), tracking.servo
     data = {
-        "effort": (("time", "effort_name"), tracking.efforts, {"units": "N or N m", "long_name": "efforts of the servos"}),
+        "effort": (
+            ("time", "effort_name"),
+            tracking.efforts,
+            {"units": "see effort_unit", "long_name": "efforts of the servos"},
+        ),
         "effort_work": (("time", "effort_name"), tracking.work, {"units": "J", "long_name": "work of each effort"}),
-        "gap": (("time", "relation"), tracking.residuals, {"long_name": "residual of each relation, at its own level"}),
+        "gap": (
+            ("time", "relation"),
+            tracking.residuals,
+            {"units": RESIDUALS, "long_name": "residual of each relation, at its own level"},
+        ),
         "hold": ("time", tracking.smallest, {"units": "1", "long_name": "smallest singular value; 0 is none"}),
     }
-    found = found.assign(data).assign_coords(effort_name=list(servo.efforts), relation=list(servo.held))
+    found = found.assign(data).assign_coords(
+        effort_name=list(servo.efforts),
+        effort_unit=("effort_name", list(effort_units(servo))),
+        relation=list(servo.held),
+    )
     return found.assign_attrs(title=f"motion of {servo.system.scene.name} under servos", verdict=str(tracking.verdict))
 
 

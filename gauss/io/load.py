@@ -84,19 +84,21 @@ def writer(path: Path, kind: str) -> Callable:
     """
     writers = WRITERS[kind]
     if path.suffix.lower() not in writers:
-        raise FileError(f"{path}: a {kind} is written as {' or '.join(writers)}.")
+        remedy = ELSEWHERE.get(path.suffix.lower(), "")
+        raise FileError(f"{path}: a {NAMES.get(kind, kind)} is written as {' or '.join(writers)}.{remedy}")
     if not path.parent.is_dir():
         raise FileError(f"{path}: there is no folder {str(path.parent)!r}.")
     return writers[path.suffix.lower()]
 
 
 def save(thing, path) -> Path:
-    """Write a scene (.toml, .urdf, or .xml for MuJoCo) or a motion (.npz, .nc, .zarr, .csv) and return where it went.
+    """Write a scene (.toml, .urdf, or .xml for MuJoCo) or a result (.npz, .csv, .json, .nc, .h5, .zarr).
 
     Parameters
     ----------
-    thing : Scene, Trajectory, Tracking, RotorMotion or Rollout
-        What is written.
+    thing : Scene, Trajectory, Tracking, RotorMotion, Rollout, Cycle, CrankRun, Dataset or dict
+        What is written; a Dataset of :func:`gauss.sweep` as its outcomes, a row a member, unless the file is a labelled one
+        (.nc, .h5, .zarr); of a dict its columns.
     path : str or Path
         Where; the ending says how.
 
@@ -115,7 +117,7 @@ def save(thing, path) -> Path:
     require(path, (str, Path), "save")
     path, kind = Path(path), type(thing).__name__.lower()
     if kind not in WRITERS:
-        raise ArgumentError(f"save: expected a Scene or a motion, got a {type(thing).__name__}.")
+        raise ArgumentError(f"save: expected a Scene, a motion or another result, got a {type(thing).__name__}.")
     write = writer(path, kind)
     try:
         return write(thing, path)
@@ -195,19 +197,45 @@ READERS: dict[str, Callable] = {  # (path, options, name) by ending
     ".sdf": _read_sdf,
     ".world": _read_sdf,
 }
-LABELLED = {".nc": _later("gauss.io.dataset", "write_netcdf"), ".zarr": _later("gauss.io.dataset", "write_zarr")}
+
+
+def _table(name: str) -> Callable:
+    """Writer of the columns of a result."""
+
+    def write(thing, path: Path) -> Path:
+        columns = import_module("gauss.io.columns").columns(thing)
+        return getattr(import_module("gauss.io.results"), name)(columns, path)
+
+    return write
+
+
+LABELLED = {
+    ".nc": _later("gauss.io.dataset", "write_netcdf"),
+    ".h5": _later("gauss.io.dataset", "write_netcdf"),
+    ".zarr": _later("gauss.io.dataset", "write_zarr"),
+}
+TABLES = {".csv": _table("write_csv"), ".json": _table("write_json")}
+RESULTS = {".npz": _table("write_arrays")} | TABLES | LABELLED
 WRITERS: dict[str, dict[str, Callable]] = {  # by the name of the class: most are not imported yet
     "scene": {
         ".toml": write_toml,
         ".xml": _later("gauss.io.mjcf.write", "write_mjcf"),
         ".urdf": _later("gauss.io.urdf.write", "write_urdf"),
     },
-    "trajectory": {
-        ".npz": _later("gauss.io.results", "write_npz"),
-        ".csv": _later("gauss.io.dataset", "write_table"),
-    }
-    | LABELLED,
-    "tracking": {".npz": _later("gauss.io.servo", "write_tracking")} | LABELLED,
-    "rotormotion": LABELLED,
-    "rollout": LABELLED,
+    "trajectory": RESULTS | {".npz": _later("gauss.io.results", "write_npz")},
+    "tracking": RESULTS | {".npz": _later("gauss.io.servo", "write_tracking")},
+    "rotormotion": RESULTS,
+    "rollout": RESULTS,
+    "cycle": RESULTS,
+    "crankrun": RESULTS,
+    "dict": RESULTS,
+    "dataset": RESULTS,
+}
+NAMES = {"rotormotion": "motion of rotors", "crankrun": "run of a linkage", "dict": "table", "dataset": "sweep"}
+FIGURE = " Figures are drawn by --plot, or gauss.view."
+FILM = " Films are made by gauss show --video, or gauss.view.viewer."
+ELSEWHERE = {  # remedies where a picture is asked for as a file of numbers
+    **dict.fromkeys((".png", ".svg", ".pdf"), FIGURE),
+    **dict.fromkeys((".gif", ".mp4"), FILM),
+    ".html": " Pages are made by gauss show --html, or gauss.view.viewer.",
 }

@@ -1,4 +1,4 @@
-"""Results on disk: motions as compressed numpy archives that any numpy can read, tables as CSV."""
+"""Results on disk: motions as compressed numpy archives that any numpy can read, tables as CSV, JSON and such archives."""
 
 import csv
 import json
@@ -61,4 +61,24 @@ def write_csv(columns: dict[str, np.ndarray], path: Path) -> Path:
             writer.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+    return path
+
+
+def write_json(columns: dict[str, np.ndarray], path: Path) -> Path:
+    """Write a table as one JSON object: a list for each column, null for what is not finite."""
+    lists = {
+        name: [
+            None if isinstance(value, float) and not np.isfinite(value) else value for value in np.asarray(column).tolist()
+        ]
+        for name, column in columns.items()
+    }
+    path.write_text(json.dumps(lists, ensure_ascii=False, allow_nan=False), encoding="utf-8")
+    return path
+
+
+def write_arrays(columns: dict[str, np.ndarray], path: Path) -> Path:
+    """Write a table as a compressed archive of numpy, an array for each column."""
+    named: dict[str, Any] = {name: np.asarray(column) for name, column in columns.items()}
+    with open(path, "wb") as file:
+        np.savez_compressed(file, **named)
     return path

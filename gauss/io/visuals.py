@@ -12,6 +12,7 @@ from gauss.io.urdf.numbers import for_parser
 from gauss.io.urdf.read import ROOTS, base_of, body_names
 from gauss.io.urdf.robots import robot
 from gauss.scene import GROUND, Scene
+from gauss.simulation.provenance import library
 
 with extra():
     import pinocchio as pin
@@ -96,8 +97,49 @@ def visuals_of(scene: Scene) -> list[Visual]:
         why = f"{scene.source} has bodies that the scene has not"
     except FileError as error:
         why = str(error).rstrip(".")
-    warnings.warn(f"scene {scene.name!r} is shown without its meshes: {why}.", NotImportedWarning, stacklevel=2)
+    warnings.warn(f"scene {scene.name!r} is without its meshes: {why}.", NotImportedWarning, stacklevel=2)
     return []
+
+
+def as_arrays(visuals) -> dict[str, tuple]:
+    """Meshes as variables of an xarray Dataset, one behind the other; nothing without meshes."""
+    if not visuals:
+        return {}
+    about = {"units": "m", "long_name": "vertices of the meshes, in the frames of their bodies"}
+    return {
+        "mesh_body": ("mesh", np.array([visual.body for visual in visuals], dtype=str)),
+        "mesh_colour": (("mesh", "channel"), np.array([visual.colour for visual in visuals], dtype=float), {"units": "1"}),
+        "mesh_vertices": ("mesh", np.array([len(visual.vertices) for visual in visuals])),
+        "mesh_triangles": ("mesh", np.array([len(visual.faces) for visual in visuals])),
+        "mesh_vertex": (("vertex", "axis"), np.concatenate([visual.vertices for visual in visuals]), about),
+        "mesh_triangle": (("triangle", "corner"), np.concatenate([visual.faces for visual in visuals]).astype(np.int32)),
+    }
+
+
+def from_arrays(found) -> list[Visual]:
+    """Meshes of a Dataset that :func:`as_arrays` filled."""
+    if "mesh_body" not in found:
+        return []
+    vertices, faces = found.mesh_vertex.values, found.mesh_triangle.values
+    ends = np.cumsum(found.mesh_vertices.values)[:-1], np.cumsum(found.mesh_triangles.values)[:-1]
+    parts = zip(found.mesh_body.values, np.split(vertices, ends[0]), np.split(faces, ends[1]), strict=True)
+    colours = (tuple(colour) for colour in found.mesh_colour.values.tolist())
+    return [
+        Visual(str(body), points, corners, colour) for (body, points, corners), colour in zip(parts, colours, strict=True)
+    ]
+
+
+def saved_visuals(path) -> list[Visual]:
+    """Meshes that :func:`gauss.save` kept with a motion.
+
+    Parameters
+    ----------
+    path : str or Path
+        File (.nc, .h5) or folder (.zarr) of the motion.
+    """
+    engine = "zarr" if Path(path).suffix.lower() == ".zarr" else "h5netcdf"
+    with library("xarray").open_dataset(path, engine=engine) as file:
+        return from_arrays(file.load())
 
 
 def _is_mesh(shape) -> bool:

@@ -52,6 +52,14 @@ class Dyad:
         Assembly mode, +1 or −1. RRR: +1 when the inner pin lies to the left of the line from the outer pin of i
         to that of j; RRP: the inner pin lies further along the guide than the foot of the outer pin; RPR: so does the outer
         pin of i against that of j.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> dyad = bar.chain.groups[0]
+    >>> dyad.kind, dyad.name, dyad.mode
+    ('RRR', 'RRR group (coupler, rocker)', 1)
     """
 
     kind: str
@@ -90,6 +98,14 @@ class Triad:
         Pins between the ternary link and the legs, in their order.
     pose : tuple
         Pose of the ternary link near the start of the cycle: x, y [m], angle [rad].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> linkage = gauss.load_linkage("class_three")
+    >>> triad = linkage.chain.triads[0]
+    >>> triad.ternary.name, [joint.name for joint in triad.inners]
+    ('ternary', ['E', 'F', 'G'])
     """
 
     ternary: PlanarLink
@@ -130,6 +146,14 @@ class Chain:
         Groups in order.
     loads : tuple of Load
         All loads.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> chain = bar.chain
+    >>> [group.kind for group in chain.groups], [joint.name for joint in chain.joints]
+    (['RRR'], ['A', 'B', 'C', 'D'])
     """
 
     name: str

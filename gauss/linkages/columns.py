@@ -18,6 +18,16 @@ def table(found: Cycle) -> dict[str, np.ndarray]:
     -------
     dict
         Columns (k,) by name and unit.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> from gauss.linkages import table
+    >>> columns = table(cycle)
+    >>> list(columns)[:3]
+    ['crank angle [rad]', 'driving torque M1 [N m]', 'reaction A x [N]']
     """
     nought = np.zeros(len(found))
     columns = {"crank angle [rad]": found.crank_angle, "driving torque M1 [N m]": found.torque}
@@ -57,6 +67,16 @@ def coupler_curves(found: Cycle, points) -> dict[str, np.ndarray]:
     -------
     dict
         Columns (k,) by name and unit.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> from gauss.linkages import coupler_curves
+    >>> curves = coupler_curves(cycle, [("coupler", (0.5, 0.2))])
+    >>> {name: column.round(4).tolist() for name, column in curves.items()}
+    {'coupler (0.5, 0.2) x [m]': [0.6203, 0.6801, 0.61], 'coupler (0.5, 0.2) y [m]': [0.4914, 0.6181, 0.7038]}
     """
     columns: dict[str, np.ndarray] = {}
     for link, point in points:

@@ -60,6 +60,18 @@ class Cycle:
     error : ndarray, shape (k,)
         Estimated relative error of torque, accelerations and reactions. Near singular positions it is
         measured, the effect of rounding lengths and angles to doubles; elsewhere the condition numbers bound it.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> cycle.torque.round(3)
+    array([-85.354,   9.519,  63.267])
+    >>> cycle.reaction("B").force.round(2)[0]
+    array([-295.56, -219.26])
+    >>> cycle.point("coupler", (0.5, 0.2)).position.round(4)[0]
+    array([0.6203, 0.4914])
     """
 
     motion: LinkageKinematics

@@ -51,6 +51,14 @@ def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float 
     -----
     NearSingularWarning
         If a group comes close to a singular position.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> from gauss.linkages import cycle
+    >>> cycle(bar.chain, [0.0, 0.5], speed=5.0).torque.round(3)
+    array([-51.888,   6.133])
     """
     driver = chain.driver
     angles = _numbers("angles", angles)

@@ -36,6 +36,15 @@ class ReducedLinkage:
         The linkage.
     added_inertia : float
         Further inertia on the crank, e.g. of rotor and flywheel [kg m²].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> from gauss.linkages import ReducedLinkage
+    >>> alone = ReducedLinkage(bar.chain)
+    >>> round(alone.acceleration(angle=0.3, speed=0.0, torque=50.0), 3)
+    259.307
     """
 
     def __init__(self, chain: Chain, added_inertia: float = 0.0):
@@ -71,6 +80,15 @@ class CrankRun:
         Of the crank [rad, rad/s, rad/s²].
     torque : ndarray
         Of the motor [N m].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> motor = bar.motor(speed=[0, 20], torque=[120, 0])
+    >>> run = bar.run(0.1)
+    >>> run.t.shape == run.speed.shape, bool(run.speed[-1] > 0)
+    (True, True)
     """
 
     t: np.ndarray
@@ -142,6 +160,15 @@ def run(
     -----
     SwitchingWarning
         If the law of a motor, a Python function, was evaluated at few points.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> from gauss.linkages import run
+    >>> motion = run(bar.chain, lambda t, angle, speed: 120.0 - 6.0 * speed, 0.05, step=0.01)
+    >>> round(float(motion.speed[-1]), 3)
+    16.84
     """
     _check_settings(duration, rtol, atol, step, added_inertia)
     equation = ReducedLinkage(chain, added_inertia)

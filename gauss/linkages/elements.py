@@ -29,6 +29,12 @@ class PlanarLink:
         Moment of inertia about the centre of mass [kg m²].
     com : array_like, shape (2,)
         Centre of mass in the link frame [m].
+
+    Examples
+    --------
+    >>> from gauss.linkages import PlanarLink
+    >>> PlanarLink("rocker", mass=2.2, inertia=0.09, com=(0.35, 0))
+    PlanarLink(name='rocker', mass=2.2, inertia=0.09, com=(0.35, 0.0))
     """
 
     name: str
@@ -67,6 +73,13 @@ class LinkJoint:
         Pin, or reference point of the slider, in the frame of the child [m]; it runs on the guide.
     angle, child_angle : float
         Direction of the guide in the frames of parent and child [rad].
+
+    Examples
+    --------
+    >>> from gauss.linkages import LinkJoint
+    >>> pin = LinkJoint("B", "revolute", "crank", "coupler", at=(0.4, 0))
+    >>> pin.kind, pin.parent, pin.child
+    ('revolute', 'crank', 'coupler')
     """
 
     name: str
@@ -116,6 +129,14 @@ class Here(NamedTuple):
         Link [rad, rad/s].
     position, velocity : ndarray, complex
         Point of application, x + i y [m, m/s].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> spring = bar.load("rocker", law=lambda here: (0.0, 0.0, -5.0 * here.angle))
+    >>> bar.cycle([0.3]).torque.round(3)
+    array([-34.401])
     """
 
     crank_angle: Any
@@ -148,6 +169,13 @@ class Load:
         c [N m s/rad] of a further moment −c ω.
     law : callable, optional
         law(here) → (Fx, Fy, M) in world axes, added to the rest; ``here`` is a :class:`Here`.
+
+    Examples
+    --------
+    >>> from gauss.linkages import Load
+    >>> saw = Load("slider", force=(-300.0, 0.0), resisting=True)
+    >>> saw.force, saw.resisting
+    ((-300.0, 0.0), True)
     """
 
     link: str
@@ -192,6 +220,13 @@ class CrankMotor:
         Torques there [N m].
     inertia : float
         Inertia that it adds to the crank, rotor and flywheel [kg m²].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> bar.motor(speed=[0, 20], torque=[120, 0], inertia=0.5).torque
+    (120.0, 0.0)
     """
 
     speed: tuple
@@ -228,6 +263,12 @@ class Driver:
         Its acceleration [rad/s²].
     start : float
         Crank angle at which a cycle starts [rad].
+
+    Examples
+    --------
+    >>> from gauss.linkages import Driver
+    >>> Driver("A", speed=10.0)
+    Driver(joint='A', speed=10.0, acceleration=0.0, start=0.0)
     """
 
     joint: str

@@ -47,6 +47,15 @@ def kinetic(motion: LinkageKinematics) -> np.ndarray:
     -------
     ndarray, shape (k,)
         Energy [J].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> from gauss.linkages import kinetic
+    >>> kinetic(cycle.motion).round(3)
+    array([22.631, 11.068, 20.404])
     """
     total = 0.0 * motion.crank_angle
     for link in motion.chain.links:
@@ -67,6 +76,15 @@ def potential(motion: LinkageKinematics) -> np.ndarray:
     -------
     ndarray, shape (k,)
         Energy [J].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> from gauss.linkages import potential
+    >>> potential(cycle.motion).round(3)
+    array([17.715, 21.78 , 24.715])
     """
     weights = (link.mass * dot(motion.chain.gravity, centre(motion, link)) for link in motion.chain.links)
     return 0.0 * motion.crank_angle - sum(weights)
@@ -84,6 +102,15 @@ def power_balance(found: Cycle) -> Balance:
     -------
     Balance
         Powers (k,) [W].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> from gauss.linkages import power_balance
+    >>> bool(abs(power_balance(cycle).residual).max() < 1e-9)
+    True
     """
     motion = found.motion
     change = 0.0 * motion.crank_angle
@@ -112,6 +139,15 @@ def work(chain: Chain, angles) -> np.ndarray:
     -------
     ndarray, shape (k,)
         Work [J].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> import numpy as np
+    >>> from gauss.linkages import work
+    >>> bool(abs(work(bar.chain, np.linspace(0, 2 * np.pi, 181))[-1]) < 1e-9)  # a turn under a conservative load
+    True
     """
     angles = np.asarray(angles, dtype=float)
     return cumulative(lambda x: cycle(chain, x).torque, angles, _jumps(chain, angles[0], angles[-1]))

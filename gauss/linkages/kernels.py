@@ -29,6 +29,15 @@ def cycle_kernel(chain: Chain) -> Kernel:
     ------
     LinkageError
         If the law of a load cannot be traced.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> from gauss.linkages import cycle_kernel
+    >>> kernel = cycle_kernel(bar.chain)
+    >>> kernel.__class__.__name__
+    'Kernel'
     """
 
     def forces(x):
@@ -55,6 +64,15 @@ def reduced_kernel(chain: Chain) -> Kernel:
     ------
     LinkageError
         If the law of a load cannot be traced.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> from gauss.linkages import reduced_kernel
+    >>> kernel = reduced_kernel(bar.chain)
+    >>> type(kernel).__name__
+    'Kernel'
     """
 
     def terms(x):

@@ -42,6 +42,15 @@ def to_scene(chain: Chain, angle: float | None = None, torque: float | Callable 
     ------
     LinkageError
         If the linkage does not close there.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> from gauss.linkages import to_scene
+    >>> scene = to_scene(bar.chain, angle=0.5)
+    >>> list(scene.joints)
+    ['A', 'B', 'D', 'C']
     """
     angle = chain.driver.start if angle is None else float(angle)
     links = {name: _pose(moving) for name, moving in cycle(chain, [angle]).motion.links.items()}
@@ -159,6 +168,17 @@ def scene_state(system: System, found: Cycle, index: int, reference: float | Non
     ------
     LinkageError
         If the system is of something else.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> from gauss.linkages import scene_state
+    >>> system = gauss.compile_scene(bar.to_scene())
+    >>> state = scene_state(system, cycle, 1)
+    >>> state.q.round(4)
+    array([ 0.5   , -0.7358, -0.1339, -0.1019])
     """
     chain = found.chain
     joints = {joint.name: joint for joint in chain.joints}

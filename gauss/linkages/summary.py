@@ -28,6 +28,15 @@ def report(linkage: Linkage, found: Cycle) -> str:
     -------
     str
         Lines to be printed.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> cycle = bar.cycle([0.0, 0.5, 1.0])
+    >>> from gauss.linkages import report
+    >>> print(report(bar, cycle).splitlines()[0])
+    four-bar: kinematics from top to bottom, forces from bottom to top
     """
     lines = [str(found.chain), ""]
     lines += [f"  {name:14} {text}" for name, text in (*_geometry(linkage), *_forces(linkage, found))]

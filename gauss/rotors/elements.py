@@ -22,6 +22,12 @@ class Shaft:
         ω at the start [rad/s]; follows from the shafts geared to it when not given, else 0.
     angle : float
         α at the start [rad].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> rotors.Shaft("motor", inertia=0.1, speed=50.0)
+    Shaft(name='motor', inertia=0.1, speed=50.0, angle=0.0)
     """
 
     name: str
@@ -54,6 +60,16 @@ class Torque:
         Account of its work: "motor" (input), "load" (useful) or "loss" (heat of bearings); the law's own when not given.
     breaks : sequence of float
         Times at which the law switches [s], for a law that cannot be traced; conditions of traced laws are found.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> brake = fan.torque(wheel, rotors.Dry(30.0), name="brake", begin=6.0)
+    >>> brake.name, brake.shaft, brake.begin
+    ('brake', 'wheel', 6.0)
     """
 
     name: str
@@ -126,6 +142,12 @@ def law_of(name: str, arguments: dict, what: str) -> Law:
     ------
     SceneError
         If there is no such law, or a value is unknown or missing.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> rotors.law_of("constant", {"value": -40.0}, "torque of the file")
+    Constant(value=-40.0)
     """
     if name not in LAWS:
         raise SceneError(f"{what}: unknown law {name!r}. {did_you_mean(name, LAWS)}")

@@ -27,6 +27,19 @@ class RotorEvent:
         "separate", "stuck", "reversal", "rest", "switch", "corner", …
     element : str
         Shaft, link or torque.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> brake = fan.torque(wheel, rotors.Dry(10.0))
+    >>> clutch = fan.clutch("clutch", wheel, motor, torque=30.0)
+    >>> push = fan.torque(motor, rotors.Constant(25.0), until=0.1)
+    >>> run = rotors.simulate(fan, 0.3)
+    >>> run.events[0].kind, round(run.events[0].time, 6), run.events[0].element
+    ('switch', 0.1, 'torque on motor')
     """
 
     time: float

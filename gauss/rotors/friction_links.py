@@ -23,6 +23,16 @@ class FrictionDrive(ShaftLink):
         η and η̄ as of a :class:`GearPair`; the loss by slip comes on top.
     largest_slip : float, optional
         End of the fitted range of the curve; an event reports when it is left.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> belt = fan.friction_drive("belt", wheel, motor, ratio=2.0, curve=(300.0, 6.0, 0.02))
+    >>> belt.ratio, type(belt.curve).__name__
+    (2.0, 'Hyperbola')
     """
 
     kind = "friction drive"
@@ -66,6 +76,17 @@ class FrictionClutch(ShaftLink):
         Torque while it slips [N m]; a table {time [s], torque [N m]} of straight lines describes its engagement.
     static : float
         Static over sliding friction, at least 1.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> clutch = fan.clutch("clutch", wheel, motor, torque=30.0, static=1.2)
+    >>> push = fan.torque(motor, rotors.Constant(20.0))
+    >>> rotors.snapshot(fan).accelerations.round(3)  # it sticks: 20 / (0.1 + 0.5)
+    array([33.333, 33.333])
     """
 
     kind = "clutch"
@@ -126,6 +147,17 @@ class TorqueLimiter(FrictionClutch):
         Torque while it slips [N m].
     static : float
         Static over sliding friction, at least 1.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> limiter = fan.torque_limiter("limiter", wheel, motor, torque=15.0)
+    >>> push = fan.torque(motor, rotors.Constant(6.0))
+    >>> rotors.snapshot(fan).accelerations.round(3)  # below its limit it is rigid
+    array([10., 10.])
     """
 
     kind = "torque limiter"
@@ -143,6 +175,17 @@ class OneWayClutch(ShaftLink):
         Shafts.
     ratio : float
         i = ω_driver/ω_driven.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> freewheel = fan.one_way("freewheel", wheel, motor)
+    >>> push = fan.torque(motor, rotors.Constant(12.0))
+    >>> rotors.snapshot(fan).accelerations.round(3)  # it drives: 12 / (0.1 + 0.5)
+    array([20., 20.])
     """
 
     kind = "one-way clutch"

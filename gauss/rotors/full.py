@@ -36,6 +36,19 @@ class Snapshot(NamedTuple):
         Q_em of the links [N m].
     forward : ndarray of bool, shape (n_l,)
         Whether power flows from driver to driven.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> now = rotors.snapshot(fan)
+    >>> now.accelerations.round(3), now.torques.round(3), now.forward
+    (array([1303.167,  651.584]), array([325.792]), array([ True]))
     """
 
     accelerations: np.ndarray
@@ -66,6 +79,20 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
     ------
     StateError
         If speeds contradict the gears, or the form does not exist.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> rotors.snapshot(fan, speeds=[50.0, 25.0]).torques.round(3)
+    array([219.91])
+    >>> rotors.snapshot(fan, speeds=[50.0, 25.0], form="full").torques.round(3)
+    array([219.91])
     """
     if form not in FORMS:
         raise StateError(f"no form {form!r}. {did_you_mean(form, FORMS)}")

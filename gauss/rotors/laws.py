@@ -28,6 +28,16 @@ class TorqueFunction(Law):
     ----------
     function : callable
         f(t, angle, speed) → torque, of [s], [rad], [rad/s] and [N m].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> ramp = rotors.TorqueFunction(lambda t, speed, angle: 4.0 * t)
+    >>> fan.torque(motor, ramp).name
+    'torque on motor'
     """
 
     function: Callable

@@ -128,6 +128,20 @@ class GearPair(ShaftLink):
         η̄ when the driven shaft drives; 0 is self-locking; max(0, 2 − 1/η) when not given, at most 1 − ε.
     slip : float
         ε, constant.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> gear.ratio, gear.efficiency
+    (2.0, 0.96)
+    >>> rotors.snapshot(fan, speeds=[10.0, 5.0]).torques.round(3)
+    array([304.181])
     """
 
     kind = "gear"
@@ -161,6 +175,16 @@ class TorsionSpring(Elastic, ShaftLink):
         Backlash from side to side [rad], referred to the driven shaft.
     rest : float
         Twist α_driver/i − α_driven without torque, in the middle of the backlash [rad].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> spring = fan.spring("coupling", wheel, motor, stiffness=200.0, damping=0.5, backlash=0.01)
+    >>> spring.stiffness, spring.backlash
+    (200.0, 0.01)
     """
 
     kind = "torsion spring"

@@ -20,6 +20,13 @@ class Constant(Law):
     ----------
     value : float
         Torque [N m].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> lift = rotors.Constant(-40.0)  # N m
+    >>> lift.value
+    -40.0
     """
 
     value: float
@@ -46,6 +53,12 @@ class Viscous(Law):
     ----------
     value : float
         Torque over speed [N m s/rad].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> rotors.Viscous(0.2)
+    Viscous(value=0.2)
     """
 
     value: float
@@ -67,6 +80,12 @@ class Quadratic(Law):
     ----------
     value : float
         Torque over the square of the speed [N m s²/rad²].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> rotors.Quadratic(0.01)
+    Quadratic(value=0.01)
     """
 
     value: float
@@ -109,6 +128,13 @@ class TorqueTable(Law):
         Speeds, rising [rad/s].
     torque : tuple of float
         Torque at each of them [N m].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.TorqueTable(speed=(0.0, 50.0, 100.0), torque=(0.0, -5.0, -20.0))
+    >>> fan.torque
+    (0.0, -5.0, -20.0)
     """
 
     speed: tuple
@@ -139,6 +165,16 @@ class Periodic(Law):
         Values [N m] at the angles 0, p/m, 2 p/m, … of one period p.
     period : float
         p [rad]; a full turn when not given.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> press = rotors.Periodic(torque=(0.0, -10.0, 0.0, 5.0))  # over a turn
+    >>> fan.torque(wheel, press).name
+    'torque on wheel'
     """
 
     torque: tuple

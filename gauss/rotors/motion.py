@@ -26,6 +26,20 @@ class RotorEnergy:
         Heat of links by slip or damping, and by their efficiencies.
     kinetic, elastic : ndarray
         Change of the energies of motion and of springs.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
+    >>> energy = run.energy()
+    >>> energy.kinetic.round(2), bool(abs(energy.balance).max() < 1e-9 * energy.scale)
+    (array([   0.  , 2104.57]), True)
     """
 
     input: np.ndarray
@@ -90,6 +104,21 @@ class RotorMotion:
         What happened.
     stats : RotorStats
         What it cost.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
+    >>> run.speed("wheel").round(3), run.torque("gear").round(3)
+    (array([ 0.   , 68.387]), array([325.792,  49.041]))
+    >>> run.t
+    array([0. , 0.5])
     """
 
     reduced: ReducedNetwork

@@ -20,6 +20,13 @@ class Linear(MotorLaw):
         Torque over speed [N m s/rad].
     omega_0 : float
         Speed without torque [rad/s].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> law = rotors.Linear(stiffness=2.0, omega_0=150.0)
+    >>> law.stiffness, law.omega_0
+    (2.0, 150.0)
     """
 
     stiffness: float
@@ -87,6 +94,15 @@ class DC(MotorLaw):
         R [ohm].
     constant : float
         k, torque over current [N m/A], which is voltage over speed [V s/rad].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> torque = fan.torque(motor, rotors.DC(voltage=24.0, resistance=0.5, constant=0.1))
+    >>> rotors.snapshot(fan).accelerations.round(3)  # k U / R / J
+    array([48.])
     """
 
     voltage: float
@@ -123,6 +139,16 @@ class Diesel(MotorLaw):
         Speed without load, above ``governed`` [rad/s].
     drag : float
         Torque with which the engine brakes when it is driven faster [N m].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> engine = rotors.Diesel(speed=(0, 80, 150, 220), torque=(0, 300, 340, 260), governed=220.0, idle=240.0)
+    >>> fan.torque(motor, engine).name
+    'torque on motor'
     """
 
     speed: tuple

@@ -31,6 +31,21 @@ class OperatingPoint:
         Power of motors, loads and bearings [W].
     slip_loss, mesh_loss : ndarray, shape (n_l,)
         Power lost in the links [W].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> point = rotors.operating_points(fan)[0]
+    >>> round(point.speed("wheel"), 3), point.stable
+    (68.831, True)
+    >>> bool(abs(point.input - point.useful - point.mesh_loss.sum()) < 1e-9 * point.input)
+    True
     """
 
     reduced: ReducedNetwork

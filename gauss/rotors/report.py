@@ -21,6 +21,19 @@ def report(motion: RotorMotion) -> str:
     -------
     str
         Lines to be printed.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
+    >>> print(rotors.report(run).splitlines()[0])
+    RotorMotion('fan', 2 samples, 0 … 0.5 s, 0 events)
     """
     reduced, stats, energy = motion.reduced, motion.stats, motion.energy()
     how = "; ".join([stats.plan.dynamics, *map(str, stats.plan.rejected)])
@@ -37,7 +50,7 @@ def report(motion: RotorMotion) -> str:
     lines += _more(reduced.names)
     lines += [
         "",
-        f"  {'link':20} {'torque at the end':>18} {'largest':>13} {'slip':>9} {'heat of slip':>14} {'of mesh':>13}",
+        f"  {'link':20} {'torque at the end':>18} {'largest':>13} {'slip [1]':>9} {'heat of slip':>14} {'of mesh':>13}",
     ]
     for b, link in enumerate(reduced.links[:LISTED]):
         largest, slip = np.abs(motion.torques[:, b]).max(), round(motion.slip(link)[-1], 4) + 0.0
@@ -67,6 +80,20 @@ def table(motion: RotorMotion) -> dict[str, np.ndarray]:
     -------
     dict
         Columns (k,) by name and unit.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
+    >>> columns = rotors.table(run)
+    >>> list(columns)[:3]
+    ['time [s]', 'motor: angle [rad]', 'motor: speed [rad/s]']
     """
     columns = {"time [s]": motion.t}
     for name in motion.reduced.names:
@@ -92,6 +119,21 @@ def steady_table(points: list[OperatingPoint], t: float = 0.0) -> str:
     -------
     str
         Lines to be printed.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
+    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
+    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
+    >>> print(rotors.steady_table(rotors.operating_points(fan)))
+    <BLANKLINE>
+    steady operating points with the torques at 0 s: 1
+      1. stable: speeds [rad/s] motor 137.662, wheel 68.8311
+         input 3396.9 W, useful 3261.02 W, losses [W] gear 135.88
     """
     if not points:
         return f"\nno steady operating point with the torques at {t:g} s: at every speed in its range something accelerates"
@@ -122,7 +164,7 @@ def mode_table(modes: Modes) -> str:
         Lines to be printed.
     """
     shown = modes.names[:LISTED]
-    lines = ["", f"torsional modes, {modes.state}", f"  {'f [Hz]':>10}  amplitudes"]
+    lines = ["", f"torsional modes, {modes.state}", f"  {'f [Hz]':>10}  amplitudes, the largest 1"]
     for frequency, shape in zip(modes.frequencies[:LISTED], modes.shapes.T, strict=False):
         amplitudes = "  ".join(f"{name} {value:+.3f}" for name, value in zip(shown, shape, strict=False))
         lines.append(f"  {frequency:10.5g}  {amplitudes}")

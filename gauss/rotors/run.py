@@ -43,7 +43,18 @@ REMEDY = " Of shafts: the law Dry, or a clutch."
 
 
 class BeltSlipWarning(UserWarning):
-    """A belt of constant slip is driven backward: use a friction drive if it matters."""
+    """A belt of constant slip is driven backward: use a friction drive if it matters.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> import warnings
+    >>> issubclass(rotors.BeltSlipWarning, UserWarning)
+    True
+    """
 
 
 class Sample(NamedTuple):

@@ -41,6 +41,13 @@ class Hyperbola:
         threshold A − B/C, like dry friction.
     C : float
         Slip at which half of A is reached when B = A C.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> curve = rotors.Hyperbola(A=300.0, C=0.02, B=6.0)
+    >>> curve.A
+    300.0
     """
 
     A: float
@@ -89,6 +96,16 @@ class Measured:
         Increasing from 0.
     torque : sequence of float
         Torque there [N m], 0 at first.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> curve = rotors.Measured(slip=(0.0, 0.01, 0.05), torque=(0.0, 80.0, 120.0))
+    >>> fan.friction_drive("belt", wheel, motor, ratio=2.0, curve=curve).name
+    'belt'
     """
 
     slip: tuple
@@ -128,6 +145,17 @@ class Characteristic:
     ----------
     function : callable
         f(x).
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> curve = rotors.Characteristic(lambda slip: 400.0 * slip)
+    >>> belt = fan.friction_drive("belt", driven=wheel, driver=motor, ratio=2.0, curve=curve)
+    >>> belt.name
+    'belt'
     """
 
     function: Callable

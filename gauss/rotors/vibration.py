@@ -35,6 +35,17 @@ class Modes:
         Amplitudes of the shafts, the largest of each mode 1.
     state : str
         State that they are linearised in.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> spring = fan.spring("coupling", wheel, motor, stiffness=200.0)
+    >>> modes = rotors.eigenmodes(fan)
+    >>> modes.names, modes.frequencies.round(3), modes.state
+    (('motor', 'wheel'), array([0.   , 7.797]), 'friction drives and clutches open')
     """
 
     names: tuple
@@ -130,6 +141,19 @@ class Campbell:
         Of the modes that oscillate, lowest first [Hz], and their damping ratios; nan where a mode is overdamped.
     crossings : tuple of (order, speed, frequency)
         Resonances: order · speed = 2 π · frequency [1, rad/s, Hz].
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> spring = fan.spring("coupling", wheel, motor, stiffness=200.0)
+    >>> diagram = rotors.campbell(fan, "motor", [10.0, 80.0], orders=(1,))
+    >>> diagram.frequencies.shape
+    (2, 1)
+    >>> [tuple(round(float(x), 3) for x in crossing) for crossing in diagram.crossings]
+    [(1.0, 48.99, 7.797)]
     """
 
     shaft: str
@@ -162,6 +186,17 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
     ------
     SceneError
         If a speed is 0 or not finite.
+
+    Examples
+    --------
+    >>> from gauss import rotors
+    >>> fan = rotors.Network("fan")
+    >>> motor = fan.shaft("motor", inertia=0.1)
+    >>> wheel = fan.shaft("wheel", inertia=0.5)
+    >>> spring = fan.spring("coupling", wheel, motor, stiffness=200.0)
+    >>> diagram = rotors.campbell(fan, "motor", [10.0, 80.0], orders=(1, 2))
+    >>> [tuple(round(float(x), 3) for x in crossing) for crossing in diagram.crossings]
+    [(1.0, 48.99, 7.797), (2.0, 24.495, 7.797)]
     """
     name, speeds = network.require_shaft(shaft), np.asarray(speeds, dtype=float)
     if speeds.ndim != 1 or not np.isfinite(speeds).all() or not speeds.all():

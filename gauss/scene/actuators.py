@@ -54,6 +54,15 @@ def dc_motor(
     -------
     Drive
         Drive of the joint.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.scene.actuators import dc_motor
+    >>> scene = gauss.load("pendulum")
+    >>> motor = dc_motor(scene, "motor", "A", voltage=12.0, resistance=0.5, inductance=1e-3, constant=0.1)
+    >>> list(scene.states)
+    ['motor current']
     """
     what = f"motor {text(name, 'name of a motor')!r}"
     _positive(what, resistance=resistance, inductance=inductance, constant=constant)
@@ -92,6 +101,15 @@ def pi_controller(
     -------
     Drive
         Drive of the joint.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.scene.actuators import pi_controller
+    >>> scene = gauss.load("pendulum")
+    >>> drive = pi_controller(scene, "hold", "A", 0.5, proportional=80.0, integral=40.0, derivative=8.0)
+    >>> round(float(gauss.simulate(scene, 2.0, rtol=1e-8).coordinate("A")[-1]), 2)
+    0.49
     """
     joint, stored, law = name_of(joint), f"{name} integral", _signal(target)
 
@@ -169,6 +187,15 @@ def muscle(
     -------
     Drive
         Drive of the joint.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.scene.actuators import muscle
+    >>> scene = gauss.load("pendulum")
+    >>> flexor = muscle(scene, "flexor", "A", 0.8, force=500.0, arm=0.03, optimal_length=0.1)
+    >>> list(scene.states)
+    ['flexor activation']
     """
     what = f"muscle {text(name, 'name of a muscle')!r}"
     _positive(what, force=force, optimal_length=optimal_length, fastest=fastest, activation_time=activation_time)
@@ -227,6 +254,17 @@ def lugre_friction(
     -------
     Drive
         Drive of the joint.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.scene.actuators import lugre_friction
+    >>> scene = gauss.load("pendulum")
+    >>> bristles = lugre_friction(
+    ...     scene, "bristles", "A", coulomb=0.5, static=0.8, stribeck=0.05, stiffness=1e3, damping=10.0
+    ... )
+    >>> list(scene.states)
+    ['bristles bristle']
     """
     what = f"friction {text(name, 'name of a friction')!r}"
     _positive(what, coulomb=coulomb, static=static, stribeck=stribeck, stiffness=stiffness)

@@ -51,6 +51,12 @@ class Thruster:
         Point of application in the body frame [m].
     axes : str
         "world", or "body" for directions that turn with the body.
+
+    Examples
+    --------
+    >>> from gauss import servo
+    >>> servo.Thruster("jet", "hull", force=(10.0, 0.0, 0.0), axes="body").force
+    (10.0, 0.0, 0.0)
     """
 
     kind = "thruster"
@@ -84,6 +90,12 @@ class Cable:
         Ends in the frames of the two bodies [m].
     slack : float
         Least tension [N]; below it the cable is slack.
+
+    Examples
+    --------
+    >>> from gauss import servo
+    >>> servo.Cable("rope", "trolley", "load")
+    Cable(name='rope', body='trolley', other='load', at=(0.0, 0.0, 0.0), other_at=(0.0, 0.0, 0.0), slack=0.0)
     """
 
     kind = "cable"
@@ -117,6 +129,12 @@ class AuxiliarySupport:
         Name of the actuator.
     joints : sequence of str
         Joints that place the auxiliary system.
+
+    Examples
+    --------
+    >>> from gauss import servo
+    >>> servo.AuxiliarySupport("support", ("rail",))
+    AuxiliarySupport(name='support', joints=('rail',))
     """
 
     kind = "support"

@@ -22,6 +22,15 @@ class ServoEnergy(Energy):
     ----------
     servos : ndarray, shape (k, j)
         Work of each effort since the start, in the order of ``servo.efforts``.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> found = servo.energy(servo.simulate(held, 0.05))
+    >>> bool(abs(found.balance).max() < 1e-9)
+    True
     """
 
     servos: Shaped[np.ndarray, "k j"]

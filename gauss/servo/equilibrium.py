@@ -37,6 +37,15 @@ class Equilibrium(NamedTuple):
         State at rest.
     efforts : ndarray, shape (j,)
         Efforts of the servos [N, N m]; of least norm where they are not unique.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> crane = gauss.load("servo/crane")
+    >>> rest = servo.equilibrium(crane)
+    >>> dict(zip(crane.efforts, rest.efforts.round(6).tolist()))
+    {'trolley force': 0.0, 'rope tension': 19.62}
     """
 
     state: State
@@ -62,6 +71,14 @@ def equilibrium(servo: Servo, state: State | None = None) -> Equilibrium:
     ------
     StateError
         If there is none nearby: the message names the coordinate or relation that is out of balance.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> crane = gauss.load("servo/crane")
+    >>> servo.equilibrium(crane).efforts.round(6)  # the tension carries the load
+    array([ 0.  , 19.62])
     """
     system = servo.system
     require_written(system)

@@ -25,6 +25,14 @@ def explain(servo: Servo, state: State | None = None) -> str:
     -------
     str
         Lines to be printed.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> crane = gauss.load("servo/crane")
+    >>> print(servo.explain(crane).splitlines()[0])
+    servo on scene 'overhead crane'
     """
     state = servo.system.initial_state() if state is None else state
     verdict = realisable(servo, state)

@@ -38,6 +38,15 @@ class LagrangeSolution(NamedTuple):
         Accelerations.
     efforts : ndarray, shape (j,)
         Efforts of the servos [N, N m].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> found = servo.lagrange(held, servo.initial_state(held))
+    >>> found.qdd.round(4), found.efforts.round(4)
+    (array([0., 0.]), array([0.]))
     """
 
     qdd: Shaped[np.ndarray, " n"]
@@ -75,6 +84,16 @@ def lagrange(servo: Servo, state: State) -> LagrangeSolution:
     ------
     SceneError
         If a coordinate is a quaternion, or a law of a load cannot be traced.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> state = servo.initial_state(held)
+    >>> classical, ours = servo.lagrange(held, state), servo.solve(held, state)
+    >>> bool(abs(classical.qdd - ours.qdd).max() < 1e-9)
+    True
     """
     terms = _terms(servo, state)
     n, p, j = len(terms.M), len(terms.A), len(terms.W)
@@ -103,6 +122,15 @@ def without_multipliers(servo: Servo, state: State) -> np.ndarray:
     -------
     ndarray, shape (n_v,)
         Accelerations.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> state = servo.initial_state(held)
+    >>> bool(abs(servo.without_multipliers(held, state) - servo.solve(held, state).qdd).max() < 1e-9)
+    True
     """
     terms = _terms(servo, state)
     blocked = np.concatenate([terms.A, terms.W])

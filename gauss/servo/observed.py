@@ -25,6 +25,17 @@ class Observed(Kinematics):
         Time derivative of expressions of it.
     accelerations : sequence of Expression
         Accelerations of the coordinates.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> cart = gauss.load("cart_pole")
+    >>> law = lambda t, motion: motion.joint_acceleration("rail") - 0.5
+    >>> smooth = servo.ServoRelation("smooth", law, level="acceleration")
+    >>> held = servo.Servo(cart, [smooth], [servo.Motor("motor", "rail")])
+    >>> float(servo.solve(held, servo.initial_state(held)).qdd[0].round(4))
+    0.5
     """
 
     def __init__(self, motion: Kinematics, derivative, accelerations):

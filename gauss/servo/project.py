@@ -51,6 +51,15 @@ def initial_state(servo: Servo, state: State | None = None) -> State:
         If the servos cannot hold the relations.
     StateError
         If the relations cannot be met from there; the message names the worst one.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> state = servo.initial_state(held)
+    >>> state.t, state.q.round(6)
+    (0.0, array([0., 0.]))
     """
     state = servo.system.initial_state() if state is None else servo.system.projected(state)
     plan = planned(servo, state)

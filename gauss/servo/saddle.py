@@ -58,6 +58,15 @@ class ServoSolution:
         Estimated relative error of the accelerations: the size of the last correction.
     compulsion : Compulsion
         Problem of the contacts, without servos.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> now = servo.solve(held, servo.initial_state(held))
+    >>> now.qdd.round(4), bool(now.error < 1e-9)
+    (array([0., 0.]), True)
     """
 
     a: Shaped[np.ndarray, " n6"]

@@ -34,6 +34,15 @@ def solve(servo: Servo, state: State, load=None, backend: str = "auto") -> Servo
         If these forces cannot hold the relations.
     SimulationError
         If a cable would be in compression.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> now = servo.solve(held, servo.initial_state(held))
+    >>> dict(zip(now.names, now.efforts.round(6).tolist()))
+    {'motor': 0.0}
     """
     return saddle(servo, state, planned(servo, state), load).solve(backend)
 

@@ -33,6 +33,15 @@ class Tracking:
         Smallest singular value of the normalised S, distance from a loss of rank.
     verdict : Verdict
         Verdict of the start.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> held = gauss.load("servo/inverted_pendulum")
+    >>> run = servo.simulate(held, 0.05)
+    >>> run.efforts.shape == (len(run), 1), bool(abs(run.residuals).max() < 1e-9)
+    (True, True)
     """
 
     servo: Servo

@@ -34,6 +34,19 @@ class UnrealisableError(SimulationError):
         Verdict of the instant.
     trajectory : Tracking, optional
         Motion until then.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> lean = servo.ServoRelation("lean", lambda t, motion: motion.coordinate("pin"))
+    >>> rail = servo.ServoRelation("stay", lambda t, motion: motion.coordinate("rail"))
+    >>> held = servo.Servo(gauss.load("cart_pole"), [lean, rail], [servo.Motor("motor", "rail")])
+    >>> try:
+    ...     run = servo.simulate(held, 0.1)
+    ... except servo.UnrealisableError as error:
+    ...     print(error.verdict.outcome)
+    impossible
     """
 
     def __init__(self, message, verdict=None, trajectory=None):
@@ -59,6 +72,14 @@ class Verdict:
         Reason, with the names of relations and efforts.
     degree : int
         Highest relative degree: number of differentiations until efforts appear.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss import servo
+    >>> verdict = servo.realisable(gauss.load("servo/inverted_pendulum"))
+    >>> verdict.outcome, verdict.rank
+    ('determinate', 1)
     """
 
     relations: tuple[str, ...]

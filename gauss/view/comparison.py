@@ -39,6 +39,15 @@ def plot_comparison(motions, coordinates=None, path=None, labels=None) -> Figure
         If there are fewer than two motions, or a coordinate or label is missing.
     FileError
         If the format is none of these.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.view import plot_comparison
+    >>> fine, coarse = (gauss.simulate(gauss.load("pendulum"), 0.1, rtol=rtol) for rtol in (1e-12, 1e-4))
+    >>> figure = plot_comparison([fine, coarse], labels=["1e-12", "1e-4"])
+    >>> len(figure.axes)
+    2
     """
     check_format(path)
     motions = list(motions)

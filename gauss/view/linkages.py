@@ -180,6 +180,16 @@ def animate_linkage(found: Cycle, path, fps: int = 30) -> Path:
     ------
     FileError
         If the format is neither, or its encoder is not there.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> bar = gauss.load_linkage("four_bar")
+    >>> import tempfile
+    >>> from gauss.view import animate_linkage
+    >>> folder = tempfile.mkdtemp()
+    >>> animate_linkage(bar.cycle([0.0, 0.5]), f"{folder}/turn.gif").name
+    'turn.gif'
     """
     path = Path(path)
     writer = MOVIES.get(path.suffix.lower())

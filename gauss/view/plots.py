@@ -155,6 +155,14 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
         If the format is none of these.
     StateError
         If there is no such joint.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.view import plot_reactions
+    >>> figure = plot_reactions(gauss.simulate(gauss.load("pendulum"), 0.1), ["A"])
+    >>> [axis.get_ylabel() for axis in figure.axes]
+    ['size of the force [N]', 'size of the moment [N m]']
     """
     check_format(path)
     joints = [joint.name for joint in trajectory.system.joints] if joints is None else list(joints)

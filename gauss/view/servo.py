@@ -3,7 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.servo import AuxiliarySupport, Cable, Motor, Tracking, energy
+from gauss.servo import Tracking, energy
+from gauss.servo.effort_units import effort_units
 from gauss.view.plots import scalar_coordinates
 from gauss.view.style import NAMED, check_format, curves, saved
 
@@ -37,7 +38,7 @@ def plot_tracking(tracking: Tracking, path=None):
     curves(coordinates, motion.t, scalar_coordinates(motion), "coordinate [rad, m]")
     curves(rates, motion.t, dict(zip(motion.system.coordinates, motion.v.T, strict=True)), "rate [rad/s, m/s]")
     efforts = dict(zip(servo.efforts, tracking.efforts.T, strict=True))
-    curves(forces, motion.t, efforts, f"servo effort [{', '.join(_units(tracking))}]")
+    curves(forces, motion.t, efforts, f"servo effort [{', '.join(dict.fromkeys(effort_units(tracking.servo)))}]")
     done = energy(tracking)
     stored = {"kinetic and potential energy": done.kinetic + done.potential - done.kinetic[0] - done.potential[0]}
     curves(work, motion.t, {f"work of {name}": part for name, part in efforts_of(tracking).items()} | stored, "energy [J]")
@@ -63,24 +64,3 @@ def efforts_of(tracking: Tracking) -> dict[str, np.ndarray]:
 def _left(tracking: Tracking) -> str:
     units = dict.fromkeys(relation.unit for relation in tracking.servo.relations if not relation.ideal)
     return f"relation, what is left [{', '.join(units)}]"
-
-
-def _units(tracking: Tracking) -> list[str]:
-    """Units of the efforts, each once."""
-    found: dict[str, None] = {}
-    for actuator, number in tracking.servo.each_effort:
-        found[_unit(actuator, number, tracking.servo.system)] = None
-    return list(found)
-
-
-def _unit(actuator, number: int, system) -> str:
-    if isinstance(actuator, Cable):
-        return "N"
-    if isinstance(actuator, Motor | AuxiliarySupport):
-        names = [actuator.coordinate] if isinstance(actuator, Motor) else actuator.joints
-        joints = [(joint, k) for joint in system.joints for k in range(joint.pair.n_v)]
-        columns = [k for k, name in enumerate(system.coordinates) if name in names or name.split(".")[0] in names]
-        joint, k = joints[columns[number]]
-        E_omega, _ = joint.pair.subspace(np.array(joint.pair.reference))
-        return "N m" if np.any(E_omega[:, k]) else "N"
-    return "of unit force or moment"

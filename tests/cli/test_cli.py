@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gauss.cli.common import tolerances
+from gauss.errors import FileError
 from tests.support.files import call
 
 ROOT = Path(__file__).parents[2]
@@ -111,7 +112,10 @@ def test_help_of_a_group_lists_whole_summaries(group):
         (("run", "pendulum", "--atol", "rist=1e-8"), "atol: no joint 'rist', and no kind of coordinates of this name"),
         (("run", "pendulum", "--atol", "A=-1"), "atol of 'A': expected a positive number"),
         (("run", "pendulum", "--duration", "1e9", "--plot", "figure.txt"), "saved as one of"),
-        (("run", "pendulum", "--duration", "1e9", "--output", "motion.txt"), "written as .npz or .csv or .nc or .zarr"),
+        (
+            ("run", "pendulum", "--duration", "1e9", "--output", "motion.txt"),
+            "written as .npz or .csv or .json or .nc or .h5 or .zarr",
+        ),
         (("run", "pendulum", "--duration", "1e9", "--output", "none/motion.csv"), "there is no folder 'none'"),
         (("run", "pendulum", "--duration", "1e9", "--plot", "none/motion.png"), "there is no folder 'none'"),
         (("check", "pendulum", "--states", "0"), "states: expected a positive number"),
@@ -138,3 +142,30 @@ def test_the_code_of_the_readme_runs(capsys, tmp_path, monkeypatch):
     assert "agreement" in capsys.readouterr().out
     assert str(scope["solution"].status) == "solved"
     assert "<html" in (tmp_path / "door.html").read_text()[:1000].lower()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("rotors", "gear_runup", "--duration", 0.01, "--samples", 3),
+        ("linkage", "four_bar", "--steps", 12, "--coupler", "coupler=0.5,0.2"),
+        ("sweep", "pendulum", "--vary", "A.position=0.1:0.2:2", "--duration", 0.01, "--samples", 2),
+        ("run", "pendulum", "--duration", 0.01),
+    ],
+)
+@pytest.mark.parametrize("ending", [".csv", ".json", ".npz", ".nc"])
+def test_output_is_written_as_its_ending_says(arguments, ending, tmp_path):
+    path = tmp_path / f"output{ending}"
+    result = call(*arguments, "--output", path)
+    assert result.exit_code == 0, result.output
+    assert path.stat().st_size > 0 and f"written to {path}" in result.output
+
+
+@pytest.mark.parametrize("command", [("rotors", "gear_runup"), ("linkage", "four_bar"), ("run", "pendulum")])
+@pytest.mark.parametrize("ending, remedy", [(".png", "--plot"), (".gif", "--video"), (".html", "--html"), (".txt", ".csv")])
+def test_output_of_another_kind_is_refused_at_once(command, ending, remedy, tmp_path):
+    path = tmp_path / f"output{ending}"
+    result = call(*command, "--run" if command[0] == "linkage" else "--duration", 1e9, "--output", path)
+    assert isinstance(result.exception, FileError) and remedy in str(result.exception)
+    assert not path.exists()

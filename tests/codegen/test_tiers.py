@@ -241,11 +241,12 @@ def test_a_line_appears_on_a_terminal_while_code_is_made_for_long(is_terminal, s
         limit = time.monotonic() + (PATIENCE if lines else 0.05)
         while time.monotonic() < limit and notices.TEXT not in stream.getvalue():
             time.sleep(0.01)
-    assert stream.getvalue() == (notices.TEXT + notices.CLEARED) * lines
+    counted = notices.CLEARED + notices.TEXT + notices.COUNTED.format(1)
+    assert stream.getvalue() == (notices.TEXT + counted + notices.CLEARED) * lines
     monkeypatch.setattr(notices, "SLOW", PATIENCE)
     with notices.compile_notice():
         pass
-    assert stream.getvalue().count(notices.TEXT) == lines
+    assert stream.getvalue().count(notices.TEXT) == 2 * lines
 
 
 SETTINGS = {"dop853": {"rtol": 1e-8}, "taylor": {"rtol": 1e-8}, "time_stepping": {"step": 1e-3}}

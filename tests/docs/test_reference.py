@@ -7,6 +7,7 @@ from gauss.docs import plans, reference
 from gauss.docs.groups import GROUPS
 from gauss.docs.uses import names_in, uses
 from gauss.dynamics.plan import MOTIONS
+from tests.docs.test_doctests import EXAMPLES
 
 GROUPED = [name for group in GROUPS for name in group.names]
 PACKAGES = (
@@ -33,6 +34,11 @@ def test_every_public_name_is_in_one_group():
 def test_every_name_of_gauss_is_used_by_a_page_or_an_example():
     used = uses()
     assert [name for name in gauss.__all__ if f"gauss.{name}" not in used] == []
+
+
+def test_every_public_name_has_an_example():
+    used = uses()
+    assert [name for name in GROUPED if name not in used and name not in EXAMPLES] == []
 
 
 def test_names_are_found_in_code():

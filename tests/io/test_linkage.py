@@ -131,7 +131,7 @@ def test_formats_that_are_none(tmp_path, monkeypatch):
     with pytest.raises(FileError, match="needs the program ffmpeg"):
         animate_linkage(found, tmp_path / "movie.mp4")
     result = call("linkage", "four_bar", "--csv", tmp_path / "table.txt")
-    assert isinstance(result.exception, FileError) and "written as .csv" in str(result.exception)
+    assert isinstance(result.exception, FileError) and "written as .npz or .csv" in str(result.exception)
 
 
 def test_speeds_and_steps():

@@ -105,7 +105,7 @@ def test_command_line_reports_draws_and_writes(tmp_path):
         (("stall", "--duration", -1), "duration: expected a positive number"),
         (("stall", "--method", "euler"), "no method 'euler'"),
         (("stall", "--duration", 0.1, "--samples", 3, "--plot", "a.txt"), "saved as one of"),
-        (("stall", "--duration", 0.1, "--samples", 3, "--csv", "a.npz"), "written as .csv"),
+        (("stall", "--duration", 0.1, "--samples", 3, "--output", "a.txt"), "written as .npz or .csv"),
     ],
 )
 def test_errors_name_what_is_wrong(arguments, words):

@@ -43,15 +43,20 @@ def _saved(robot, ending: str, root: str):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", [".nc", ".zarr"])
+@pytest.mark.parametrize("ending", [".nc", ".h5", ".zarr"])
 @pytest.mark.parametrize("root", ["fixed", "free"])
 def test_a_saved_motion_keeps_its_meshes(robot, ending, root):
-    from gauss.io.visuals import read_visuals, visuals_of
+    """In its file, and by the name of the file that they are from."""
+    from gauss.io.visuals import read_visuals, saved_visuals, visuals_of
 
-    scene = gauss.load_motion(_saved(robot, ending, root)).system.scene
-    found, expected = visuals_of(scene), read_visuals(robot, root)
-    assert [visual.body for visual in found] == [visual.body for visual in expected] and len(found) == 2
-    assert all((one.vertices == other.vertices).all() for one, other in zip(found, expected, strict=True))
+    path, expected = _saved(robot, ending, root), read_visuals(robot, root)
+    named = visuals_of(gauss.load_motion(path).system.scene)
+    robot.unlink()
+    for found in (named, saved_visuals(path)):
+        assert [visual.body for visual in found] == [visual.body for visual in expected] and len(found) == 2
+        for one, other in zip(found, expected, strict=True):
+            assert (one.vertices == other.vertices).all() and (one.faces == other.faces).all()
+            assert one.colour == other.colour
 
 
 LOST = {
@@ -69,7 +74,7 @@ def test_meshes_that_are_lost_are_named(robot, loss):
 
     scene = gauss.load_motion(_saved(robot, ".nc", "fixed")).system.scene
     LOST[loss](robot)
-    with pytest.warns(NotImportedWarning, match="scene 'r' is shown without its meshes: .*robot.urdf"):
+    with pytest.warns(NotImportedWarning, match="scene 'r' is without its meshes: .*robot.urdf"):
         assert visuals_of(scene) == []
 
 
@@ -80,6 +85,7 @@ def test_the_command_line_shows_the_meshes_of_a_saved_motion(robot, monkeypatch)
     from gauss.cli import app
 
     path, given = _saved(robot, ".nc", "free"), {}
+    robot.unlink()
     monkeypatch.setattr(viewer, "export_html", lambda thing, path, **options: given.update(options) or path)
     assert CliRunner().invoke(app, ["show", str(path), "--html", str(robot.with_suffix(".html"))]).exit_code == 0
     assert [visual.body for visual in given["visuals"]] == ["base", "arm"]

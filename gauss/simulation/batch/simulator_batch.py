@@ -82,7 +82,7 @@ class SimulatorBatch:
     >>> many = gauss.SimulatorBatch(scene, step=1e-3, batch=3)
     >>> many.step([[-1.0], [0.0], [1.0]], n=100)
     >>> np.sign(many.v[:, 0])
-    array([-1.,  0.,  1.])
+    array([-1., -1.,  1.])
     """
 
     @named_arguments

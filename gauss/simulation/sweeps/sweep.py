@@ -28,6 +28,7 @@ from gauss.simulation.sweeps.workers import results_of
 from gauss.simulation.tolerances import shares_of_scale
 from gauss.system import System
 
+NETCDF = (".nc", ".h5")  # endings of files, not folders
 DEFAULT_ATOL = 1e-9  # relative to the scale of the scene
 
 
@@ -152,12 +153,13 @@ def sweep(
 
 
 def load_sweep(path):
-    """Open the folder of a sweep; numbers are read on access.
+    """Open the folder or file of a sweep; numbers are read on access.
 
     Parameters
     ----------
     path : str or Path
-        Folder that :func:`gauss.sweep` wrote. Unfinished members have ``status`` 0.
+        Folder that :func:`gauss.sweep` wrote, or file of :func:`gauss.save` (.nc, .h5). Unfinished members have ``status``
+        0.
 
     Returns
     -------
@@ -167,17 +169,18 @@ def load_sweep(path):
     Raises
     ------
     FileError
-        If the folder holds no sweep.
+        If it holds no sweep.
     """
     if not Path(path).exists():
-        raise FileError(f"{path}: there is no such folder.")
-    library("zarr")
+        raise FileError(f"{path}: there is no such folder or file.")
+    engine = "h5netcdf" if Path(path).suffix.lower() in NETCDF else "zarr"
+    library(engine)
     try:
-        found = library("xarray").open_zarr(path, chunks=None)
+        found = library("xarray").open_dataset(path, engine=engine)
     except (OSError, KeyError, ValueError) as error:
         raise FileError(f"{path}: no sweep that gauss wrote: {error}.") from error
     if "sweep_sha256" not in found.attrs:
-        raise FileError(f"{path}: a Zarr folder, but no sweep that gauss wrote.")
+        raise FileError(f"{path}: labelled arrays, but no sweep that gauss wrote.")
     return found
 
 

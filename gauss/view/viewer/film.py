@@ -55,6 +55,15 @@ def export_film(
     ------
     FileError
         If the ending is another one, nothing on this machine writes it, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import gauss
+    >>> from gauss.view.viewer import export_film
+    >>> motion = gauss.simulate(gauss.load("pendulum"), 0.1)
+    >>> export_film(motion, f"{tempfile.mkdtemp()}/pendulum.gif", size=(160, 120)).name
+    'pendulum.gif'
     """
     path = Path(path)
     if path.suffix.lower() not in ENDINGS:

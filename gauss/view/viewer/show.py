@@ -44,6 +44,14 @@ class Viewer:
     ----------
     url : str
         Where a browser finds it.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> viewer = gauss.show(gauss.load("pendulum"), port=8123)
+    >>> viewer.url.startswith("http://127.0.0.1:")
+    True
+    >>> viewer.close()
     """
 
     def __init__(self, what: Shown, port: int, dark: bool = False, beside: Shown | None = None):
@@ -84,6 +92,14 @@ class Page:
     ----------
     html : str
         The page.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.view.viewer import page
+    >>> shown = page(gauss.load("pendulum"))  # a notebook shows it
+    >>> type(shown).__name__
+    'Page'
     """
 
     html: str = field(repr=False)
@@ -175,6 +191,14 @@ def page(
     -------
     Page
         With its ``html``; a notebook shows it where it is the value of a cell.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.view.viewer import page
+    >>> shown = page(gauss.simulate(gauss.load("pendulum"), 0.1), dark=True)
+    >>> type(shown).__name__
+    'Page'
     """
     what = shown(thing, frames, visuals, joints, traces)
     server = _server(_free_port(), what.motion.system.scene.name)
