@@ -67,6 +67,7 @@ from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibriu
 from gauss.analysis.identification import Identification, identify
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
+from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
 from gauss.analysis.planned_path import plan_path
 from gauss.analysis.recommendation import advise
@@ -113,6 +114,7 @@ __all__ = [
     "Coupling",
     "DistanceTarget",
     "Drive",
+    "FeedbackMotion",
     "Force",
     "Frame",
     "GaussError",
@@ -125,6 +127,7 @@ __all__ = [
     "LinearModes",
     "Linkage",
     "MotionGradient",
+    "OptimalMotion",
     "Plan",
     "PlannedMotion",
     "PointTarget",
@@ -163,6 +166,7 @@ __all__ = [
     "friction_forces",
     "generalised_alpha",
     "identify",
+    "ilqr",
     "inverse_dynamics",
     "inverse_kinematics",
     "linearise",
@@ -173,6 +177,7 @@ __all__ = [
     "load_sweep",
     "mobility",
     "motion_gradient",
+    "optimal_motion",
     "paradoxes",
     "plan_motion",
     "plan_path",

@@ -58,7 +58,7 @@ class MotionStep:
         self.sizes = {name: size_of(system, name) for name in self.parameters}
         self.inputs = tuple(system.scene.inputs)
         self.n_x, self.n_p = system.n_q + system.n_v, sum(self.sizes.values())
-        self.key = (MotionStep, integrator, self.parameters, self.laws.key)
+        self.key: tuple = (MotionStep, integrator, self.parameters, self.laws.key)
 
     @cached_property
     def loads(self) -> list:
@@ -109,7 +109,7 @@ class MotionStep:
             return function(time, inputs, *given)
 
         sizes = 2, self.system.n_q, self.system.n_v, self.n_p, *sizes
-        make = lambda: Kernel(write(traced, *sizes, name=name), batch=name == "tangent")  # noqa: E731
+        make = lambda: Kernel(write(traced, *sizes, name=name), batch=name in ("tangent", "curvature"))  # noqa: E731
         return cached_on_disk(self.system, (*self.key, name), make)
 
     @cached_property

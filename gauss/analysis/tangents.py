@@ -114,16 +114,21 @@ def _evaluated(system: System, state: State, along_q, along_v) -> list[np.ndarra
     return np.split(kernel(np.concatenate([np.tile(given[:, None], count), *directions])), ends)
 
 
+def constraint_residuals(system: System, t, q, v) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of positions and of rates, those of the coordinates and rates of loop joints included."""
+    unreduced = (whole(system),)
+    mechanism = Mechanism(system, q, v, t, unreduced)
+    held, slack = loop_residual(system, q, t, unreduced)
+    positions = np.concatenate([held, *(part for parts in slack for part in parts)])
+    return positions, np.concatenate([mechanism.velocity_residual(), mechanism.dependent_rates() - v])
+
+
 def _kernel(system: System) -> tuple[Kernel, np.ndarray]:
     """(t, q, v, displacements, changes of rates) → changes of residuals and of rates of coordinates."""
-    sizes, unreduced = list[int](), (whole(system),)
+    sizes = list[int]()
 
     def slopes(t, q, v, along_q, along_v):
-        mechanism = Mechanism(system, q, v, t[0], unreduced)
-        held, slack = loop_residual(system, q, t[0], unreduced)
-        positions = np.concatenate([held, *(part for parts in slack for part in parts)])
-        dependent = mechanism.dependent_rates() - v
-        residuals = [positions, np.concatenate([mechanism.velocity_residual(), dependent]), coordinate_rates(system, q, v)]
+        residuals = [*constraint_residuals(system, t[0], q, v), coordinate_rates(system, q, v)]
         sizes[:] = [part.size for part in residuals]
         direction = np.concatenate([coordinate_rates(system, q, along_q), along_v])
         return forward(np.concatenate(residuals), np.concatenate([q, v]), direction)

@@ -6,7 +6,7 @@ import warnings
 from importlib import import_module
 from pathlib import Path
 
-from gauss.docs import generated, reference
+from gauss.docs import generated, notebooks, reference
 from gauss.errors import FileError, extra
 
 HERE = Path(__file__).parent
@@ -66,8 +66,11 @@ def collect(folder: Path, program):
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(source, target)
-    for name, text in (generated.texts(program) | reference.pages()).items():
+    pages, pictures = notebooks.notebook_pages()
+    for name, text in (generated.texts(program) | reference.pages() | pages).items():
         _write(folder / name, text)
+    for name, picture in pictures.items():
+        (folder / name).write_bytes(picture)
 
 
 def _write(path: Path, text: str):

@@ -89,6 +89,13 @@ GROUPS = (
         _of("gauss", "identify Identification base_parameters BaseParameters regressor Regressor"),
     ),
     Group(
+        "optimal",
+        "Optimal motions",
+        "Motions of least time, effort or any cost by direct collocation (extra ``export``), and by iLQR with feedback. "
+        "Guide: :doc:`/guides/optimisation`.",
+        _of("gauss", "optimal_motion OptimalMotion ilqr FeedbackMotion"),
+    ),
+    Group(
         "view",
         "Look at a motion",
         "Figures of matplotlib, the viewer in the browser, self-contained pages and films. Needs the extra ``view``.",
@@ -145,6 +152,7 @@ ROOMS = (
     "gauss.simulation.sweeps",
     "gauss.analysis",
     "gauss.analysis.crosscheck",
+    "gauss.analysis.optimal",
     "gauss.backends",
     "gauss.integrators",
     "gauss.dynamics",
@@ -159,6 +167,7 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.Constraint": ".constrain",
     "gauss.Coupling": ".couple",
     "gauss.Drive": ".drive",
+    "gauss.FeedbackMotion": "gauss.ilqr",
     "gauss.Force": ".force",
     "gauss.Frame": ".frame",
     "gauss.Identification": "gauss.identify",
@@ -171,6 +180,7 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.LinearModel": "gauss.linearise",
     "gauss.LinearModes": ".modes",
     "gauss.MotionGradient": "gauss.motion_gradient",
+    "gauss.OptimalMotion": "gauss.optimal_motion",
     "gauss.PlannedMotion": "gauss.plan_motion",
     "gauss.Regressor": "gauss.regressor",
     "gauss.Sensitivities": "gauss.sensitivities",

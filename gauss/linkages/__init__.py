@@ -16,10 +16,13 @@ from gauss.linkages.cycles import cycle
 from gauss.linkages.dynamics import CrankRun, ReducedLinkage, run
 from gauss.linkages.elements import CrankMotor, Driver, Here, LinkJoint, Load, PlanarLink
 from gauss.linkages.energy import kinetic, potential, power_balance, work
+from gauss.linkages.four_bar import FourBarDesign
 from gauss.linkages.kernels import cycle_kernel, reduced_kernel
 from gauss.linkages.linkage import Linkage
+from gauss.linkages.motion_generation import motion_generation
 from gauss.linkages.scene import scene_state, to_scene
 from gauss.linkages.summary import report
+from gauss.linkages.synthesis import function_generation, path_generation
 from gauss.versions import current_name
 
 __all__ = [
@@ -29,6 +32,7 @@ __all__ = [
     "Cycle",
     "Driver",
     "Dyad",
+    "FourBarDesign",
     "Here",
     "LinkJoint",
     "Linkage",
@@ -39,7 +43,10 @@ __all__ = [
     "coupler_curves",
     "cycle",
     "cycle_kernel",
+    "function_generation",
     "kinetic",
+    "motion_generation",
+    "path_generation",
     "potential",
     "power_balance",
     "reduced_kernel",

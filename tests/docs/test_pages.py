@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gauss.docs import generated
+from gauss.docs import generated, notebooks
 from gauss.docs.uses import PAGES, snippets
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +24,8 @@ def _known() -> set[str]:
     examples = generated.folder() / "examples"
     gallery = {f"gallery/{path.relative_to(examples).with_suffix('.rst')}" for path in examples.rglob("*.py")}
     of_package = {"glossary.md", "changelog.md", "formats.md", "models.md", "guides/command_line.md", "reference/laws.rst"}
-    return files | tables | gallery | of_package | {*MADE, *generated.copies(), "reference/gauss.integrators.rst"}
+    books, _ = notebooks.notebook_pages()
+    return files | tables | gallery | of_package | {*books, *MADE, *generated.copies(), "reference/gauss.integrators.rst"}
 
 
 KNOWN = _known()

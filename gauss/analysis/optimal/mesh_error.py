@@ -1,0 +1,94 @@
+"""Error of a mesh: each interval is integrated again from its start by compiled steps of gauss, under the found inputs.
+
+The steps are those of :mod:`gauss.analysis.motion_step`, Runge–Kutta of order 4 with a projection onto the constraints, so
+short that their own error is small against that of the collocation.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from gauss.analysis.motion_step import MotionStep
+from gauss.analysis.optimal.equations import OptimalEquations
+from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.integrators import Rates
+from gauss.system import State
+
+SUBSTEPS = 16  # of an interval: the error of order 4 is 65 000 times smaller than with one step
+
+
+class LinearInputStep(MotionStep):
+    """Step under inputs that are linear in time, u = u₀ + (t − t₀) u′; what a step takes as parameters are t₀, u₀, u′.
+
+    Parameters
+    ----------
+    equations : OptimalEquations
+        Equations of motion.
+    """
+
+    def __init__(self, equations: OptimalEquations):
+        super().__init__(equations.system, "rk4")
+        self.equations, self.inputs, self.n_p = equations, (), 1 + 2 * equations.n_u
+        self.key = (LinearInputStep, self.laws.key)
+
+    def evaluate(self, state: State, delta) -> Rates:
+        """Rates of a state."""
+        (begin,), value, slope = np.split(delta, [1, 1 + self.equations.n_u])
+        loads = self.equations.loads(value + (state.t - begin) * slope)
+        still = np.zeros(self.system.n_v)
+        return Rates(LoadedMechanism(self.system, loads, state.t, state.q, state.v, still).motion()[0], np.zeros(3))
+
+    def interval(self, t: float, h: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """(q, v) at the end of an interval, from inputs u (2, n_u) at its ends."""
+        given, step = np.concatenate([[t], u[0], (u[1] - u[0]) / h]), h / SUBSTEPS
+        for k in range(SUBSTEPS):
+            x = self.move(np.concatenate([[t + k * step, step], x, given]))
+        return x
+
+
+class MeshError:
+    """Errors of found motions of one system.
+
+    Parameters
+    ----------
+    equations : OptimalEquations
+        Equations of motion.
+    """
+
+    def __init__(self, equations: OptimalEquations):
+        self.equations = equations
+
+    @cached_property
+    def step(self) -> LinearInputStep:
+        """Its compiled step."""
+        return LinearInputStep(self.equations)
+
+    def of_intervals(self, t: np.ndarray, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Error (n,) of each interval from its own start, the largest of all coordinates and rates in their units.
+
+        Parameters
+        ----------
+        t : ndarray, shape (n + 1,)
+            Mesh points [s].
+        x : ndarray, shape (n + 1, n_q + n_v)
+            States there.
+        u : ndarray, shape (n, 2, n_u)
+            Inputs at the ends of the intervals.
+        """
+        ends = [self.step.interval(t[k], t[k + 1] - t[k], x[k], u[k]) for k in range(len(u))]
+        return np.abs((np.array(ends) - x[1:]) / self.equations.units).max(axis=1)
+
+    def simulated(self, t: np.ndarray, start: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """States (n + 1, n_q + n_v) of a motion from the start under the inputs."""
+        found = [start]
+        for k in range(len(u)):
+            found.append(self.step.interval(t[k], t[k + 1] - t[k], found[-1], u[k]))
+        return np.array(found)
+
+
+def refined(mesh: np.ndarray, errors: np.ndarray, tolerance: float, order: int) -> np.ndarray:
+    """Mesh whose intervals have errors below a tolerance: error ∝ h^(order + 1); an interval makes at most four."""
+    counts = np.ceil((errors / (0.5 * tolerance)) ** (1.0 / (order + 1)))
+    parts = np.where(errors > tolerance, np.clip(counts, 2, 4), 1).astype(int)
+    pieces = [np.linspace(a, b, m, endpoint=False) for a, b, m in zip(mesh[:-1], mesh[1:], parts, strict=True)]
+    return np.concatenate([*pieces, mesh[-1:]])
