@@ -121,6 +121,10 @@ class SwitchingWarning(UserWarning):
     """A law may have switched between two evaluations without effect on the motion."""
 
 
+class TimeDependenceWarning(UserWarning):
+    """Laws depend on time, but the result holds for one time only, which was not named."""
+
+
 class SlowRouteWarning(UserWarning):
     """An element of the scene bars a motion from machine code, which makes it a hundred times slower."""
 

@@ -12,11 +12,13 @@ from numbers import Real
 import numpy as np
 
 from gauss.analysis.derivatives import derivatives
+from gauss.analysis.frozen_time import state_at
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import checked_load
+from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.energies import potential_energy
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import fixed_columns, project_positions
@@ -59,8 +61,10 @@ class StaticEquilibrium:
 
 
 @named_arguments
-def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), loads=None) -> StaticEquilibrium:
-    """Equilibrium near a start.
+def equilibrium(
+    system: System | Scene, start: State | None = None, *, keep=(), loads=None, t: float | None = None
+) -> StaticEquilibrium:
+    """Equilibrium near a start; laws of time have their values at the time of the start.
 
     Parameters
     ----------
@@ -72,16 +76,26 @@ def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), 
         Joints, or rates such as "U.angle1", that keep their coordinates; the forces that this takes are found.
     loads : dict or array_like, shape (n_v,), optional
         Generalised forces added to those of the scene, by the names of coordinates, or of all [N m, N].
+    t : float, optional
+        Time of the start, where none is given [s].
 
     Returns
     -------
     StaticEquilibrium
         State, energy, forces on the kept coordinates, linear model.
 
+    Warns
+    -----
+    TimeDependenceWarning
+        If laws depend on time, and neither a start nor a time is given.
+
     Raises
     ------
+    ArgumentError
+        If a time is given beside a start.
     SimulationError
-        If none is found, with what still accelerates; or the system cannot be compiled.
+        If none is found, with what still accelerates, or with the constraints that prescribe a velocity; or the system
+        cannot be compiled.
     StateError
         If a name is none of the system.
 
@@ -92,14 +106,13 @@ def equilibrium(system: System | Scene, start: State | None = None, *, keep=(), 
     -4.905
     """
     system = _compiled(system, "equilibrium")
-    start = system.initial_state() if start is None else start
-    require(start, (State,), "equilibrium: start")
+    start = state_at(system, start, t, "equilibrium")
     return _found(system, start, fixed_columns(system, keep), _load(system, loads))
 
 
 @named_arguments
 def equilibria(
-    system: System | Scene, *, starts: int = 32, seed: int = 0, keep=(), loads=None
+    system: System | Scene, *, starts: int = 32, seed: int = 0, keep=(), loads=None, t: float | None = None
 ) -> tuple[StaticEquilibrium, ...]:
     """All equilibria that searches from the start of the scene and from random starts find, the lowest energy first.
 
@@ -111,7 +124,7 @@ def equilibria(
         Number of random starts.
     seed : int
         Their seed: the same one, the same starts.
-    keep, loads
+    keep, loads, t
         As for :func:`equilibrium`.
 
     Returns
@@ -122,7 +135,7 @@ def equilibria(
     Raises
     ------
     ArgumentError
-        If the number of starts is no whole number.
+        If the number of starts is no whole number, or the time is none.
     SimulationError
         If none is found.
     """
@@ -130,7 +143,7 @@ def equilibria(
         raise ArgumentError(f"equilibria: starts: expected a whole number, 0 or more, got {starts!r}.")
     system, rng = _compiled(system, "equilibria"), np.random.default_rng(seed)
     held, load, found = fixed_columns(system, keep), _load(system, loads), list[StaticEquilibrium]()
-    base, why = system.initial_state(), None
+    base, why = state_at(system, None, t, "equilibria"), None
     for k in range(starts + 1):
         try:
             one = _found(system, _random(system, base, rng, held, keep) if k else base, held, load)
@@ -157,7 +170,7 @@ def _random(system: System, base: State, rng: np.random.Generator, held: list[in
     """Assembled state far from another one, with the kept coordinates of that."""
     away = np.pi * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
     away[held] = 0.0
-    return system.initial_state(retract(system, base.q, away), keep=keep or None)
+    return system.initial_state(retract(system, base.q, away), t=base.t, keep=keep or None)
 
 
 def _load(system: System, loads) -> np.ndarray:
@@ -208,6 +221,11 @@ def _found(system: System, start: State, held: list[int], load: np.ndarray) -> S
         raise SimulationError(
             f"scene {system.scene.name!r}: no equilibrium was found near this start: {system.coordinates[worst]!r} still "
             f"accelerates by {own[worst]:.3g} rad/s² or m/s². Start elsewhere, or ask gauss.equilibria for random starts."
+        )
+    if moving := violations(system, state):
+        raise SimulationError(
+            f"scene {system.scene.name!r}: no state of rest at t = {state.t:g} s: constraint {next(iter(moving))!r} is "
+            f"{next(iter(moving.values()))} there. Hold what it moves, or name a time at which it stands still by t= [s]."
         )
     names = [system.coordinates[k] for k in held]
     energy = np.asarray(potential_energy(kinematics(system, state)), dtype=float).item()

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gauss.analysis.derivatives import derivatives
+from gauss.analysis.frozen_time import state_at
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, write
@@ -146,9 +147,11 @@ class LinearModel:
 
 @named_arguments
 def linearise(
-    system: System | Scene, state: State | None = None, *, inputs=None, outputs=None, independent=None, load=None
+    system: System | Scene, state: State | None = None, *, inputs=None, outputs=None, independent=None, load=None, t=None
 ) -> LinearModel:
     """Linear model about a state that meets the constraints, exact for loops and for rolling.
+
+    Laws of time have their values at the time of the state.
 
     Parameters
     ----------
@@ -166,16 +169,23 @@ def linearise(
         Joints or rates to describe the system with, one for each freedom; well-conditioned ones when not given.
     load : array_like, shape (n_v,), optional
         Generalised forces added to those of the scene [N m, N].
+    t : float, optional
+        Time of the start, where no state is given [s].
 
     Returns
     -------
     LinearModel
         Matrices and names.
 
+    Warns
+    -----
+    TimeDependenceWarning
+        If laws depend on time, and neither a state nor a time is given.
+
     Raises
     ------
     ArgumentError
-        If inputs or outputs are no names.
+        If inputs or outputs are no names, or a time is given beside a state.
     StateError
         If a name is none of the scene, or the independent coordinates do not determine the others.
     SimulationError
@@ -190,10 +200,7 @@ def linearise(
     """
     require(system, (System, Scene), "linearise")
     system = compile_scene(system) if isinstance(system, Scene) else system
-    if state is None:
-        start = system.initial_state()
-        state = system.initial_state(start.q, np.zeros(system.n_v))
-    require(state, (State,), "linearise: state")
+    state = state_at(system, state, t, "linearise")
     slopes, tangents = derivatives(system, state, load), Tangents(system, state)
     N, rate = tangents.position, tangents.rate
     if independent is not None:

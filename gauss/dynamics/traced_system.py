@@ -269,17 +269,17 @@ class Program:
         return self._evaluated(t, q, v, tau)[1:]
 
     def _monitored_rates(self, t, q, v):
-        self._order_inputs(t)
+        self.order_inputs(t)
         acceleration, power, _, monitored = self.shared.motion(self.shared.place(t, q, often=True), v, often=True)
         return acceleration, power, monitored
 
-    def _order_inputs(self, t):
+    def order_inputs(self, t):
         """Let the inputs of the scene be the last ones of a function that is traced, in the order of the scene."""
         for name in self.inputs:
             t[0].graph.parameter(name)
 
     def _evaluated(self, t, q, v, tau=None):
-        self._order_inputs(t)
+        self.order_inputs(t)
         state = State(t[0], q, v)
         own, forces, power = self.applied(state)
         mechanism = Mechanism(self.system, q, v, state.t)

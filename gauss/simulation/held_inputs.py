@@ -132,8 +132,9 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     SimulationError
         If they are not a finite number for each input.
     """
-    if type(value) is np.ndarray and value.dtype is FLOAT and value.shape == (len(names),) and isfinite(value.dot(value)):
-        return value.copy()  # the usual case, quickly
+    if type(value) is np.ndarray and value.dtype is FLOAT and value.shape == (len(names),):
+        if all(map(isfinite, value.tolist())):
+            return value.copy()  # the usual case, quickly
     found = real_numbers(value)
     if found is None or found.size != len(names):
         expected = f"expected {len(names)} number(s) ({', '.join(names)})" if names else "the scene declares none"

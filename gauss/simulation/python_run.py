@@ -227,7 +227,7 @@ class PythonRun:
                 continue
             if due != Due.OFF_GRID_SAMPLE:
                 begin, point = point, self._advance(method, point, t)
-                self.unseen += self.switching.share(begin, point)[0] < 1.0
+                self.unseen += self.switching.share(begin, point)[0] < 1.0 or self._misses_peaks(begin, point)
                 if t in after:
                     point = replace(point, rates=self.evaluate(point.state), method_state=None)
                 self.steps += 1
@@ -236,6 +236,11 @@ class PythonRun:
                 if jumped:
                     point, passed = jumped, stops[t]
                     yield point, None
+
+    def _misses_peaks(self, begin: Point, end: Point) -> bool:
+        """Whether a fixed step does not resolve a smooth peak of a law."""
+        peaks = self.switching.peaks
+        return peaks is not None and peaks.misses(lambda state: self.evaluate(state).acceleration, begin, end)
 
     def _off_grid(self, method: FixedStep, begin: Point, t: float) -> tuple[State, np.ndarray]:
         """State and work of an off-grid sample: a separate shorter step that the motion does not continue from."""

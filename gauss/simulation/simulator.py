@@ -45,6 +45,7 @@ FAILURES = {
 }
 
 
+MOST_STEPS = 10**8  # of one call: their times fill the memory
 STEPS = {
     ("compiled loop", "compiled"),
     ("compiled loop", "callbacks"),
@@ -260,7 +261,7 @@ class Simulator:
 
     def _set(self, u):
         given = u if isinstance(u, np.ndarray) and u.dtype == float else _floats(u)
-        if given is None or given.shape != self._u.shape or not isfinite(given @ given):
+        if given is None or given.shape != self._u.shape or not all(map(isfinite, given.tolist())):
             given = checked_inputs(u, self.inputs, self.t)
         self._u[:] = given
         if isinstance(self._run, CompiledFixedRun) and self._run.method.starts_from_accelerations:
@@ -272,6 +273,8 @@ class Simulator:
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
         n = checked_count("n", n)
+        if n > MOST_STEPS:
+            raise SimulationError(f"n: expected no more than {MOST_STEPS} steps in a call, got {n}.")
         if n > len(self._grid):
             self._grid = _unchecked(n)
             self._bind()

@@ -43,7 +43,10 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class PlacedRelation:
-    """A relation: bodies, joints, its number of rows, that of nonholonomic ones, and whether C may differ from zero."""
+    """A relation: bodies, joints, its number of rows, that of nonholonomic ones, and whether C may differ from zero.
+
+    The last entry tells whether its residuals depend on time.
+    """
 
     name: str
     bodies: tuple[int, ...]
@@ -51,6 +54,7 @@ class PlacedRelation:
     size: int
     velocities: int
     moves: bool
+    is_timed: bool
 
 
 @dataclass(frozen=True)
@@ -193,7 +197,7 @@ def _traced_rows(relation, view: Symbols):
         C = C + B @ v
     D = -forward(rate, moving, rates)
     gap = np.concatenate([c, np.zeros(len(g))])
-    return [*blocks, C, D, gap], len(rate), len(g), _moves(rate, velocities)
+    return [*blocks, C, D, gap], len(rate), len(g), _moves(rate, velocities), _asks([*c, *g], [view.t])
 
 
 def _moves(rate: np.ndarray, velocities) -> bool:

@@ -4,6 +4,7 @@ Motions have closed forms; sliding modes and opaque laws are refused or warned o
 """
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -122,3 +123,24 @@ def test_narrow_quotients_are_never_flown_past(shape):
             0
         ]
         assert motion.v[-1, 0] == pytest.approx(np.sqrt(9.0 + 2.0 * work), rel=1e-8)
+
+
+@pytest.mark.parametrize("shape", NARROW)
+@pytest.mark.parametrize("backend", ["auto", "recursion"])
+def test_fixed_steps_over_a_narrow_peak_are_warned_of(shape, backend):
+    """The peak is half a step wide; the same law at a place that is not reached is no cause of a warning."""
+    for at, warned in ((3.0 + 0.7, True), (100.0, False)):
+        scene = slider(lambda t, m, at=at: 10.0 * NARROW[shape]((m.coordinate("x") - at) / 0.05), rate=1.0)
+        for _ in range(2):
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                gauss.simulate(scene, 5.0, integrator="rk4", step=0.1, backend=backend, progress=False)
+            assert any(issubclass(each.category, SwitchingWarning) for each in caught) == warned
+
+
+def test_steps_that_resolve_a_peak_are_not_warned_of():
+    for shape in NARROW.values():
+        scene = slider(lambda t, m, shape=shape: 10.0 * shape((m.coordinate("x") - 3.7) / 0.05), rate=1.0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            gauss.simulate(scene, 5.0, integrator="rk4", step=5e-4, progress=False)

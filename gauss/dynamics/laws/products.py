@@ -6,6 +6,7 @@ lie by chance: stages may lie beside it. The rule has no unit and no scale: a pr
 """
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class Products:
 
     def __init__(self, outputs: list[Expression], known: set[int]):
         found: dict[tuple, Expression] = {}
-        for node, powers in _products(outputs):
+        for node, powers in _products(outputs, known):
             own = _steep(powers, known)
             if _may_peak(own):
                 found.setdefault(tuple(own.items()), node)
@@ -83,12 +84,13 @@ class Products:
                 hidden = math.where(at[j] > at[j + 1] + PEAK, math.minimum(hidden, risen), hidden)
         return hidden
 
-    def is_flat(self, ends: list[list], values: list[list[Interval]], rates: list[list[Interval]], tau: Scalar) -> Scalar:
-        """1 where no product rises by more than samples resolve in a step, undivided; arguments as of :meth:`hidden`."""
+    def is_flat(
+        self, rise: float, ends: list[list], values: list[list[Interval]], rates: list[list[Interval]], tau: Scalar
+    ) -> Scalar:
+        """1 where ln |f| of no product rises by more than ``rise`` in a step, undivided; others as of :meth:`hidden`."""
         (bound,), flat = self._all_bounds(ends, values, rates, tau), 1.0
         for powers in self.powers:
-            least = math.minimum(*(_heights(x, powers) for x in ends))
-            flat = math.where(_top(bound, powers) > least + PEAK, 0.0, flat)
+            flat = math.where(_rises(ends[0], ends[1], bound, powers, rise), 0.0, flat)
         return flat
 
     def _all_bounds(self, ends, values, rates, tau: Scalar) -> list[list[Interval]]:
@@ -112,24 +114,31 @@ class Products:
         return Interval(math.maximum(value.low, middle - reach), math.minimum(value.high, middle + reach))
 
 
-def _products(outputs: list[Expression]) -> list[tuple[Expression, Counter]]:
+def _products(outputs: list[Expression], known: set[int]) -> list[tuple[Expression, Counter]]:
     """Products that are no factors of others, each with the powers of (base, whether it is an exponent).
 
     A square root, and an angle of two sides, turn where what their derivatives are divided by nearly vanishes.
     """
     nodes = reachable(outputs)
-    powers: dict[int, Counter] = {}
+    powers = _all_powers(nodes, known)
     ends = {x.index for x in outputs}
-    for node in nodes:
-        x = [powers.get(operand.index, Counter({(operand, False): 1.0})) for operand in node.operands]
-        if node.op in FACTORED:
-            powers[node.index] = _combined(node.op, x)
-        else:
-            ends |= {operand.index for operand in node.operands}
-        if node.op == "exp":
-            powers[node.index] = Counter({(node.operands[0], True): 1.0})
+    ends |= {x.index for node in nodes if node.op == "exp" or node.index not in powers for x in node.operands}
     roots = [(node, Counter({(_turning(node), False): -0.5})) for node in nodes if node.op in ("sqrt", "atan2")]
     return [*roots, *((node, powers[node.index]) for node in nodes if node.index in powers and node.index in ends)]
+
+
+def _all_powers(nodes: list[Expression], known: set[int]) -> dict[int, Counter]:
+    """Powers of all products, of sums that are written as quotients, and of exponential functions."""
+    powers: dict[int, Counter] = {}
+    for node in nodes:
+        x = [powers.get(operand.index) or _base(operand, known) for operand in node.operands]
+        if node.op in FACTORED:
+            powers[node.index] = _combined(node, x)
+        elif node.op == "exp":
+            powers[node.index] = Counter({(node.operands[0], True): 1.0})
+        elif node.index not in known and (shared := _over_one_divisor(node, x)):
+            powers[node.index] = shared
+    return powers
 
 
 def _turning(node: Expression) -> Expression:
@@ -151,11 +160,49 @@ def _is_smooth(base: Expression) -> bool:
     return not any(node.op in ("less", "less_equal", "floor") for node in reachable([base]))
 
 
-def _combined(op: str, x: list[Counter]) -> Counter:
+def _base(x: Expression, known: set[int]) -> Counter:
+    """Powers of a base: a − b and b − a are one, but for the sign."""
+    if x.op == "sub" and x.index not in known and x.operands[0].index > x.operands[1].index:
+        a, b = x.operands
+        return Counter({(b - a, False): 1.0, _minus(x): 1.0})
+    return Counter({(x, False): 1.0})
+
+
+def _minus(x: Expression) -> tuple[Expression, bool]:
+    return x.graph.constant(-1.0), False
+
+
+def _combined(node: Expression, x: list[Counter]) -> Counter:
     """Powers of a product, quotient, negative or square root."""
-    found = Counter({key: 0.5 * p for key, p in x[0].items()}) if op == "sqrt" else Counter(x[0])
+    found = Counter({key: 0.5 * p for key, p in x[0].items()}) if node.op == "sqrt" else Counter(x[0])
+    if node.op == "neg":
+        found[_minus(node)] += 1
     for key, p in x[1].items() if len(x) > 1 else ():
-        found[key] += p if op == "mul" else -p
+        found[key] += p if node.op == "mul" else -p
+    return found
+
+
+def _over_one_divisor(node: Expression, x: list[Counter]) -> Counter | None:
+    """Powers of the sum a/x + b as (a + b x)/x, which is small, and has no peak, where x nearly vanishes in a divisor."""
+    divisors = {key for powers in x for key, p in powers.items() if p < 0.0 and not key[0].is_constant}
+    if node.op not in ("add", "sub") or len(divisors) != 1:
+        return None
+    (key,) = divisors
+    power = max(-powers[key] for powers in x)
+    one, other = (_written({**powers, key: powers[key] + power}) for powers in x)
+    if one is None or other is None:
+        return None
+    return Counter({(one + other if node.op == "add" else one - other, False): 1.0, key: -power})
+
+
+def _written(powers: dict[tuple[Expression, bool], float]) -> Expression | None:
+    """Product of its powers; None unless these are small whole numbers, so that it may not be narrow itself."""
+    found: Any = 1.0
+    for (base, grows), p in powers.items():
+        if grows or p != round(p) or p >= HIGH or (p < 0.0 and not base.is_constant):
+            return None
+        for _ in range(abs(int(p))):
+            found = found * base if p > 0.0 else found / base
     return found
 
 
@@ -190,6 +237,18 @@ def _is_magnitude(node: Expression) -> bool:
 def _heights(bases: list, powers: list[Power]) -> Scalar:
     """Logarithm of |f| of a product."""
     return sum((_height(bases[k], grows, p) for k, grows, p in powers), 0.0)
+
+
+def _rises(before: list, after: list, bounds: list[Interval], powers: list[Power], rise: float):
+    """Whether the upper bound of a product exceeds its value at an end by the factor e^rise."""
+    (k, grows, p), *others = powers
+    if grows or others:
+        return _top(bounds, powers) > math.minimum(_heights(before, powers), _heights(after, powers)) + rise
+    one, other = (math.maximum(math.abs(x[k]), LEAST) for x in (before, after))  # one power needs no logarithm
+    factor = float(np.exp(rise / p))
+    if p < 0.0:
+        return math.maximum(bounds[k].low, LEAST) < factor * math.maximum(one, other)
+    return bounds[k].high > factor * math.minimum(one, other)
 
 
 def _top(bounds: list[Interval], powers: list[Power]) -> Scalar:

@@ -7,6 +7,7 @@ import numpy as np
 
 from gauss.codegen import Expression
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
 from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.laws.sampled_laws import sampled_times
 from gauss.dynamics.laws.switching_functions import watch_of
@@ -35,6 +36,8 @@ class Switching(NamedTuple):
         Loads whose laws have switching functions of the state.
     jumps : Jumps
         Possible jumps of prescribed velocities.
+    peaks : NarrowPeaks or None
+        Smooth peaks of traced laws that fixed steps may not resolve.
     """
 
     times: Timetable = NO_TIMES
@@ -42,6 +45,7 @@ class Switching(NamedTuple):
     called: tuple[str, ...] = ()
     conditional: tuple[str, ...] = ()
     jumps: Jumps = NO_JUMPS
+    peaks: NarrowPeaks | None = None
 
     def share(self, begin: Point, end: Point) -> tuple[float, float]:
         """Share of a step without undetected crossings, and the number of crossings detected in all of it."""
@@ -83,7 +87,10 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     times = times.join(*_limits(system, start, end))
     watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if needs_poses(bound.load))
     found = Switching(times, None, called, jumps=jumps)
-    return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
+    if not watch:
+        return found
+    peaks = watch.narrow if watch.may_be_narrow else None
+    return found._replace(watch=watch.machine_code, conditional=watch.names, peaks=peaks)
 
 
 def _sampled(bound: BoundLoad, laws: Laws, motion, begin: float, end: float) -> Timetable:

@@ -15,10 +15,10 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
-from gauss.codegen.kernels import CheckedSwitch
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
 from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
 from gauss.dynamics.laws.products import Products
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
 from gauss.dynamics.laws.traced_laws import Laws
@@ -104,6 +104,11 @@ class SwitchingFunctions:
         share, _ = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
         return math.where(share < 1.0, 1.0, 0.0)
 
+    @property
+    def may_be_narrow(self) -> bool:
+        """Whether laws have smooth peaks that fixed steps may not resolve."""
+        return bool(self.peaks or self.products)
+
     def is_between(self, state: State) -> bool:
         """Whether some switching function has a switching value in a state, but for rounding."""
         given = {
@@ -162,7 +167,7 @@ class SwitchingFunctions:
     def _without_narrow_peaks(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> Scalar:
         """Share of a step before its first narrow peak of a product, 1 where there is none."""
         given = ([begin.t], begin.q, begin.v, first, [end.t], end.q, end.v, last)
-        return self._narrow(*given)[0] if self.products else 1.0
+        return self.narrow.hidden(*given)[0] if self.products else 1.0
 
     def _beyond_rounding(self, k: int, changes: Scalar, before: Scalar, after: Scalar) -> Scalar:
         """Changes of the sign of a function, 0 where its values at both ends of a subinterval are rounding."""
@@ -224,39 +229,9 @@ class SwitchingFunctions:
         return Kernel(write(share, *sizes, *sizes, name="unseen"), batch=False)
 
     @cached_property
-    def _narrow(self) -> CheckedSwitch:
-        """Ends of a step, as for :attr:`machine_code` → share before its first narrow peak of a product.
-
-        Few steps are divided: the others have no peak by one enclosure of the whole step.
-        """
-        symbols, bases = [*self._symbols, *self._acceleration], self.products.bases
-        rates = self._slopes(bases)
-        sizes = (1, self.system.n_q, self.system.n_v, self.system.n_v)
-
-        def values(state):
-            given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, state, strict=True)}
-            return [value.low for value in enclose(bases, given)]
-
-        def enclosures(ends):
-            given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
-            return [end for value in enclose([*bases, *rates], given) for end in value]
-
-        at = write(values, len(self._symbols), name="bases")
-        around = write(enclosures, 2 * len(symbols), name="base_enclosures")
-
-        def seen(count, t, q, v, first, t_end, q_end, v_end, last):
-            nodes, parts = enclosed_parts(self.system, State(t[0], q, v), first, State(t_end[0], q_end, v_end), last, count)
-            found = [_divided(_intervals(around(np.ravel(part))), len(bases), len(rates)) for part in parts]
-            return [list(at(node)) for node in nodes], *map(list, zip(*found, strict=True)), (t_end[0] - t[0]) / count
-
-        def whole(*ends):
-            return [1.0, self.products.is_flat(*seen(1, *ends))]
-
-        def divided(*ends):
-            return [self.products.hidden(*seen(PARTS, *ends))]
-
-        flat, parted = write(whole, *sizes, *sizes, name="flat"), write(divided, *sizes, *sizes, name="narrow")
-        return CheckedSwitch(flat, parted, 0.5)
+    def narrow(self) -> NarrowPeaks:
+        """Its products and exponential functions."""
+        return NarrowPeaks(self.system, self._symbols, self._acceleration, self.products, self.peaks, self._slopes)
 
     @cached_property
     def _groups(self) -> tuple[list, list, list, list]:

@@ -144,7 +144,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     def stepped(equations, x, h):
         begin = begun(equations, x)
         reached, cost = method.step(equations, begin, h[0])
-        unseen = program.watch.passes(begin, reached)
+        unseen = math.maximum(program.watch.passes(begin, reached), missed(begin, reached))
         reached = replace(reached, rates=begin.rates) if program.inputs else reached  # the next step computes its own
         if method.state_size:  # it satisfies the constraints itself, and a projection would spoil its compensated sums
             residual = equations.largest_violation(reached.state)
@@ -159,6 +159,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         numbers = [cost.evaluations + int(program.projects), cost.factorisations, cost.unsolved]
         return packed, residuals, [*numbers, unseen]
 
+    missed = _missed_peaks(program)
     free = not method.mechanical and not program.drift.partitioned
     step: Function | CheckedSwitch
     if program.may_lose_rank and free:
@@ -169,6 +170,19 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         step = write(steps(_equations(program, method)), size, 1, name="step")
     project = None if method.state_size else program.projection()
     return Fixed(size, layout.row, step, project, program.point_check, method.evaluations, program.rates)
+
+
+def _missed_peaks(program: Program) -> Callable[[Point, Point], Scalar]:
+    """Ends of a fixed step → 1 where it does not resolve a smooth peak of a law, else 0."""
+    if not program.watch.may_be_narrow:
+        return lambda begin, end: 0.0
+    look = program.watch.narrow.unresolved(lambda state: program.evaluate(state).acceleration, program.order_inputs)
+
+    def missed(begin: Point, end: Point) -> Scalar:
+        parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
+        return look(*parts[0], *parts[1])[0]
+
+    return missed
 
 
 def fixed_batch(
