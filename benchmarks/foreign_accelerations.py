@@ -13,7 +13,8 @@ from gauss import rotations
 from gauss.dynamics.inputs import driven_scene
 from gauss.errors import GaussError
 from gauss.io.guard import Source
-from gauss.io.mjcf.actuators import controls
+from gauss.io.mjcf.activations import activation
+from gauss.io.mjcf.actuators import actuators, controls, state_name
 from gauss.io.mjcf.names import SCALAR, Named
 from gauss.system import State, random_state
 
@@ -92,6 +93,10 @@ def _compared(model, system, state: State, qdd: np.ndarray, ctrl: np.ndarray) ->
             v, a = (np.concatenate([one[:3], R_0.T @ one[3:]]) for one in (v, a))
         data.qvel[dof : dof + len(v)], ours[dof : dof + len(v)] = v, a
     data.ctrl[:] = ctrl
+    for name in set(system.scene.states) & {state_name(model, i) for i in actuators(model)}:
+        i = next(i for i in actuators(model) if state_name(model, i) == name)
+        acting = activation(model, i).bounded(state.v[system.joint(name).v][0])  # MuJoCo never has one beyond its range
+        data.act[int(model.actuator_actadr[i])] = acting
     if not np.isfinite(ours).all():
         raise NotCompared("no accelerations")
     return ours, _accelerations(model, data)

@@ -13,6 +13,7 @@ from gauss.simulation.held_inputs import driven_as
 from tests.support.files import quietly
 
 SAME = 1e-11  # relative: two exact engines, but for rounding
+WITHIN = 1e-7  # relative: MuJoCo ends the search of a path through a geom at an angle of 1e-6
 CLOSED = 1e-6  # relative, where the reference of closed loops is found by differences
 
 ARM = """<site name="hook" pos="0.2 0.1 1.5"/><body name="a" pos="0 0 1"{a}><joint name="h" axis="0 1 0"{h}/>
@@ -32,7 +33,23 @@ PATH = (
 )
 PULLEY = '<pulley divisor="2"/><site site="o"/><site site="hook"/>'
 SUM = '<tendon><fixed name="t" {}><joint joint="h" coef="0.5"/><joint joint="k" coef="-2"/></fixed></tendon>'
+ROUND = '<geom name="{}" type="{}" size="{}" pos="{}" euler="20 -30 10" mass="0.3"/><site name="side" pos="{}"/>'
+AROUND = (
+    '<tendon><spatial stiffness="20" damping="0.5" springlength="0.1" {1}>'
+    '<site site="hook"/><geom geom="w" {0}/><site site="r"/>'
+    '<pulley divisor="2"/><site site="o"/><geom geom="w"/><site site="p"/></spatial></tendon>'
+)
 WIND = '<option density="1.2" viscosity="0.3" wind="1 0.5 -2"/>'
+
+
+def wound(
+    kind: str, size: str, side: str = "", at: str = "0.3 0.1 -0.1", where: str = "0.6 0 -0.4", more: str = ""
+) -> tuple[str, str]:
+    """Arm with a tendon around a geom of its middle body."""
+    round_ = ROUND.format("w", kind, size, at, where)
+    return arm(a="").replace('<site name="p"', round_ + '<site name="p"', 1), AROUND.format(
+        side and f'sidesite="{side}"', more
+    )
 
 
 def arm(**more) -> str:
@@ -55,6 +72,11 @@ ELEMENTS = {
     "path": (arm(), PATH.format('stiffness="20" damping="0.5" springlength="0.3"', "")),
     "path with a pulley": (arm(), PATH.format('stiffness="20" damping="0.5" springlength="0.3"', PULLEY)),
     "path that is slack": (arm(), PATH.format('stiffness="20" springlength="0.3 1.5"', "")),
+    "path around a sphere": wound("sphere", "0.25"),
+    "path around a sphere, on a side": wound("sphere", "0.2", "side"),
+    "path around a cylinder": wound("cylinder", "0.2 0.1"),
+    "path around a cylinder, on a side": wound("cylinder", "0.15 0.1", "side"),
+    "path around a sphere, a side on another body": wound("sphere", "0.1", "o"),
     "path in one body": (arm(), '<tendon><spatial stiffness="5"><site site="p"/><site site="q"/></spatial></tendon>'),
     "path with armature": (arm(), PATH.format('armature="0.3"', PULLEY)),
     "sum with armature": (arm(), SUM.format('armature="0.3"')),
@@ -71,6 +93,11 @@ ELEMENTS = {
     ),
     "damper": acting('<damper name="m" joint="h" kv="3" ctrlrange="0 1"/>'),
     "at a sum": acting('<position name="m" tendon="t" kp="7" gear="2"/>', more=SUM.format("")),
+    "at a path around a sphere": acting(
+        '<position name="m" tendon="t" kp="7" gear="2"/>',
+        wound("sphere", "0.2")[0],
+        wound("sphere", "0.2", more='name="t"')[1],
+    ),
     "at a path": acting('<position name="m" tendon="t" kp="7" gear="2"/>', more=PATH.format("", PULLEY)),
     "at a path in one body": acting(
         '<motor name="m" tendon="t"/>', more='<tendon><spatial name="t"><site site="p"/><site site="q"/></spatial></tendon>'
@@ -95,6 +122,10 @@ ELEMENTS = {
 }
 WELD = '<equality><weld body1="a" body2="w" {}/></equality>'
 POINT = '<body name="w" pos="1 0 1"><freejoint/><geom size="0.1" pos="0.1 0 0"/></body>'
+THROUGH = {
+    "path through a sphere": wound("sphere", "0.2", "side", where="0.3 0.15 -0.1"),
+    "path through a cylinder": wound("cylinder", "0.15 0.1", "side", where="0.3 0.15 -0.1"),
+}
 HELD = {
     "weld at another pose": (arm() + POINT, WELD.format('relpose="0.7 0.1 0.3 0.8 0.6 0 0" anchor="0.1 0.2 0"')),
     "weld of sites, at another pose": (
@@ -131,16 +162,23 @@ def test_elements_accelerate_as_in_mujoco(tmp_path, name):
 
 
 @pytest.mark.peer
+@pytest.mark.parametrize("name", THROUGH)
+def test_paths_through_geoms_accelerate_as_in_mujoco(tmp_path, name):
+    path = _file(tmp_path, *THROUGH[name])
+    assert deviation(path, quietly(path)) < WITHIN
+
+
+@pytest.mark.peer
 @pytest.mark.parametrize("name", HELD)
 def test_held_tendons_accelerate_as_in_mujoco(tmp_path, name):
     path = _file(tmp_path, *HELD[name])
     assert deviation(path, quietly(path)) < CLOSED
 
 
-@pytest.mark.parametrize("name", ELEMENTS | HELD)
+@pytest.mark.parametrize("name", ELEMENTS | THROUGH | HELD)
 def test_machine_code_of_elements_is_kept_by_their_content(tmp_path, name):
     """Laws that hold the model of MuJoCo would have no digest, and be compiled in every process."""
-    path = _file(tmp_path, *(ELEMENTS | HELD)[name])
+    path = _file(tmp_path, *(ELEMENTS | THROUGH | HELD)[name])
     one, other = content_digest(quietly(path)), content_digest(quietly(path))
     assert one is not None and one == other
 
@@ -219,15 +257,6 @@ def test_a_scene_starts_from_the_key_frame_that_is_asked_for(tmp_path, asked, ex
 def test_a_key_frame_that_is_not_there_is_refused(tmp_path, asked):
     with pytest.raises(FileError, match="keyframe: no key frame .* among 2"):
         quietly(_file(tmp_path, arm(), KEYS), keyframe=asked)
-
-
-def test_controls_of_actuators_with_states_are_named(tmp_path):
-    filtered = '<general name="m" joint="h" dyntype="filter" dynprm="1" gainprm="2" biastype="affine" biasprm="3 0 0"/>'
-    path = _file(tmp_path, *acting(filtered))
-    with pytest.warns(NotImportedWarning, match="controls of actuators with states of their own, which are 0: m"):
-        scene = gauss.load(path)
-    assert not scene.inputs and scene.loads["bias of m"].effort == 3.0
-    assert deviation(path, scene) < SAME
 
 
 def test_every_control_of_mujoco_has_its_place(tmp_path):

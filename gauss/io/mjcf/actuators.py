@@ -1,12 +1,14 @@
 """Actuators of a MuJoCo model: the numbers of their force, which of them act, and their controls.
 
-Force = (g₀ + g₁ l + g₂ l̇) u + b₀ + b₁ l + b₂ l̇ of the length l of what is pulled, for a control u; MuJoCo's documentation,
-"Computation: Actuation model". Where nobody gives u, it is 0, clamped to its range as MuJoCo clamps it.
+Force = (g₀ + g₁ l + g₂ l̇) u + b₀ + b₁ l + b₂ l̇ of the length l of what is pulled, for a control u, or an activation that
+follows one; MuJoCo's documentation, "Computation: Actuation model". Muscles have curves for both. Where nobody gives u, it
+is 0, clamped to its range as MuJoCo clamps it.
 """
 
 import mujoco
 import numpy as np
 
+from gauss.io.mjcf.activations import KNOWN, MUSCLE_BIAS, MUSCLE_GAIN
 from gauss.io.mjcf.switches import is_off
 
 COUNT = (
@@ -63,15 +65,30 @@ def control_range(model, i: int) -> tuple[float, float] | None:
     return low, high
 
 
-def has_affine_force(model, i: int) -> bool:
-    """Whether the force is that of the formula above."""
-    gains = (FIXED_GAIN, AFFINE_GAIN)
-    return int(model.actuator_biastype[i]) in (NO_BIAS, AFFINE) and int(model.actuator_gaintype[i]) in gains
+def has_known_force(model, i: int) -> bool:
+    """Whether the force is that of the formula above, or of a muscle."""
+    gains = (FIXED_GAIN, AFFINE_GAIN, MUSCLE_GAIN)
+    return int(model.actuator_biastype[i]) in (NO_BIAS, AFFINE, MUSCLE_BIAS) and int(model.actuator_gaintype[i]) in gains
+
+
+def is_muscle(model, i: int) -> bool:
+    """Whether curves of a muscle make its force."""
+    return int(model.actuator_gaintype[i]) == MUSCLE_GAIN or int(model.actuator_biastype[i]) == MUSCLE_BIAS
 
 
 def has_state(model, i: int) -> bool:
-    """Whether it acts by an activation, which follows its control by a differential equation and is 0 without control."""
+    """Whether it acts by an activation, which follows its control by a differential equation."""
     return int(model.actuator_dyntype[i]) != STATELESS
+
+
+def has_known_state(model, i: int) -> bool:
+    """Whether it has no activation, or one whose law is known."""
+    return not has_state(model, i) or (int(model.actuator_dyntype[i]) in KNOWN and int(model.actuator_actnum[i]) == 1)
+
+
+def state_name(model, i: int) -> str:
+    """Name of the state that is the activation of an actuator."""
+    return f"{model.actuator(i).name or f'actuator {i}'} activation"
 
 
 def bias_of(model, i: int) -> np.ndarray:
@@ -82,7 +99,8 @@ def bias_of(model, i: int) -> np.ndarray:
 def gain_of(model, i: int) -> np.ndarray:
     """Numbers g of the formula (3,)."""
     affine = float(int(model.actuator_gaintype[i]) == AFFINE_GAIN)
-    return model.actuator_gainprm[i, :3] * [1.0, affine, affine]
+    constant = float(int(model.actuator_gaintype[i]) != MUSCLE_GAIN)
+    return model.actuator_gainprm[i, :3] * [constant, affine, affine]
 
 
 def control_place(model, i: int) -> int:

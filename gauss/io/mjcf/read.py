@@ -1,6 +1,6 @@
 """Scenes of MJCF files, read through MuJoCo's own compiler.
 
-Bodies, joints, equalities, actuators, fixed and straight tendons, inertia from geometry. What moves a mechanism and has no
+Bodies, joints, equalities, actuators, tendons, inertia from geometry. What moves a mechanism and has no
 counterpart is refused by name, file and line. What does not move it by itself is read where it is asked for, else named in a
 warning: contacts of geoms, and limits, which are always kept for the assembly of a start.
 """
@@ -43,7 +43,8 @@ def read_mjcf(
     those of a joint with ``ref`` are smaller by it. An actuator is an input, named like it, of its control; the force that
     it has when nobody controls it, under control 0 or the end of its ``ctrlrange`` that is nearest, is a load. Armature is
     a rotor on the ground that turns with its joint. A fixed tendon pulls its joints; one between two sites is a spring, a
-    rope, or a distance, one over several sites pulls the bodies of all. A key frame called "start", or another that is
+    rope, or a distance, one over several sites and around spheres and cylinders pulls the bodies of all. An activation of an
+    actuator is a state of the scene. A key frame called "start", or another that is
     asked for, is where the scene starts.
 
     Parameters

@@ -9,10 +9,10 @@ from gauss.io.mjcf.actuators import (
     actuators,
     adheres,
     bias_of,
-    control,
     gain_of,
-    has_affine_force,
-    has_state,
+    has_known_force,
+    has_known_state,
+    is_muscle,
     is_switched_off,
     n_controls,
 )
@@ -78,7 +78,6 @@ def _curved(named: Named) -> Iterator[Finding]:
 def _without_counterpart(named: Named, contacts: bool) -> Iterator[Finding]:
     model = named.model
     for kind, count, against in (
-        ("tendon", model.ntendon, _against_tendon),
         ("equality", model.neq, _against_equality),
         ("actuator", len(actuators(model)), _against_actuator),
     ):
@@ -135,7 +134,6 @@ def _uncontrolled(named: Named) -> list[tuple[str, list[str]]]:
     return [
         ("actuators that are switched off:", [name(i) for i in actuators(model) if is_switched_off(model, i)]),
         ("adhesion, which needs contacts, of actuators", [name(i) for i in acting if adheres(model, i)]),
-        ("controls of actuators with states of their own, which are 0:", [name(i) for i in acting if has_state(model, i)]),
     ]
 
 
@@ -154,16 +152,6 @@ def _of_joint(named: Named, i: int) -> list[str]:
     return ["frictionloss, in axes that are not those of the world,"] if model.dof_frictionloss[dof] and turned else []
 
 
-def _against_tendon(named: Named, i: int) -> str:
-    """Why a tendon has no counterpart; empty if it has one."""
-    model, path = named.model, tendon_path(named, i)
-    if not path.is_read:
-        return "it is wrapped around geoms; lead it over sites"
-    if model.tendon_frictionloss[i] and not (path.is_fixed and len(path.terms) == 1):
-        return "its frictionloss is not modelled; give frictionloss of its joints"
-    return ""
-
-
 def _against_equality(named: Named, i: int) -> str:
     """Why an equality has no counterpart; empty if it has one."""
     model = named.model
@@ -171,11 +159,9 @@ def _against_equality(named: Named, i: int) -> str:
     if kind == JOINT:
         scalar = all(named.kinds[j] in SCALAR for j in ends if j >= 0)
         return "" if scalar else "a joint has several freedoms"
-    if kind == TENDON:
-        return "" if all(tendon_path(named, j).is_read for j in ends if j >= 0) else "it holds a tendon wrapped around geoms"
-    if kind not in (CONNECT, WELD):
+    if kind not in (CONNECT, WELD, TENDON):
         return "only connect, weld, joint and tendon are read"
-    if int(model.eq_objtype[i]) not in (BODY, SITE):
+    if kind != TENDON and int(model.eq_objtype[i]) not in (BODY, SITE):
         return "it binds neither bodies nor sites"
     return ""
 
@@ -196,21 +182,23 @@ def _against_actuator(named: Named, i: int) -> str:
     """Why an actuator has no counterpart; empty if it has one."""
     model, acted = named.model, transmission(named, i)
     if acted is None:
-        return "only actuators of joints, of tendons over sites, and of sites beside none or one of the ground are read"
+        return "only actuators of joints, of tendons, and of sites beside none or one of the ground are read"
     if n_controls(model, i) > 1:
         return "it has several controls"
     if np.any(getattr(model, "actuator_delay", np.zeros(i + 1))[i]):
         return "its control is delayed"
-    if not has_affine_force(model, i):
-        return "its force is not affine"
-    if has_state(model, i) and control(model, i):
-        return "it has states of its own, and its control may not be 0"
+    if not has_known_force(model, i):
+        return "its force is neither affine nor that of a muscle"
+    if not has_known_state(model, i):
+        return "its activation is no integral, filter or muscle's"
     return _against_force(named, i, acted)
 
 
 def _against_force(named: Named, i: int, acted: ActuatorTransmission) -> str:
     """Why the force of an actuator on an element has no counterpart."""
     model, numbers = named.model, np.abs(gain_of(named.model, i)) + np.abs(bias_of(named.model, i))
+    if is_muscle(model, i):
+        numbers = np.ones(3)
     if (numbers[1] and acted.length is None) or (numbers[2] and acted.rate is None):
         return "its force depends on the motion of what has several freedoms, or of a site beside another"
     on_joint = int(model.actuator_trntype[i]) in (ON_JOINT, JOINT_IN_PARENT)

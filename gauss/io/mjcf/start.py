@@ -4,6 +4,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, did_you_mean
+from gauss.io.mjcf.actuators import actuators, state_name
 from gauss.io.mjcf.names import SCALAR, Named
 from gauss.scene import Scene
 
@@ -33,7 +34,7 @@ def key_of(named: Named, keyframe: str | int | None) -> int | None:
 
 
 def add_start(scene: Scene, named: Named, keyframe: str | int | None = None):
-    """Start every joint where a key frame has it, if there is one."""
+    """Start every joint, and every activation, where a key frame has it, if there is one."""
     model, key = named.model, key_of(named, keyframe)
     if key is None:
         return
@@ -52,3 +53,6 @@ def add_start(scene: Scene, named: Named, keyframe: str | int | None = None):
             omega = rotations.from_quaternion(Q_0) @ omega
         along = qvel[dof : dof + 3 * free]
         scene.start(name, tuple(np.concatenate([moved, Q])), tuple(np.concatenate([along, omega])))
+    for i in actuators(model):
+        if state_name(model, i) in scene.states:
+            scene.start(state_name(model, i), rate=float(model.key_act[key][int(model.actuator_actadr[i])]))

@@ -20,11 +20,20 @@ def add_tendon(scene: Scene, named: Named, i: int, stops: bool):
         path.pull(scene, name, _resistance(path, stiffness, damping, low, high))
     if model.tendon_limited[i] and (stops or not path.is_fixed):
         _limit(scene, named, i, path, name)
-    if model.tendon_armature[i]:
-        _add_armature(scene, name, path, float(model.tendon_armature[i]))
-    if model.tendon_frictionloss[i]:  # of one joint, see what is refused
+    _add_inertia_and_friction(scene, named, i, path, name)
+
+
+def _add_inertia_and_friction(scene: Scene, named: Named, i: int, path: TendonPath, name: str):
+    """Armature and dry friction, along the tendon: those of a rotor that it turns, but for friction of a single joint."""
+    friction, armature = float(named.model.tendon_frictionloss[i]), float(named.model.tendon_armature[i])
+    if friction and path.is_fixed and len(path.terms) == 1:
         joint, factor = next(iter(path.terms.items()))
-        scene.joint_friction(joint, abs(factor) * float(model.tendon_frictionloss[i]), name=f"friction of {name}")
+        scene.joint_friction(joint, abs(factor) * friction, name=f"friction of {name}")
+        friction = 0.0
+    if friction or armature:
+        shaft = _add_rotor(scene, name, path, armature)
+        if friction:
+            scene.joint_friction(shaft, friction, name=f"friction of {name}")
 
 
 def _ends(path: TendonPath) -> dict:
@@ -55,19 +64,19 @@ def _limit(scene: Scene, named: Named, i: int, path: TendonPath, name: str):
         scene.one_sided(f"{name} at its shortest", lambda at: path.length(at) - shortest)
 
 
-def _add_armature(scene: Scene, name: str, path: TendonPath, inertia: float):
-    """A rotor on the ground that turns by 1 rad for each rad or m of the tendon: it adds its inertia only."""
+def _add_rotor(scene: Scene, name: str, path: TendonPath, inertia: float) -> str:
+    """Shaft of a rotor on the ground that turns by 1 rad for each rad or m of the tendon: it adds its inertia only."""
     rotor, shaft = f"rotor of {name}", f"shaft of {name}"
     scene.body(rotor, 1.0, (inertia,) * 3)
     scene.revolute(shaft, GROUND, rotor)
     if path.is_fixed and len(path.terms) == 1:
         joint, factor = next(iter(path.terms.items()))
         scene.couple(f"armature of {name}", shaft, joint, factor)
-        return
-    if path.is_fixed:
+    elif path.is_fixed:
         scene.linear_coupling(f"armature of {name}", path.terms | {shaft: -1.0}, 0.0)
-        return
-    scene.constrain(f"armature of {name}", lambda at: path.length(at) - path.rest - at.coordinate(shaft))
+    else:
+        scene.constrain(f"armature of {name}", lambda at: path.length(at) - path.rest - at.coordinate(shaft))
+    return shaft
 
 
 def hold_tendon(scene: Scene, name: str, path: TendonPath, offset: float):

@@ -85,15 +85,16 @@ def _of_joint(named: Named, i: int, j: int, on: int) -> ActuatorTransmission | N
     return ActuatorTransmission(found, range=bounds)
 
 
-def _of_tendon(named: Named, i: int, number: int) -> ActuatorTransmission | None:
+def _of_tendon(named: Named, i: int, number: int) -> ActuatorTransmission:
     model, path, ratio = named.model, tendon_path(named, number), float(gear(named.model, i)[0])
-    if not path.is_read:
-        return None
     bounds = _bounds(model.tendon_actfrcrange[number]) if model.tendon_actfrclimited[number] else None
     length, rate = (lambda at: ratio * path.length(at)), (lambda at: ratio * path.rate(at))
     if path.is_fixed:
         return ActuatorTransmission({joint: ratio * x for joint, x in path.terms.items()}, (), length, rate, bounds)
-    forces = [Force(one.name, one.body, _times(one.force, ratio), at=one.at) for one in path.unit_forces("force")]
+    forces = [
+        Force(one.name, one.body, _times(one.force, ratio), _times(one.moment, ratio), at=one.at)
+        for one in path.unit_forces("force")
+    ]
     return ActuatorTransmission({}, tuple(forces), length, rate, bounds)
 
 
