@@ -43,8 +43,6 @@ FAILURES = {
     LoopStatus.OFF_CONSTRAINTS: "the projection onto the constraints failed",
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
 }
-
-
 MOST_STEPS = 10**8  # of one call: their times fill the memory
 STEPS = {
     ("compiled loop", "compiled"),
