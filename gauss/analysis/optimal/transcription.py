@@ -105,7 +105,7 @@ class MotionValues:
         low, width = self.mesh[middle], np.diff(self.mesh)[middle]
         share = np.clip([(begins - low) / width, (ends - low) / width], 0.0, 1.0)[:, None]
         u = (1.0 - share) * self.u[0][:, middle] + share * self.u[1][:, middle]
-        z = np.moveaxis(np.array([at(begins + (ends - begins) * node) for node in c]), 0, 0)
+        z = np.array([at(begins + (ends - begins) * node) for node in c])
         return replace(self, mesh=mesh, x=at(mesh), z=z, u=u)
 
 
