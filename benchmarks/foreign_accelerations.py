@@ -40,6 +40,7 @@ def deviation(path, scene: gauss.Scene) -> float:
     model = mujoco.MjModel.from_xml_path(str(path))
     for name in OFF:
         model.opt.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
+    model.actuator_actearly[:] = 0  # time is continuous in gauss: it has no next step whose activation could act
     model.opt.jacobian = int(mujoco.mjtJacobian.mjJAC_DENSE)
     if not model.nv:
         raise NotCompared("nothing moves")
@@ -48,8 +49,9 @@ def deviation(path, scene: gauss.Scene) -> float:
     rng, worst = np.random.default_rng(0), 0.0
     for _ in range(STATES):
         ctrl = rng.normal(size=model.nu)
-        laws = {name: lambda t, u=ctrl[k]: u for name, k in controls(model).items() if name in scene.inputs}
-        driven = [k for name, k in controls(model).items() if name not in scene.inputs]
+        named = {name if name in scene.inputs else f"actuator {name}": k for name, k in controls(model).items()}
+        laws = {name: lambda t, u=ctrl[k]: u for name, k in named.items() if name in scene.inputs}
+        driven = [k for name, k in named.items() if name not in scene.inputs]
         ctrl[driven] = 0.0
         system = gauss.compile_scene(driven_scene(scene, laws))
         try:

@@ -1,15 +1,19 @@
-"""Model files of others: how many open, what the others are refused for, and how far accelerations are from MuJoCo's.
+"""Model files of others: how many open, what the others are refused for, and how far accelerations are from others'.
 
 Run it with:
 
     python -m benchmarks.foreign_files FOLDER...
 
-Each folder holds a copy of a public source, as a wheel of the Python package index unpacked (gymnasium, gymnasium-robotics,
-dm_control, brax, robosuite) or a checkout (google-deepmind/mujoco, gazebosim/gz-sim, gazebosim/sdformat). It is the root
-folder of its files. Files that MuJoCo itself refuses, that hold flexible bodies or plugins, or where nothing moves, are
-counted apart, as are SDFormat files with models on a server. Accelerations are compared at random states and controls,
-without contacts, limits and friction. One file differs by its own design: MuJoCo drops the terms of M between branches of
-a tree that a heavy tendon joins; gauss keeps them. Many files of sdformat are tests of what a reader is to refuse.
+Each folder holds a copy of a public source and is the root folder of its files: a wheel of the Python package index
+unpacked (gymnasium, gymnasium-robotics, dm_control, brax, robosuite, example-robot-data, icub-models, jvrc-description,
+rtb-data, differentiable-robot-model) or a checkout (google-deepmind/mujoco, gazebosim/gz-sim, gazebosim/sdformat,
+unitreerobotics/unitree_ros, of bulletphysics/bullet3 only pybullet_data without random_urdfs). Files that MuJoCo, or
+Pinocchio's parser of URDF, itself refuses, that hold flexible bodies or plugins, or where nothing moves, are counted
+apart, as are SDFormat files with models on a server. URDF files get a floating base where nothing else moves, and their
+inertias are taken as given where they break the triangle inequality: both are counted, too. Accelerations are compared at
+random states and controls, without contacts, limits and friction. One file differs by its own design: MuJoCo drops the
+terms of M between branches of a tree that a heavy tendon joins; gauss keeps them. Many files of sdformat are tests of
+what a reader is to refuse.
 """
 
 import argparse
@@ -24,17 +28,20 @@ import mujoco
 
 import gauss
 from benchmarks.foreign_accelerations import NotCompared, deviation
+from benchmarks.foreign_urdf import deviation_of_urdf, is_refused_by_parser, opened_urdf
 from gauss.errors import GaussError
 
 RESULTS = Path(__file__).parent / "results"
 PATIENCE = 120  # s for each file
 AGREED = 1e-9  # relative deviation of accelerations; of closed loops, whose reference is differenced, AGREED_LOOPS
 AGREED_LOOPS = 1e-5
-KINDS = {".xml": "mujoco", ".sdf": "sdf", ".world": "sdf"}
+KINDS = {".xml": "mujoco", ".sdf": "sdf", ".world": "sdf", ".urdf": "robot"}
+FORMATS = {".xml": "MJCF", ".sdf": "SDFormat", ".world": "SDFormat", ".urdf": "URDF"}
 ON_SERVER = "it is on a server"
 STILL = ("nothing moves", "there is no model in it")
 STATES = ("agreed", "opened", "nothing moves", "differs", "refused", "too slow", "crashed")
-APART = ("some on a server, rest opens", "all on a server", "refused by MuJoCo", "flex or plugin")
+APART = ("some on a server, rest opens", "all on a server", "refused by the reference", "flex or plugin")
+REFUSED_BY_REFERENCE = APART[2]
 QUOTED, NUMBER = re.compile(r"'[^']*'"), re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -49,9 +56,10 @@ class FileRecord(NamedTuple):
     has_loops: bool = False
 
 
-def records(folder: Path):
-    """What became of every model file below a folder."""
-    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in KINDS and path.is_file()):
+def records(folder: Path, kind: str | None = None):
+    """What became of every model file, or those of one ending, below a folder."""
+    endings = KINDS if kind is None else (kind,)
+    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in endings and path.is_file()):
         if root_of(path) == KINDS[path.suffix.lower()]:
             yield of_file(folder, path)
 
@@ -66,7 +74,7 @@ def of_file(folder: Path, path: Path) -> FileRecord:
     """Open a file and compare its accelerations."""
     signal.alarm(PATIENCE)
     try:
-        apart = excluded(path) if path.suffix == ".xml" else ""
+        apart = excluded(path)
         found = (apart,) if apart else opened(folder, path)
     except GaussError as error:
         still = any(words in str(error) for words in STILL)
@@ -83,6 +91,8 @@ def of_file(folder: Path, path: Path) -> FileRecord:
 
 def opened(folder: Path, path: Path) -> tuple:
     """Status, no reasons, deviation of accelerations and whether loops are closed, of a file that opens."""
+    if path.suffix == ".urdf":
+        return _opened_urdf(path)
     scene = gauss.load(path, root_folder=folder)
     if all(joint.kind == "fixed" for joint in scene.joints.values()):
         return ("nothing moves",)
@@ -96,6 +106,17 @@ def opened(folder: Path, path: Path) -> tuple:
     return "agreed" if found < (AGREED_LOOPS if has_loops else AGREED) else "differs", (), found, has_loops
 
 
+def _opened_urdf(path: Path) -> tuple:
+    """Status of a robot that opens, the options that it needs, and its deviation."""
+    _, options = opened_urdf(path)
+    needs = tuple(f"{key}={value!r}" for key, value in options.items())
+    try:
+        found = deviation_of_urdf(path, options)
+    except NotCompared:
+        return "opened", needs
+    return "agreed" if found < AGREED else "differs", needs, found
+
+
 def without_server(path: Path) -> str:
     """Status of a file that names models on a server: whether the rest of it opens."""
     try:
@@ -107,19 +128,23 @@ def without_server(path: Path) -> str:
 
 def excluded(path: Path) -> str:
     """Why a MJCF file is counted apart; empty where it is not."""
+    if path.suffix == ".urdf":
+        return REFUSED_BY_REFERENCE if is_refused_by_parser(path) else ""
+    if path.suffix != ".xml":
+        return ""
     text = path.read_text(errors="replace")
     if re.search(r"<(flex|flexcomp|plugin|extension)\b", text):
         return "flex or plugin"
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError):
-        return "refused by MuJoCo"
+        return REFUSED_BY_REFERENCE
     return "flex or plugin" if model.nflex or model.nplugin else ""
 
 
 def reasons(message: str) -> tuple[str, ...]:
     """Reasons of a refusal without names, places, numbers and advice."""
-    text = re.sub(r"^\S+?\.(xml|sdf|world)(:\d+)?: (not modelled: )?", "", message).partition(". Remove them")[0]
+    text = re.sub(r"^\S+?\.(xml|sdf|world|urdf)(:\d+)?: (not modelled: )?", "", message).partition(". Remove them")[0]
     parts = [
         re.sub(r"\S*/\S+", "…", part).strip("; ").partition("; ")[0].strip() for part in re.split(r"\([^()]*:\d+\)", text)
     ]
@@ -132,16 +157,28 @@ def page(found: list[FileRecord]) -> list[str]:
     lines = ["# Model files of others", "", *about, f"gauss {gauss.__version__}, MuJoCo {mujoco.__version__}.", ""]
     lines += [f"| source | files | {' | '.join((*STATES, *APART))} | of those that move, open |"]
     lines += ["|---" * (3 + len(STATES + APART)) + "|"]
-    lines += [_row(source, [one for one in found if source in (one.source, "all")]) for source in _sources(found)]
+    lines += [_row(name, [one for one in found if name in (one.source, _format(one), "all")]) for name in _sources(found)]
     trees = [one.deviation for one in found if one.status == "agreed" and not one.has_loops]
     loops = [one.deviation for one in found if one.status == "agreed" and one.has_loops]
     lines += ["", "Largest relative deviation of accelerations of those that agree: "]
     lines += [f"{max(trees, default=0.0):.1e} of trees, {max(loops, default=0.0):.1e} of loops (differenced).", ""]
-    return [*lines, *_refusals(found), *_exceptions(found), ""]
+    return [*lines, *_needs(found), *_refusals(found), *_exceptions(found), ""]
 
 
 def _sources(found: list[FileRecord]) -> list[str]:
-    return [*dict.fromkeys(one.source for one in found), "all"]
+    return [*dict.fromkeys(one.source for one in found), *dict.fromkeys(_format(one) for one in found), "all"]
+
+
+def _format(one: FileRecord) -> str:
+    return FORMATS[Path(one.path).suffix.lower()]
+
+
+def _needs(found: list[FileRecord]) -> list[str]:
+    """Options of the URDF files that open."""
+    robots = [one for one in found if _format(one) == "URDF" and one.status in ("agreed", "opened", "differs")]
+    count = Counter(", ".join(one.reasons) or "none" for one in robots)
+    rows = [f"| {options} | {number} |" for options, number in count.most_common()]
+    return ["| options that a URDF file needs | files |", "|---|---|", *rows, ""] if rows else []
 
 
 def _row(source: str, own: list[FileRecord]) -> str:
@@ -175,11 +212,12 @@ def main():
     parser = argparse.ArgumentParser(prog="python -m benchmarks.foreign_files", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folders", nargs="+", type=Path, help="folders of public sources")
     parser.add_argument("--out", type=Path, default=RESULTS / "foreign_files.md", help="page that is written")
+    parser.add_argument("--kind", choices=KINDS, help="files of one ending only")
     parser.add_argument("--list", type=Path, help="file that gets a line for each model file")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     signal.signal(signal.SIGALRM, _too_slow)
-    found = [one for folder in given.folders for one in records(folder.resolve())]
+    found = [one for folder in given.folders for one in records(folder.resolve(), given.kind)]
     if given.list:
         given.list.write_text("\n".join("\t".join(map(str, one)) for one in found))
     given.out.write_text("\n".join(page(found)), encoding="utf-8")

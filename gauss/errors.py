@@ -155,6 +155,7 @@ def did_you_mean(name: str, existing: Iterable[str]) -> str:
 DISTRIBUTIONS = {  # of imports
     "imageio_ffmpeg": "imageio-ffmpeg",
     "pinocchio": "pin",
+    "pxr": "usd-core",
     "sksundae": "scikit-sundae",
     "yaml": "pyyaml",
 }

@@ -13,6 +13,7 @@ from gauss.scene.toml import from_tables, tables, write_toml
 
 EXTRAS = ("limits", "resistance", "collisions", "motors")  # of a URDF file, where they are asked for
 OF_SDF = ("root", "limits", "root_folder", "missing")
+OF_USD = ("limits", "root_folder")
 OF_MJCF = ("limits", "contacts", "root_folder", "keyframe")
 
 
@@ -23,7 +24,7 @@ def load(source, **options):
     ----------
     source : str or Path
         * path of a .toml scene, a .urdf robot (with the .loops.toml beside it, if there is one), a model in SDFormat (.sdf,
-          or .world of Gazebo), or in MJCF (.xml, needs MuJoCo);
+          or .world of Gazebo), in MJCF (.xml, needs MuJoCo), or in USD (.usda, .usdc, .usd; extra "usd");
         * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda";
@@ -37,6 +38,8 @@ def load(source, **options):
 
         For .xml ``limits``, ``contacts=True``, ``root_folder=FOLDER`` and ``keyframe=NAME`` (see
         :func:`gauss.io.mjcf.read.read_mjcf`).
+
+        For .usda, .usdc and .usd ``limits`` and ``root_folder=FOLDER`` (see :func:`gauss.io.usd.read.read_usd`).
 
         For families their parameters.
 
@@ -170,6 +173,10 @@ def _read_mjcf(path: Path, options, name: str) -> Scene:
     return reader.read_mjcf(path, **options)
 
 
+def _read_usd(path: Path, options, name: str) -> Scene:
+    return import_module("gauss.io.usd.read").read_usd(path, **_known(name, options, OF_USD))
+
+
 def _later(module: str, name: str) -> Callable:
     """Writer that is imported when it is first called: few need it, and its parts take milliseconds to import."""
     return lambda thing, path: getattr(import_module(module), name)(thing, path)
@@ -196,6 +203,9 @@ READERS: dict[str, Callable] = {  # (path, options, name) by ending
     ".xml": _read_mjcf,
     ".sdf": _read_sdf,
     ".world": _read_sdf,
+    ".usda": _read_usd,
+    ".usdc": _read_usd,
+    ".usd": _read_usd,
 }
 
 

@@ -8,6 +8,7 @@ import gauss
 from benchmarks.foreign_accelerations import deviation
 from gauss.codegen.content_digest import content_digest
 from gauss.dynamics.inputs import driven_scene
+from gauss.errors import NotImportedWarning
 from gauss.io.mjcf.actuators import state_name
 from gauss.system import random_state
 from tests.io.test_mjcf_elements import SUM, acting, wound
@@ -23,7 +24,7 @@ ACTIVE = {
         '<general name="m" joint="h" dyntype="filterexact" dynprm="0.3" actlimited="true" actrange="-0.4 0.5"/>'
     ),
     "integrator of a servo": acting('<intvelocity name="m" joint="h" kp="30" kv="2" actrange="-1 1"/>'),
-    "early": acting('<position name="m" joint="s" kp="30" timeconst="0.2" inheritrange="0"/>'),
+    "filter of a servo": acting('<position name="m" joint="s" kp="30" timeconst="0.2" inheritrange="0"/>'),
     "muscle on a joint": acting(MUSCLE.format('joint="h"', "0", "50")),
     "muscle, smooth, of a scaled force": acting(MUSCLE.format('joint="h"', "0.4", "-1")),
     "muscle on a sum": acting(MUSCLE.format('tendon="t"', "0", "50"), more=SUM.format("")),
@@ -80,6 +81,12 @@ def test_an_activation_stays_in_its_range(tmp_path):
     system = moved.system
     found = moved.v[:, system.joint("m activation").v][:, 0]
     assert found == pytest.approx(np.minimum(moved.t, 0.5), abs=1e-3)
+
+
+def test_activations_that_act_a_step_early_are_named(tmp_path):
+    path = written(tmp_path, *acting('<general name="m" joint="h" dyntype="filter" dynprm="0.3" actearly="true"/>'))
+    with pytest.warns(NotImportedWarning, match="actearly.*m"):
+        gauss.load(path)
 
 
 def test_a_key_frame_starts_activations(tmp_path):

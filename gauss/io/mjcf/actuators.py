@@ -81,6 +81,11 @@ def has_state(model, i: int) -> bool:
     return int(model.actuator_dyntype[i]) != STATELESS
 
 
+def acts_early(model, i: int) -> bool:
+    """Whether the activation after a step of MuJoCo acts, not that before it."""
+    return has_state(model, i) and bool(model.actuator_actearly[i])
+
+
 def has_known_state(model, i: int) -> bool:
     """Whether it has no activation, or one whose law is known."""
     return not has_state(model, i) or (int(model.actuator_dyntype[i]) in KNOWN and int(model.actuator_actnum[i]) == 1)

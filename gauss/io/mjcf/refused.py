@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from gauss.io.mjcf.actuators import (
+    acts_early,
     actuators,
     adheres,
     bias_of,
@@ -134,6 +135,10 @@ def _uncontrolled(named: Named) -> list[tuple[str, list[str]]]:
     return [
         ("actuators that are switched off:", [name(i) for i in actuators(model) if is_switched_off(model, i)]),
         ("adhesion, which needs contacts, of actuators", [name(i) for i in acting if adheres(model, i)]),
+        (
+            "the step by which activations act early (actearly), of actuators",
+            [name(i) for i in acting if acts_early(model, i)],
+        ),
     ]
 
 

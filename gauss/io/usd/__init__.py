@@ -1,0 +1,1 @@
+"""USD files of rigid articulations, read with their loops."""

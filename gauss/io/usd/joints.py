@@ -1,0 +1,163 @@
+"""Joints of a USD stage: kind, axis, frames on both bodies, limits; D6 joints by the freedoms that they leave."""
+
+from dataclasses import dataclass
+from math import inf, radians
+
+import numpy as np
+
+from gauss.errors import FileError, extra
+from gauss.io.usd.bodies import body_of, moving_prims
+from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits
+from gauss.scene import GROUND
+
+with extra("usd"):
+    from pxr import Usd, UsdPhysics
+
+Axis = tuple[float, float, float]
+AXES: dict[str, Axis] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+FREEDOMS: tuple[str, ...] = tuple(f"{kind}{axis}" for kind in ("trans", "rot") for axis in AXES)
+PAIRS_OF: dict[tuple[str, ...], tuple[str, Axis]] = {  # kind and axis by the freedoms that a D6 joint leaves
+    (): ("fixed", AXES["Z"]),
+    FREEDOMS: ("free", AXES["Z"]),
+    FREEDOMS[3:]: ("ball", AXES["Z"]),
+    **{(f"rot{name}",): ("revolute", axis) for name, axis in AXES.items()},
+    **{(f"trans{name}",): ("prismatic", axis) for name, axis in AXES.items()},
+    **{(f"trans{name}", f"rot{name}"): ("cylindrical", axis) for name, axis in AXES.items()},
+    ("transX", "transY", "rotZ"): ("planar", AXES["Z"]),
+    ("transX", "transZ", "rotY"): ("planar", AXES["Y"]),
+    ("transY", "transZ", "rotX"): ("planar", AXES["X"]),
+}
+NOT_READ = ("physxJoint:armature", "physxJoint:jointFriction", "newton:armature", "newton:friction")
+NOT_READ_APIS = ("Mimic", "Tendon", "Gear")
+
+
+@dataclass(frozen=True)
+class UsdJoint:
+    """Joint between two bodies.
+
+    Parameters
+    ----------
+    prim : Usd.Prim
+        Where the file has it.
+    name, kind : str
+        Name and kind, as of :class:`gauss.scene.Joint`; "free" holds nothing.
+    parent, child : str
+        Bodies.
+    parent_frame, child_frame : FramePose
+        Frame of the joint in each.
+    axis : tuple of float
+        Axis in these frames.
+    limits : tuple of float, optional
+        Least and largest coordinate [rad, m].
+    is_loop : bool
+        Whether the file leaves it out of the tree.
+    drive : str
+        Name of its drive in the file; empty where it can have none.
+    """
+
+    prim: Usd.Prim
+    name: str
+    kind: str
+    parent: str
+    child: str
+    parent_frame: FramePose
+    child_frame: FramePose
+    axis: Axis
+    limits: tuple[float, float] | None
+    is_loop: bool
+    drive: str = ""
+
+
+def joints_of(stage: Usd.Stage, bodies: dict[str, Usd.Prim], units: StageUnits) -> list[UsdJoint]:
+    """All joints that are switched on, by names of their own."""
+    prims = [prim for prim in moving_prims(stage) if prim.IsA(UsdPhysics.Joint)]
+    on = [prim for prim in prims if UsdPhysics.Joint(prim).GetJointEnabledAttr().Get()]
+    names = [prim.GetName() for prim in on]
+    taken = {name for name in names if names.count(name) > 1} | set(bodies)
+    return [
+        _joint(prim, str(prim.GetPath())[1:] if name in taken else name, bodies, units)
+        for prim, name in zip(on, names, strict=True)
+    ]
+
+
+def _joint(prim: Usd.Prim, name: str, bodies: dict[str, Usd.Prim], units: StageUnits) -> UsdJoint:
+    _refuse_what_is_not_read(prim)
+    joint, kind_of = UsdPhysics.Joint(prim), _kind(prim, units)
+    ends = []
+    for bound, at, turned in (
+        (joint.GetBody0Rel(), joint.GetLocalPos0Attr(), joint.GetLocalRot0Attr()),
+        (joint.GetBody1Rel(), joint.GetLocalPos1Attr(), joint.GetLocalRot1Attr()),
+    ):
+        ends.append(_end(prim, bound.GetTargets(), at.Get(), turned.Get(), bodies, units))
+    (parent, first), (child, second) = ends
+    if parent == child:
+        raise FileError(f"{prim.GetPath()}: joint {name!r} binds {parent!r} to itself.")
+    kind, axis, limits, drive = kind_of
+    is_loop = bool(joint.GetExcludeFromArticulationAttr().Get())
+    return UsdJoint(prim, name, kind, parent, child, first, second, axis, limits, is_loop, drive)
+
+
+def _end(joint: Usd.Prim, targets, at, turned, bodies: dict[str, Usd.Prim], units: StageUnits) -> tuple[str, FramePose]:
+    """Body of one side of a joint, and the frame of the joint in it."""
+    if len(targets) > 1:
+        raise FileError(f"{joint.GetPath()}: a joint binds one body on each side, got {len(targets)}.")
+    target = joint.GetStage().GetPrimAtPath(targets[0]) if targets else None
+    if targets and not target:
+        raise FileError(f"{joint.GetPath()}: it binds {targets[0]}, which does not exist.")
+    prim = target or joint.GetStage().GetPseudoRoot()
+    local, body = units.local(prim, at, turned), body_of(prim, bodies)
+    placed = units.pose(bodies[body]) if body != GROUND else GROUND_POSE
+    return body, placed.inverse @ units.pose(prim) @ local
+
+
+def _kind(prim: Usd.Prim, units: StageUnits) -> tuple:
+    """Kind, axis, limits and name of the drive."""
+    if prim.IsA(UsdPhysics.FixedJoint):
+        return "fixed", AXES["Z"], None, ""
+    if prim.IsA(UsdPhysics.SphericalJoint):
+        return "ball", AXES["Z"], None, ""
+    for schema, kind, drive in (
+        (UsdPhysics.RevoluteJoint, "revolute", "angular"),
+        (UsdPhysics.PrismaticJoint, "prismatic", "linear"),
+    ):
+        if prim.IsA(schema):
+            joint = schema(prim)
+            low, high = float(joint.GetLowerLimitAttr().Get()), float(joint.GetUpperLimitAttr().Get())
+            return kind, AXES[joint.GetAxisAttr().Get()], limits_of(prim, low, high, kind, units), drive
+    if prim.GetTypeName() != "PhysicsJoint":
+        raise FileError(f"{prim.GetPath()}: a joint of type {prim.GetTypeName()} is not modelled.")
+    return _by_freedoms(prim, units)
+
+
+def _by_freedoms(prim: Usd.Prim, units: StageUnits) -> tuple:
+    """Kind of a D6 joint: a freedom whose lower limit is above the upper one is locked."""
+    ranges = dict.fromkeys(FREEDOMS, (-inf, inf))
+    for freedom in FREEDOMS:
+        if prim.HasAPI(UsdPhysics.LimitAPI, freedom):
+            limit = UsdPhysics.LimitAPI(prim, freedom)
+            ranges[freedom] = float(limit.GetLowAttr().Get()), float(limit.GetHighAttr().Get())
+    free = tuple(freedom for freedom, (low, high) in ranges.items() if low <= high)
+    if free not in PAIRS_OF:
+        raise FileError(f"{prim.GetPath()}: a D6 joint with the freedoms {', '.join(free)} is not modelled.")
+    kind, axis = PAIRS_OF[free]
+    if len(free) > 1 or not free:
+        return kind, axis, None, ""
+    return kind, axis, limits_of(prim, *ranges[free[0]], kind, units), free[0]
+
+
+def limits_of(prim: Usd.Prim, low: float, high: float, kind: str, units: StageUnits) -> tuple[float, float] | None:
+    """Limits of a joint of one freedom in rad or m; None where neither end is limited."""
+    if low == -inf and high == inf:
+        return None
+    if not low < high:
+        raise FileError(f"{prim.GetPath()}: expected the lower limit below the upper one, got {low} and {high}.")
+    scale = radians(1.0) if kind == "revolute" else units.length
+    return low * scale, high * scale
+
+
+def _refuse_what_is_not_read(prim: Usd.Prim):
+    """Refuse what moves the mechanism and has no counterpart in UsdPhysics."""
+    bad = [str(name) for name in prim.GetAppliedSchemas() if any(word in str(name) for word in NOT_READ_APIS)]
+    bad += [name for name in NOT_READ if prim.HasAttribute(name) and np.any(prim.GetAttribute(name).Get())]
+    if bad:
+        raise FileError(f"{prim.GetPath()}: {', '.join(bad)} is not modelled.")
