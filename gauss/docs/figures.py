@@ -44,4 +44,6 @@ def reset(gallery_conf: dict, name):
     import warnings
 
     warnings.resetwarnings()
+    for kind in (DeprecationWarning, PendingDeprecationWarning):  # of what extensions call of Sphinx
+        warnings.simplefilter("ignore", kind)
     warnings.simplefilter("default", UserWarning)
