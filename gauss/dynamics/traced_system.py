@@ -23,6 +23,7 @@ from gauss.dynamics.generic_rank import has_full_generic_rank
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.constraint_functions import watched_functions
 from gauss.dynamics.laws.switching_functions import SwitchingFunctions
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
@@ -94,13 +95,14 @@ class Program:
         self.loads = laws.traced if family is None else family.system.loads
         self.inputs = tuple(system.scene.inputs) if inputs else ()
         self.loads = [*self.loads, *input_loads(system)] if inputs else self.loads
+        self.is_plain = family is None
         self.pattern = system if family is None else family.pattern  # a system of numbers alone
         self.layout = PointLayout(system.n_q, system.n_v, memory, self.inputs if family is None else family.parameters)
 
     @cached_property
     def watch(self) -> SwitchingFunctions:
-        """Switching functions of its laws."""
-        return SwitchingFunctions(self.system, self.laws)
+        """Switching functions of its laws and constraints."""
+        return SwitchingFunctions(self.system, watched_functions(self.system, self.laws) if self.is_plain else self.laws)
 
     @property
     def projects(self) -> bool:

@@ -144,3 +144,35 @@ def test_steps_that_resolve_a_peak_are_not_warned_of():
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             gauss.simulate(scene, 5.0, integrator="rk4", step=5e-4, progress=False)
+
+
+# Narrow bumps of a guide, 0.05 m high; each with its slope.
+DELAYS = 3e-8  # [m] at a rate of 1 m/s: a hundred times atol, and the tails of a quotient
+BUMPS = {
+    "quotient": (lambda u: 0.05 / (1 + u * u) ** 3, lambda u: -0.3 * u / (1 + u * u) ** 4),
+    "bell": (lambda u: 0.05 * gm.exp(-u * u), lambda u: -0.1 * u * np.exp(-u * u)),
+    "piece": (
+        lambda u: gm.where(abs(u) < 1.0, 0.05 * (1 - u * u) ** 3, 0.0),
+        lambda u: -0.3 * u * (1 - u * u) ** 2 * (abs(u) < 1.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("width", [0.002, 0.02])
+@pytest.mark.parametrize("bump", BUMPS)
+@pytest.mark.parametrize("integrator", ["dop853", "radau5"])
+def test_bumps_of_a_constraint_are_never_passed_over(bump, width, integrator):
+    """Of (1 + f′²) ẋ² = 1 follows the delay ∫ (√(1 + f′²) − 1) dx, by quadrature."""
+    height, slope = BUMPS[bump]
+    scene = gauss.Scene("guide", gravity=(0.0, 0.0, 0.0))
+    for name, axis in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0))):
+        scene.body(f"body of {name}", 1.0)
+        scene.prismatic(name, "ground", f"body of {name}", axis=axis)
+    scene.start("x", rate=1.0)
+    scene.constrain("guide", lambda view: view.coordinate("y") - height((view.coordinate("x") - 6.1) / width))
+    motion = gauss.simulate(scene, 20.0, integrator=integrator, rtol=1e-10, atol=1e-10, progress=False)
+    delay = quad(
+        lambda u: width * (np.sqrt(1.0 + (slope(u) / width) ** 2) - 1.0), -30.0, 30.0, points=[-1, 0, 1], limit=500
+    )[0]
+    assert delay > 1e3 * DELAYS  # a bump that is passed over delays nothing
+    assert motion.q[-1, 0] == pytest.approx(20.0 - delay, abs=DELAYS)

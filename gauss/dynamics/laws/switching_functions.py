@@ -16,6 +16,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
 from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.laws.constraint_functions import watched_functions
 from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
@@ -378,8 +379,9 @@ def _size(value: Interval) -> Scalar:
 
 
 def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:
-    """Switching functions of traced laws, cached with the system; None where there are none."""
-    if not laws.outputs:
+    """Switching functions of traced laws and constraints, cached with the system; None where there are none."""
+    functions = watched_functions(system, laws)
+    if not functions.outputs:
         return None
-    make = lambda: SwitchingFunctions(system, laws)  # noqa: E731
+    make = lambda: SwitchingFunctions(system, functions)  # noqa: E731
     return cached(system, (SwitchingFunctions, laws.key), make) or None

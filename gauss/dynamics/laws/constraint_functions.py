@@ -1,0 +1,47 @@
+"""Functions of the user in constraints, to be watched within steps as traced laws are: conditions and narrow peaks."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.codegen import Expression, Function
+from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.laws.traced_laws import Laws, symbols
+from gauss.scene import Constraint
+from gauss.system import System
+from gauss.system.relations import Rows, place_relations
+
+
+class WatchedFunctions(NamedTuple):
+    """Traced functions over the symbols of a motion, each with the name of its load or constraint."""
+
+    motion: Kinematics
+    functions: list[tuple[str, Function]]
+
+    @property
+    def outputs(self) -> list[Expression]:
+        """Outputs of all functions."""
+        return [output for _, function in self.functions for output in function.outputs]
+
+
+def watched_functions(system: System, laws: Laws) -> Laws | WatchedFunctions:
+    """Traced laws of loads, and residuals of constraints of the user."""
+    own = [relation for relation in system.scene.relations.values() if type(relation) is Constraint]
+    if not own:
+        return laws
+    motion, relations = symbols(system), place_relations(system, own)
+    pairs = zip(relations.placed, relations.rows(motion), strict=True)
+    traced = [(placed.name, Function("constraint", [], _residuals(rows, placed.velocities))) for placed, rows in pairs]
+    functions = [(name, Function("law", [], _expressions(function.outputs))) for name, function in laws.functions]
+    return WatchedFunctions(motion, [*functions, *traced])
+
+
+def _residuals(rows: Rows, velocities: int) -> list[Expression]:
+    """Position residuals, and slopes and right-hand sides of the last rows, which bind velocities."""
+    first = len(rows.C) - velocities
+    parts = [block[first:] for block in (*rows.A, *rows.B, rows.C)]
+    return _expressions([entry for part in (rows.gap[:first], *parts) for entry in np.ravel(part)])
+
+
+def _expressions(entries) -> list[Expression]:
+    return [entry for entry in entries if isinstance(entry, Expression)]
