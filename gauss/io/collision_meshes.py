@@ -11,7 +11,7 @@ SCHEMES = ("package://", "model://", "file://")
 
 
 def mesh_path(file: Path, named: str) -> Path | None:
-    """Path of a mesh that a robot's file names; None if there is none.
+    """Path of a mesh that a robot's file names; None if there is none, or if it lies outside its package.
 
     Parameters
     ----------
@@ -22,11 +22,13 @@ def mesh_path(file: Path, named: str) -> Path | None:
     """
     scheme = next((scheme for scheme in SCHEMES if named.startswith(scheme)), "")
     rest = named.removeprefix(scheme)
-    if ".." in PurePosixPath(rest).parts and scheme in SCHEMES[:2]:
+    home, in_package = file.resolve().parent, scheme in SCHEMES[:2]
+    if in_package and ".." in PurePosixPath(rest).parts:
         return None
-    home = file.resolve().parent
-    folders = file.resolve().parents[:ABOVE] if scheme in SCHEMES[:2] else [home]
-    return next((folder / rest for folder in folders if (folder / rest).is_file()), None)
+    folders = file.resolve().parents[:ABOVE] if in_package else [home]
+    found = next((folder / rest for folder in folders if (folder / rest).is_file()), None)
+    inside = found is not None and (in_package or found.resolve().is_relative_to(home.parent))  # meshes/ beside urdf/
+    return found if inside else None
 
 
 def mesh_vertices(path: Path, scale) -> np.ndarray:

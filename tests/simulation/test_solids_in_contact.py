@@ -6,6 +6,8 @@ import pytest
 import gauss
 from benchmarks.convex_meshes import heap
 from benchmarks.free_bodies import free_body
+from gauss.errors import GaussError
+from gauss.scene import contact_patch
 
 STEP, G, FRICTION = 1e-3, 9.81, 0.4
 RADIUS = 0.1  # [m]
@@ -59,6 +61,18 @@ def test_a_cylinder_rolls_down_with_two_thirds_of_g_sin(floor):
     assert end.v[-1][0] == pytest.approx(speed, rel=ROLLING)
     assert end.q[-1][0] == pytest.approx(-0.5 + 0.5 * speed * time, abs=2 * speed * STEP)
     assert abs(end.q[-1][2] - RADIUS) < ON_FLOOR
+
+
+def test_nearest_points_that_are_not_found_are_refused_by_the_name_of_the_contact(monkeypatch):
+    scene = gauss.Scene("lost")
+    FLOORS["box"](scene)
+    free_body(scene, "A", 0.4 * RADIUS**2, (0, 0, RADIUS))
+    SOLIDS["cylinder"](scene)
+    scene.contacts_all(friction=FRICTION)
+    system = gauss.compile_scene(scene)
+    monkeypatch.setattr(contact_patch, "FAILED", 0.0)
+    with pytest.raises(GaussError, match="solid on floor"):
+        moved(system, 0.1)
 
 
 def test_a_heap_of_meshes_stays_above_its_floor():

@@ -42,19 +42,19 @@ class PatchKernels:
         self.pairs: dict[int, SolidPair] = {}
         self.patch: list[ContactPoint] = []
         self.features = [Feature(0, signs=(k,)) for k in range(SLOTS)]
-        self.distances, rows = _Entry(self._distances, DISTANCE_INPUTS, SLOTS), _Entry(self._rows, ROW_INPUTS, ROWS)
-        self.rows = [rows]
+        unknown = np.array([-1.0, *[FAR] * (SLOTS - 1)])  # a contact whose row, asked next, is NaN: it is refused by name
+        self.distances = _Entry(self._distances, DISTANCE_INPUTS, unknown)
+        self.rows = [_Entry(self._rows, ROW_INPUTS, np.full(ROWS, np.nan))]
 
     def _distances(self, given: np.ndarray, found: np.ndarray):
-        found[:] = FAR
+        found[:], self.patch = FAR, []
         number = int(self.count[3])
         if number not in self.pairs:
             self.pairs[number] = solid_pair(*self.shapes(number))
-        given = given.copy()  # machine code writes over it
-        pair, reach = self.pairs[number], float(self.settings[0])
-        if not pair.may_touch(given[9:12].tolist(), given[25:28].tolist(), reach):
-            self.patch = []
+        pair, reach, places = self.pairs[number], float(self.settings[0]), given.tolist()
+        if not pair.may_touch(places[9:12], places[25:28], reach):
             return
+        given = given.copy()  # machine code writes over it
         one, other = (SolidPose(own[:9].reshape(3, 3), own[9:12]) for own in (given[:16], given[16:32]))
         self.patch = pair.points(one, other, reach)
         for k, point in enumerate(self.patch):
@@ -82,28 +82,36 @@ def axes_of_contact(x: float, y: float, z: float) -> tuple[tuple[float, float, f
 
 
 class _Entry:
-    """A Python function that machine code calls by its address; what it raises makes its results NaN.
+    """A Python function that machine code calls by its address.
 
     Parameters
     ----------
     function : callable
         (inputs, results) → fills the results.
-    n_in, n_out : int
-        How many there are.
+    n_in : int
+        Number of inputs.
+    failed : ndarray
+        Results where the function raises: machine code cannot pass that on.
     """
 
-    def __init__(self, function: Callable[[np.ndarray, np.ndarray], None], n_in: int, n_out: int):
-        kinds = ctypes.c_double * n_in, ctypes.c_double * n_out
+    def __init__(self, function: Callable[[np.ndarray, np.ndarray], None], n_in: int, failed: np.ndarray):
+        kinds = ctypes.c_double * n_in, ctypes.c_double * failed.size
+        views: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
 
         def called(n, given, stride, found, other_stride):
-            results = np.ctypeslib.as_array(kinds[1].from_address(found))
+            key = given, found
+            if key not in views:  # machine code has few places for them
+                views.clear()
+                of_inputs, of_results = (kind.from_address(at) for kind, at in zip(kinds, key, strict=True))
+                views[key] = np.ctypeslib.as_array(of_inputs), np.ctypeslib.as_array(of_results)
+            inputs, results = views[key]
             try:
-                function(np.ctypeslib.as_array(kinds[0].from_address(given)), results)
+                function(inputs, results)
             except KeyboardInterrupt:
-                results[:] = np.nan
+                results[:] = failed
                 _thread.interrupt_main()  # raised again once machine code has returned
-            except Exception:  # machine code cannot pass it on; a contact without slope is refused by name
-                results[:] = np.nan
+            except Exception:  # results say so
+                results[:] = failed
 
         self.code = SIGNATURE(called)
 

@@ -12,7 +12,7 @@ from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
 from gauss.io.collision_meshes import mesh_path, mesh_vertices
 from gauss.io.guard import Source
 from gauss.io.numbers import add_stop, bounds
-from gauss.io.urdf.guard import guarded, placed, require_own_meshes
+from gauss.io.urdf.guard import guarded, placed
 from gauss.io.urdf.numbers import value, values
 from gauss.io.urdf.transmissions import add_motors
 from gauss.scene import GROUND, Box, Capsule, Collider, ConvexMesh, Cylinder, Scene, Sphere
@@ -71,7 +71,6 @@ def with_extras(
     if not resistance:
         left += _named("damping and friction of {} (resistance=True or --read resistance reads them)", resisting)
     if collisions:
-        require_own_meshes(source)
         unlike = chain.from_iterable(_shapes(scene, source, link) for link in source.root.findall("link"))
         left += _named("collision shapes that are not modelled: {}", unlike)
     if motors:
