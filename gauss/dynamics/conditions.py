@@ -13,6 +13,8 @@ from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
 from gauss.integrators import ExplicitPair, FixedStep
 from gauss.scene import Contact, Points
+from gauss.scene.contact_pairs import have_closed_form
+from gauss.scene.patch_distances import no_closed_form
 from gauss.system import System, build, phase_scene, sides
 from gauss.system.contact_gaps import of_shapes, slips
 from gauss.system.elimination_cost import MOST_WORK
@@ -185,9 +187,21 @@ def few_contact_operations(ask: Question) -> list[str]:
     scene = ask.system.scene
     if not shapes_in_contact(ask):
         return []
+    found = closed_form_contacts(ask)
+    if found:
+        return found
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
     work = sum(_operations(scene.shapes[one.shape], scene.shapes[one.other]) for one in contacts)
     return [f"its contacts would have about {work:.0e} operations"] if work > MOST_CONTACT_OPERATIONS else []
+
+
+def closed_form_contacts(ask: Question) -> list[str]:
+    """The distances of all shapes that may touch are closed forms."""
+    shapes = ask.system.scene.shapes
+    contacts = [contact for contact in ask.system.scene.contacts.values() if isinstance(contact, Contact)]
+    pairs = ((shapes[one.shape], shapes[one.other]) for one in contacts)
+    odd = next((pair for pair in pairs if not have_closed_form(*pair)), None)
+    return [no_closed_form(*odd)] if odd else []
 
 
 def _operations(one, other) -> int:

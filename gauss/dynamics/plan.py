@@ -34,6 +34,7 @@ from collections.abc import Callable, Hashable
 from gauss.codegen import IdentityKey, content_key
 from gauss.dynamics.conditions import (
     callbacks,
+    closed_form_contacts,
     compilable,
     contacts_alone,
     explicit,
@@ -112,6 +113,8 @@ def _beyond_accelerations(ask: Question) -> str:
 
 def _refused(ask: Question, why: str) -> str:
     needs = _beyond_accelerations(ask)
+    if closed_form_contacts(ask):
+        return f"scene {ask.system.scene.name!r}: {why}; use integrator='time_stepping' with a step, and the backend 'auto'."
     return f"{needs} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
 
 
@@ -154,9 +157,9 @@ MOTIONS = RuleTable(
         Rule("time stepping", "compiled", "certified", is_time_stepping, (*_STEP, few_contact_operations)),
         Rule("time stepping", "pair kernels", "", _both(is_time_stepping, shapes_in_contact), _PAIR_KERNELS),
         Rule("time stepping", "callbacks", "certified", _both(is_time_stepping, has_opaque_laws), _CALLING_STEP),
-        Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs,)),
-        Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs)),
-        Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs,)),
+        Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs, closed_form_contacts)),
+        Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, closed_form_contacts)),
+        Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, closed_form_contacts)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
         Rule("compiled loop", "compiled", "refined", _both(_smooth, _without_feedback), _LOOP),
         Rule("compiled loop", "compiled", "certified", _both(_smooth, _with_feedback), _LOOP),
@@ -176,7 +179,7 @@ TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 # Batches (ensembles) of motions of one system.
 BATCHES = RuleTable(
     (
-        Rule("batch", "compiled", "simulate", is_time_stepping, _STEP),
+        Rule("batch", "compiled", "simulate", is_time_stepping, (*_STEP, closed_form_contacts)),
         Rule("batch", "compiled", "simulate", lambda ask: not is_time_stepping(ask), (compilable, few_bodies, traced_laws)),
     ),
     lambda ask, why: (

@@ -12,7 +12,7 @@ from gauss.scene import Scene
 from gauss.scene.toml import from_tables, tables, write_toml
 
 EXTRAS = ("limits", "resistance", "collisions", "motors")  # of a URDF file, where they are asked for
-OF_SDF = ("root", "limits", "root_folder", "missing")
+OF_SDF = ("root", "limits", "root_folder", "missing", "collisions")
 OF_USD = ("limits", "root_folder")
 OF_MJCF = ("limits", "contacts", "root_folder", "keyframe")
 
@@ -34,7 +34,8 @@ def load(source, **options):
         For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``inertia="as given"``, ``limits="start"|"stops"``,
         ``resistance=True``, ``collisions=True`` and ``motors=True`` (see :func:`gauss.io.urdf.extras.with_extras`).
 
-        For .sdf ``root``, ``limits``, ``root_folder=FOLDER`` and ``missing`` (see :func:`gauss.io.sdf.read.read_sdf`).
+        For .sdf ``root``, ``limits``, ``root_folder=FOLDER``, ``missing`` and ``collisions=True`` (see
+        :func:`gauss.io.sdf.read.read_sdf`).
 
         For .xml ``limits``, ``contacts=True``, ``root_folder=FOLDER`` and ``keyframe=NAME`` (see
         :func:`gauss.io.mjcf.read.read_mjcf`).

@@ -4,6 +4,8 @@ from gauss.scene.clutches import Clutch, Freewheel, JointLink
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact, Guard, Slip
 from gauss.scene.contact_distances import FeaturePair
+from gauss.scene.convex_mesh import ConvexMesh
+from gauss.scene.curved_shapes import Cone, Cylinder, Ellipsoid
 from gauss.scene.elastic import Elastic, ElasticLink
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
@@ -34,13 +36,17 @@ __all__ = [
     "Capsule",
     "Coincident",
     "Collider",
+    "Cone",
     "Constraint",
     "Contact",
+    "ConvexMesh",
     "Coupling",
+    "Cylinder",
     "Distance",
     "Drive",
     "Elastic",
     "ElasticLink",
+    "Ellipsoid",
     "Force",
     "Frame",
     "Freewheel",

@@ -23,6 +23,22 @@ class ContactBuilder(SceneBuilder):
         """Give a body a box of three edges [m]; see :class:`gauss.scene.Box`."""
         return self.add(elements.Box(name, name_of(body), at, size, rotation))
 
+    def ellipsoid(self, name: str, body, radii, at=(0, 0, 0), rotation=(0, 0, 0)) -> "elements.Ellipsoid":
+        """Give a body an ellipsoid of three half axes [m]; see :class:`gauss.scene.Ellipsoid`."""
+        return self.add(elements.Ellipsoid(name, name_of(body), at, radii, rotation))
+
+    def cylinder(self, name: str, body, radius: float, length: float, at=(0, 0, 0), axis=(0, 0, 1)) -> "elements.Cylinder":
+        """Give a body a cylinder with flat ends; see :class:`gauss.scene.Cylinder`."""
+        return self.add(elements.Cylinder(name, name_of(body), at, radius, length, axis))
+
+    def cone(self, name: str, body, radius: float, length: float, at=(0, 0, 0), axis=(0, 0, 1)) -> "elements.Cone":
+        """Give a body a cone; see :class:`gauss.scene.Cone`."""
+        return self.add(elements.Cone(name, name_of(body), at, radius, length, axis))
+
+    def mesh(self, name: str, body, vertices, at=(0, 0, 0), rotation=(0, 0, 0), faces=()) -> "elements.ConvexMesh":
+        """Give a body the convex hull of points [m]; see :class:`gauss.scene.ConvexMesh`."""
+        return self.add(elements.ConvexMesh(name, name_of(body), at, vertices, rotation, faces))
+
     def points(self, name: str, body, points, radius: float = 0.0, at=(0, 0, 0)) -> "elements.Points":
         """Give a body feet: points, or balls around them; see :class:`gauss.scene.Points`."""
         return self.add(elements.Points(name, name_of(body), at, points, radius))

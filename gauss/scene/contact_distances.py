@@ -39,6 +39,11 @@ class FeaturePair:
     the ``margin`` of that becomes negative where other features take over.
     """
 
+    @property
+    def is_traced(self) -> bool:
+        """Whether its distance is a closed form, the second derivatives of which hold over a whole time step."""
+        return True
+
     def touch(self, at) -> Touch:
         """Contact distance, point and normal, by a view of the mechanism."""
         raise NotImplementedError
@@ -62,6 +67,11 @@ class Turned(FeaturePair):
         """Contact distance, with the opposite normal."""
         gap, place, normal = self.place.touch(at)
         return Touch(gap, place, -normal)
+
+    @property
+    def is_traced(self) -> bool:
+        """As the pair."""
+        return self.place.is_traced
 
     def fixed(self, at) -> "Turned | None":
         """Pair of the present features."""

@@ -1,12 +1,16 @@
 """Pairs of features (corners, edges, faces) by which two shapes may touch, for every pair of kinds of shapes."""
 
 from collections.abc import Callable
-from itertools import product
+from itertools import combinations_with_replacement, product
 
 from gauss.errors import SceneError
 from gauss.scene.box_distances import CornerOnBox, Edges
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.contact_distances import Balls, Capsules, FeaturePair, OnCapsule, OnEdge, OnHalfSpace, Turned
+from gauss.scene.convex_mesh import ConvexMesh
+from gauss.scene.curved_distances import ApexOnHalfSpace, EllipsoidOnHalfSpace, rim
+from gauss.scene.curved_shapes import Cone, ConvexCollider, Cylinder, Ellipsoid
+from gauss.scene.patch_distances import patch_points
 
 BOTH_SIDES = (-1, 1)
 
@@ -24,7 +28,9 @@ def places(first: Collider, second: Collider) -> list[FeaturePair]:
         return RULES[kinds](first, second)
     if kinds[::-1] in RULES:
         return [Turned(place) for place in RULES[kinds[::-1]](second, first)]
-    raise SceneError(f"{first.what} and {second.what}: two half-spaces meet almost everywhere, so they make no contact.")
+    if set(kinds) == {HalfSpace}:
+        raise SceneError(f"{first.what} and {second.what}: two half-spaces meet almost everywhere, so they make no contact.")
+    raise SceneError(f"{first.what} and {second.what} have no rule of contact; use spheres in place of points.")
 
 
 def have_rule(first: Collider, second: Collider) -> bool:
@@ -33,6 +39,11 @@ def have_rule(first: Collider, second: Collider) -> bool:
     if not (first.is_round or second.is_round) and set(kinds) == {Points}:
         return False
     return kinds in RULES or kinds[::-1] in RULES
+
+
+def have_closed_form(first: Collider, second: Collider) -> bool:
+    """Whether the distance of two shapes that may touch is traced; others are found by iteration in time stepping."""
+    return all(place.is_traced for place in places(first, second))
 
 
 def have_edges(first: Collider, second: Collider) -> bool:
@@ -78,3 +89,14 @@ RULES |= {(kind, HalfSpace): _on_half_space for kind in (Sphere, Points, Capsule
 RULES |= {(first, second): _balls for first in (Sphere, Points) for second in (Sphere, Points)}
 RULES |= {(kind, Capsule): _on_capsule for kind in (Sphere, Points)} | {(Capsule, Capsule): _capsules}
 RULES |= {(kind, Box): _on_box for kind in (Sphere, Points)} | {(Capsule, Box): _capsule_on_box, (Box, Box): _boxes}
+RULES |= {
+    (Ellipsoid, HalfSpace): lambda first, second: [EllipsoidOnHalfSpace(first, second)],
+    (Cylinder, HalfSpace): lambda first, second: [*rim(first, second, -1), *rim(first, second, 1)],
+    (Cone, HalfSpace): lambda first, second: [*rim(first, second, -1), ApexOnHalfSpace(first, second)],
+}
+SOLIDS: tuple[type[Collider], ...] = (Sphere, Capsule, Box, Ellipsoid, Cylinder, Cone, ConvexMesh, HalfSpace)
+RULES |= {
+    (first, second): patch_points
+    for first, second in combinations_with_replacement(SOLIDS, 2)
+    if (first, second) not in RULES and (issubclass(first, ConvexCollider) or issubclass(second, ConvexCollider))
+}

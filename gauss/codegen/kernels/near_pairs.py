@@ -89,7 +89,7 @@ class _NearPairsWriter:
                 given[16 * side + i] = column[i]
             for i in range(4):
                 given[16 * side + 12 + i] = column[24 + i]
-        given[32] = self.settings[1]
+        given[32], self.count[3] = self.settings[1], p
         self._call(kind[0], given, self.gaps)
         least, features = r.variable(np.inf), kind[1]
         with r.each(features) as f:

@@ -11,8 +11,11 @@ from gauss.dynamics.contact.free_bodies import place_function
 from gauss.dynamics.contact.moreau_step import START_OVERLAP
 from gauss.dynamics.contact.near_contacts import COLUMNS, NearContacts, Overlap
 from gauss.dynamics.contact.pair_kernels import SIGNS, PairKernels, pair_kernels
+from gauss.dynamics.contact.patch_kernels import PatchKernels
 from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
 from gauss.scene import HalfSpace
+from gauss.scene.contact_pairs import RULES
+from gauss.scene.patch_distances import patch_points
 
 FIRST_ROOM = 64  # contacts that there is room for at first
 
@@ -47,13 +50,24 @@ class NearDetection:
         self.edges = np.minimum(edges[first], edges[second])
         self.moved, self.bodies = np.empty(n * (MOVED + 3)), np.empty((24, bodies))
         self.deepest, self.settings = np.empty(first.size), np.array([0.0, length, START_OVERLAP * length])
-        self.kinds: dict[int, PairKernels] = {}
+        self.kinds: dict[int, PairKernels | PatchKernels] = {}
         self._make_room(FIRST_ROOM)
         self.kind, self.feature = np.zeros((self.codes.size, KIND), dtype=np.int64), np.zeros((0, FEATURE), dtype=np.int64)
-        self.signs, self.count, self.depth = np.zeros((0, SIGNS)), np.zeros(3, dtype=np.int64), np.zeros(1)
+        self.signs, self.count, self.depth = np.zeros((0, SIGNS)), np.zeros(4, dtype=np.int64), np.zeros(1)
 
     def _make_room(self, capacity: int):
         self.rows, self.found = np.empty((capacity, ROW)), np.empty((capacity, 2), dtype=np.int64)
+
+    def _kernels(self, code: int) -> PairKernels | PatchKernels:
+        """Kernels of a pair of kinds of shapes."""
+        one, other = divmod(code, len(KINDS))
+        kinds = KINDS[one], KINDS[other]
+        if RULES[kinds] is not patch_points:
+            return pair_kernels(kinds)
+        parts, (first, second), shapes = self.table.parts, self.pairs, self.table.scene.shapes
+        return PatchKernels(
+            lambda p: (shapes[parts[first[p]].shape], shapes[parts[second[p]].shape]), self.count, self.settings
+        )
 
     def connect(self):
         """Take the addresses of the kernels anew: a new motion may run in another tier."""
@@ -95,10 +109,9 @@ class NearDetection:
         while True:
             counts = len(table.parts), len(self.pair), len(self.rows), self.bodies.shape[1]
             self.code(counts, self.addresses)
-            m, missed, unmade = self.count.tolist()
+            m, missed, unmade, _ = self.count.tolist()
             if unmade:
-                one, other = divmod(int(self.codes[unmade - 1]), len(KINDS))
-                self.kinds[unmade - 1] = pair_kernels((KINDS[one], KINDS[other]))
+                self.kinds[unmade - 1] = self._kernels(int(self.codes[unmade - 1]))
                 self.connect()
             elif m > len(self.rows):
                 self._make_room(2 * m)

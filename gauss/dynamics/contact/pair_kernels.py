@@ -20,11 +20,12 @@ import numpy as np
 
 from gauss.codegen import Kernel, forward, from_disk, write
 from gauss.rotations import cross
-from gauss.scene import Box, Capsule, Collider, HalfSpace, Sphere
+from gauss.scene import Box, Capsule, Collider, Cone, Cylinder, Ellipsoid, HalfSpace, Sphere
 from gauss.scene.box_distances import CornerOnBox, Edges, separation
 from gauss.scene.contact import tangents
 from gauss.scene.contact_distances import Balls, Capsules, FeaturePair, OnCapsule, OnEdge, OnHalfSpace, Turned
 from gauss.scene.contact_pairs import BOTH_SIDES, have_edges, places
+from gauss.scene.curved_distances import LOWEST, QUARTERS, ApexOnHalfSpace, EllipsoidOnHalfSpace, RimOnHalfSpace
 
 POSE = 24  # rotation (9), centre (3), angular velocity, velocity of the centre (6), rates of both where q̈ = 0 (6)
 PLACE = 12  # of these rotation and centre
@@ -44,13 +45,13 @@ class Feature(NamedTuple):
         Which of the functions ``rows`` it has.
     axes : tuple of int
         Axes of both boxes that count as their first.
-    signs : tuple of int
-        Sides on which the features lie.
+    signs : tuple of float
+        Sides on which the features lie; cosine and sine of a place on a rim.
     """
 
     function: int
     axes: tuple[int, int] = (0, 0)
-    signs: tuple[int, ...] = ()
+    signs: tuple[float, ...] = ()
 
 
 class PairOfShapes:
@@ -109,6 +110,10 @@ def _shape(kind: type[Collider], name: str, sizes) -> Any:
         given |= {"radius": radius, "length": 2.0 * half[2], "axis": (0.0, 0.0, 1.0)}
     elif kind is Box:
         given |= {"size": 2.0 * half, "rotation": (0.0, 0.0, 0.0)}
+    elif kind is Ellipsoid:
+        given |= {"radii": half, "rotation": (0.0, 0.0, 0.0)}
+    elif kind in (Cylinder, Cone):
+        given |= {"radius": half[0], "length": 2.0 * half[2], "axis": (0.0, 0.0, 1.0)}
     elif kind is HalfSpace:
         given["normal"] = (0.0, 0.0, 1.0)
     for key, value in given.items():
@@ -128,9 +133,26 @@ ALONE: dict[tuple[type, type], Callable] = {
 }
 
 
+def _rim(side: int) -> list[Feature]:
+    return [Feature(0, signs=(side, *direction)) for direction in (LOWEST, *QUARTERS)]
+
+
+def _on_rim(a, b, s) -> FeaturePair:
+    return RimOnHalfSpace(a, b, s[0], (s[1], s[2]))
+
+
+CURVED: dict[tuple[type, type], tuple[list[Feature], list[Callable]]] = {
+    (Ellipsoid, HalfSpace): ([Feature(0)], [lambda a, b, s: EllipsoidOnHalfSpace(a, b)]),
+    (Cylinder, HalfSpace): ([*_rim(-1), *_rim(1)], [_on_rim]),
+    (Cone, HalfSpace): ([*_rim(-1), Feature(1)], [_on_rim, lambda a, b, s: ApexOnHalfSpace(a, b)]),
+}
+
+
 def _features(kinds: tuple[type, type]) -> tuple[list[Feature], list[Callable]]:
     """Pairs of features in the order of :func:`gauss.scene.contact_pairs.places`, and makers of one by shapes and signs."""
     one, other = kinds
+    if kinds in CURVED:
+        return CURVED[kinds]
     if kinds in ALONE:
         return [Feature(0)], [ALONE[kinds]]
     corners = [Feature(0, signs=s) for s in CORNERS[one]]
@@ -214,7 +236,8 @@ def _rows(kinds: tuple[type, type], maker: Callable[..., FeaturePair]) -> Kernel
         rates = [*view.derivative([gap]), *(axis @ slip for axis in axes)]
         arms = (1.0, point - x), (-1.0, point - x_other)
         J = [[*(sign * cross(arm, axis)), *(sign * axis), 0.0, 0.0] for sign, arm in arms for axis in (normal, *axes)]
-        return [gap], point, *J, view.derivative(rates)
+        bias = view.derivative(rates) if place.is_traced else np.zeros(3)
+        return [gap], point, *J, bias
 
     return Kernel(write(rows, POSE, SIZES, 3, POSE, SIZES, 3, 1, SIGNS, name="rows"))
 

@@ -7,17 +7,18 @@ import numpy as np
 
 from gauss.dynamics.contact.pair_kernels import SIZES
 from gauss.rotations import along
-from gauss.scene import Box, Capsule, Collider, Contact, HalfSpace, Points, Sphere
+from gauss.scene import Box, Capsule, Collider, Cone, Contact, ConvexMesh, Cylinder, Ellipsoid, HalfSpace, Points, Sphere
+from gauss.scene.curved_shapes import ConvexCollider
 from gauss.scene.values import unit
 from gauss.system import System
 
-KINDS = (Sphere, Capsule, Box, HalfSpace)
+KINDS = (Sphere, Capsule, Box, Ellipsoid, Cylinder, Cone, ConvexMesh, HalfSpace)
 MOST_FEATURES = 64  # pairs of features of one pair of parts, for keys of contacts
 RANK = {kind: k for k, kind in enumerate(KINDS)}  # the order of kinds in a rule of contacts
 
 
 class ConvexPart(NamedTuple):
-    """Convex part of a shape: ball, capsule, box or half-space.
+    """Convex part of a shape.
 
     Attributes
     ----------
@@ -30,7 +31,7 @@ class ConvexPart(NamedTuple):
     rotation, centre : ndarray
         Its axes (3, 3) and centre (3,) in the principal central frame of the body.
     sizes : ndarray, shape (4,)
-        Half edges, or half length as the last one; radius [m].
+        Half edges of the box around it, or half length as the last one; radius beyond it [m].
     """
 
     shape: str
@@ -52,7 +53,9 @@ def convex_parts(system: System, shape: Collider) -> list[ConvexPart]:
         axes, half = along(unit(shape.axis)), np.array([0.0, 0.0, 0.5 * shape.length])
     elif isinstance(shape, HalfSpace):
         axes = along(unit(shape.normal))
-    sizes = np.append(half, shape.radius)
+    elif isinstance(shape, ConvexCollider):
+        axes, half, centres = shape.axes, shape.half_edges, shape.centre[None]
+    sizes = np.append(half, 0.0 if isinstance(shape, ConvexCollider) else shape.radius)
     places = [(frame.R @ axes, frame.p + frame.R @ centre) for centre in centres]
     return [ConvexPart(shape.name, kind, frame.body, *place, sizes) for place in places]
 

@@ -11,7 +11,23 @@ import numpy as np
 from gauss import rotations
 from gauss.errors import FileError
 from gauss.io.mjcf.elements import line, reference_place
-from gauss.scene import GROUND, Box, Capsule, Contact, HalfSpace, JointFriction, Points, Rope, Sphere, Stop
+from gauss.scene import (
+    GROUND,
+    Box,
+    Capsule,
+    Cone,
+    Contact,
+    ConvexMesh,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    JointFriction,
+    Points,
+    Rope,
+    Sphere,
+    Stop,
+)
+from gauss.scene.curved_shapes import ConvexCollider
 from gauss.scene.values import unit
 
 FAR = 1e9  # rad or m: where a joint is stopped on the side that has no stop
@@ -92,6 +108,8 @@ def _geoms(shape, document) -> list[str]:
     if isinstance(shape, HalfSpace) and document.on_body(shape.body, np.zeros(3), np.eye(3))[0] != GROUND:
         raise FileError(f"{shape.what}: planes of MuJoCo do not move; use a box.")
     axes = np.eye(3)
+    if isinstance(shape, ConvexCollider):
+        return [_geom(document, shape, shape.name, shape.at, _convex(document, shape), shape.axes)]
     if isinstance(shape, Sphere):
         geom = {"type": "sphere", "size": shape.radius}
     elif isinstance(shape, Capsule):
@@ -101,6 +119,20 @@ def _geoms(shape, document) -> list[str]:
     else:
         geom, axes = {"type": "plane", "size": [SHOWN, SHOWN, SHOWN]}, rotations.along(unit(shape.normal))
     return [_geom(document, shape, shape.name, shape.at, geom, axes)]
+
+
+def _convex(document, shape: ConvexCollider) -> dict:
+    """Type and size of a geom; the vertices of a mesh are an asset."""
+    if isinstance(shape, Ellipsoid):
+        return {"type": "ellipsoid", "size": shape.radii}
+    if isinstance(shape, Cylinder):
+        return {"type": "cylinder", "size": [shape.radius, 0.5 * shape.length]}
+    if isinstance(shape, ConvexMesh):
+        if ("mesh", shape.name) not in document.taken:
+            document.add(document.section("asset"), "mesh", name=shape.name, vertex=np.ravel(shape.vertices))
+        return {"type": "mesh", "mesh": shape.name}
+    assert isinstance(shape, Cone)
+    raise FileError(f"{shape.what}: MuJoCo has no cones; use a mesh.")
 
 
 def _geom(document, shape, name: str, at, attributes: dict, axes=None) -> str:

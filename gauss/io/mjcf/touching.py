@@ -14,10 +14,11 @@ from gauss.errors import SceneError
 from gauss.io.mjcf.names import SCALAR, Named
 from gauss.io.mjcf.switches import is_off
 from gauss.io.numbers import add_stop
-from gauss.scene import Box, Capsule, HalfSpace, Scene, Sphere
+from gauss.scene import Box, Capsule, ConvexMesh, Cylinder, Ellipsoid, HalfSpace, Scene, Sphere
 
-PLANE, SPHERE, CAPSULE, BOX = (
-    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("PLANE", "SPHERE", "CAPSULE", "BOX")
+PLANE, SPHERE, CAPSULE, BOX, CYLINDER, ELLIPSOID, MESH = (
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
+    for name in ("PLANE", "SPHERE", "CAPSULE", "BOX", "CYLINDER", "ELLIPSOID", "MESH")
 )
 
 
@@ -106,4 +107,11 @@ def _shape(scene: Scene, named: Named, geom: int):
         return scene.add(Capsule(name, body, at, float(size[0]), 2.0 * float(size[1]), tuple(R[:, 2])))
     if kind == BOX:
         return scene.add(Box(name, body, at, tuple(2.0 * size), R))
+    if kind == CYLINDER:
+        return scene.add(Cylinder(name, body, at, float(size[0]), 2.0 * float(size[1]), tuple(R[:, 2])))
+    if kind == ELLIPSOID:
+        return scene.add(Ellipsoid(name, body, at, tuple(size), R))
+    if kind == MESH:
+        start, count = (int(of[model.geom_dataid[geom]]) for of in (model.mesh_vertadr, model.mesh_vertnum))
+        return scene.add(ConvexMesh(name, body, at, model.mesh_vert[start : start + count].astype(float), R))
     return scene.add(HalfSpace(name, body, at, tuple(R[:, 2]))) if kind == PLANE else None

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
 from gauss.io.guard import Source, checked_root, read_xml
 from gauss.io.numbers import add_stop
+from gauss.io.sdf.collisions import shape_of
 from gauss.io.sdf.elements import WARNED, check, check_link
 from gauss.io.sdf.includes import UNBOUNDED, Includes
 from gauss.io.sdf.inertia import of_link
@@ -25,7 +26,14 @@ ROOTS, LIMITS, MISSING = ("fixed", "free"), ("start", "stops"), ("refused", "lef
 NOT_READ = {"population": "put its models into the file", "state": "put its poses into the models"}
 
 
-def read_sdf(path, root: str | None = None, limits: str = "start", root_folder=None, missing: str = "refused") -> Scene:
+def read_sdf(
+    path,
+    root: str | None = None,
+    limits: str = "start",
+    root_folder=None,
+    missing: str = "refused",
+    collisions: bool = False,
+) -> Scene:
     """Scene of an SDFormat file: of a model, or of all models of a world.
 
     Links are bodies, frames are named frames; in a world of several models, and of nested models, they and joints are
@@ -45,6 +53,9 @@ def read_sdf(path, root: str | None = None, limits: str = "start", root_folder=N
     missing : str
         "refused": every included model must be found; "left out": those that are not, as of models on a server, are named
         in a warning.
+    collisions : bool
+        Whether collisions become shapes, called "link.collision": boxes, spheres, capsules, cylinders, cones, ellipsoids,
+        planes and hulls of meshes; contacts are added with ``scene.contacts_all`` or ``scene.contact``.
 
     Raises
     ------
@@ -54,7 +65,8 @@ def read_sdf(path, root: str | None = None, limits: str = "start", root_folder=N
     Warns
     -----
     NotImportedWarning
-        Of collisions, plugins, actors and settings of solvers, which are not read.
+        Of plugins, actors and settings of solvers, which are not read, and of collisions without counterpart or that are not
+        asked for.
     """
     if root not in (None, *ROOTS):
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
@@ -68,14 +80,15 @@ def read_sdf(path, root: str | None = None, limits: str = "start", root_folder=N
     source = read_xml(path, ("sdf",), limits=UNBOUNDED, loose_comments=True)
     includes = Includes(source, folder, missing == "left out")
     includes.expand(source.root, source.path)
-    reader = _SdfReader(source)
+    reader = _SdfReader(source, collisions)
     try:
         scene = reader.scene(root, limits == "stops")
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
     gone = ", ".join(dict.fromkeys(includes.missing))
     left = [f"included models that are not there: {gone}"] if gone else []
-    left += [what for tag, what in WARNED.items() if tag in reader.left]
+    left += [what for tag, what in WARNED.items() if tag in reader.left - ({"collision"} if collisions else set())]
+    left += [f"collisions without counterpart: {', '.join(reader.unlike)}"] if reader.unlike else []
     if left:
         warnings.warn(f"{path}: not read: {', '.join(left)}.", NotImportedWarning, stacklevel=3)
     return scene
@@ -103,8 +116,8 @@ def _gravity(source: Source, world: Element) -> tuple[float, ...]:
 class _SdfReader:
     """One file while it becomes a scene."""
 
-    def __init__(self, source: Source):
-        self.source, self.left = source, set[str]()
+    def __init__(self, source: Source, collisions: bool = False):
+        self.source, self.left, self.collisions, self.unlike = source, set[str](), collisions, list[str]()
         world = _world(source)
         self.world = Scope(source, world)
         if not self.world.models:
@@ -146,6 +159,7 @@ class _SdfReader:
         R, p = compose(scope.pose, scope.of(name))
         if scope.is_static:
             self.result.frame(f"{scope.prefix}{name}", GROUND, p, R)
+            self._shapes(scope, element, f"{scope.prefix}{name}")
             return
         found = of_link(self.source, element, lambda collision: self._in_link(scope, name, collision))
         body = self._body(scope, name)
@@ -153,6 +167,17 @@ class _SdfReader:
         if text(element, "gravity") not in ("true", "1", ""):
             weight = tuple(-found.mass * float(g) for g in self.result.gravity)
             self.result.force(f"no gravity on {body}", body, weight)
+        self._shapes(scope, element, body)
+
+    def _shapes(self, scope: Scope, link: Element, carrier: str):
+        """Shapes of a link, where collisions are asked for."""
+        for collision in link.findall("collision") if self.collisions else []:
+            name = f"{scope.prefix}{link.get('name', '')}.{collision.get('name', '')}"
+            made = shape_of(self.source, collision, name, carrier, self._in_link(scope, link.get("name", ""), collision))
+            if made is None:
+                self.unlike.append(name)
+            else:
+                self.result.add(made)
 
     def _in_link(self, scope: Scope, link: str, element: Element):
         """Pose of a part of a link in it."""

@@ -9,12 +9,13 @@ from xml.etree.ElementTree import Element
 
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
+from gauss.io.collision_meshes import mesh_path, mesh_vertices
 from gauss.io.guard import Source
 from gauss.io.numbers import add_stop, bounds
 from gauss.io.urdf.guard import guarded, placed
 from gauss.io.urdf.numbers import value, values
 from gauss.io.urdf.transmissions import add_motors
-from gauss.scene import GROUND, Box, Capsule, Scene, Sphere
+from gauss.scene import GROUND, Box, Capsule, Collider, ConvexMesh, Cylinder, Scene, Sphere
 
 LIMITS = ("start", "stops")
 MANY = 4  # names that a warning gives before it counts
@@ -42,9 +43,9 @@ def with_extras(
     resistance : bool
         Whether ``<dynamics>`` is read: damping as a damper [N m s/rad, N s/m], friction as a joint that sticks and slips.
     collisions : bool
-        Whether spheres, boxes and capsules of ``<collision>`` become shapes, named LINK or LINK.2 …; contacts are added with
-        ``scene.contacts_all``, of all shapes but those of neighbours, or with ``scene.contact``. Cylinders and meshes are
-        not modelled.
+        Whether spheres, boxes, capsules, cylinders and hulls of meshes of ``<collision>`` become shapes, named LINK or
+        LINK.2 …; contacts are added with ``scene.contacts_all``, of all shapes but those of neighbours, or with
+        ``scene.contact``.
     motors : bool
         Whether each simple ``<transmission>`` becomes an input, named like its actuator: the torque [N m] or force [N] of
         the motor, which acts on the joint times the reduction, limited by the effort of the joint.
@@ -139,7 +140,7 @@ def _shapes(scene: Scene, source: Source, link: Element) -> list[str]:
     return unlike
 
 
-def _shape(source: Source, name: str, frame: str, shape: Element, origin: Element | None) -> Box | Capsule | Sphere | None:
+def _shape(source: Source, name: str, frame: str, shape: Element, origin: Element | None) -> Collider | None:
     """Shape of the geometry of a collision; None if there is no such shape."""
     none = (0.0, 0.0, 0.0)
     at, rpy = (none if origin is None else values(source, origin, key, none) for key in ("xyz", "rpy"))
@@ -151,7 +152,14 @@ def _shape(source: Source, name: str, frame: str, shape: Element, origin: Elemen
     if shape.tag == "capsule":
         radius, length = (value(source, shape, key) for key in ("radius", "length"))
         return Capsule(name, frame, at, radius, length, tuple(R[:, 2]))
-    return None
+    if shape.tag == "cylinder":
+        radius, length = (value(source, shape, key) for key in ("radius", "length"))
+        return Cylinder(name, frame, at, radius, length, tuple(R[:, 2]))
+    path = mesh_path(Path(source.path), shape.get("filename", "")) if shape.tag == "mesh" else None
+    if path is None:
+        return None
+    vertices = mesh_vertices(path, values(source, shape, "scale", (1.0, 1.0, 1.0)))
+    return ConvexMesh(name, frame, at, tuple(map(tuple, vertices)), R)
 
 
 def _frame(scene: Scene, link: str) -> str:

@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 import trimesh
 
-from gauss.scene import GROUND, Box, Capsule, Points, Sphere
+from gauss.scene import GROUND, Box, Capsule, Cone, ConvexMesh, Cylinder, Ellipsoid, Points, Sphere
 from gauss.system import System
 from gauss.view.skeleton import lines, skeleton
 
@@ -163,12 +163,26 @@ def _solid(shape, com=(0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
         return _joined([_rod(start, end, shape.radius), _ball(shape.radius, start), _ball(shape.radius, end)])
     if isinstance(shape, Box):
         return trimesh.creation.box(extents=shape.size, transform=_pose(shape.axes, shape.at))
+    if isinstance(shape, ConvexMesh):
+        return trimesh.convex.convex_hull(shape.corners)
+    if isinstance(shape, Cylinder | Cone | Ellipsoid):
+        return _curved(shape).apply_transform(_pose(shape.axes, shape.at))
     if isinstance(shape, Points):
         corners = np.vstack([shape.corners, com])
         if np.linalg.matrix_rank(corners - corners[0], tol=FLAT * np.ptp(corners, axis=0).max()) == 3:
             return trimesh.convex.convex_hull(corners)
         return _joined([_ball(shape.radius or DOT, corner) for corner in shape.corners])
     return None
+
+
+def _curved(shape: Cylinder | Cone | Ellipsoid) -> trimesh.Trimesh:
+    """Mesh of a curved shape in its own axes."""
+    if isinstance(shape, Ellipsoid):
+        return _ball(1.0, np.zeros(3)).apply_scale(shape.radii)
+    if isinstance(shape, Cylinder):
+        return trimesh.creation.cylinder(radius=shape.radius, height=shape.length, sections=SIDES)
+    cone = trimesh.creation.cone(radius=shape.radius, height=shape.length, sections=SIDES)
+    return cone.apply_translation((0.0, 0.0, -0.5 * shape.length))
 
 
 def _pose(R, p) -> np.ndarray:

@@ -1,0 +1,150 @@
+"""Collision shape of points: their convex hull, with the faces of a mesh where these are given."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from gauss import rotations
+from gauss.errors import SceneError
+from gauss.scene import values
+from gauss.scene.curved_shapes import ConvexCollider
+
+FLAT = 1e-9  # least extent of a solid, relative to its largest
+COPLANAR = 1e-7  # difference of normals and of relative distances of two triangles of one face
+
+
+@dataclass(frozen=True)
+class ConvexMesh(ConvexCollider):
+    """Convex hull of points around ``at``.
+
+    Parameters
+    ----------
+    vertices : sequence of array_like, shape (3,)
+        The points, from ``at`` [m].
+    rotation : array_like
+        Of their axes, from the frame of the body.
+    faces : sequence of array_like, shape (3,)
+        Triangles of a mesh, three numbers of vertices each. They are checked only: the mesh is to be closed; the shape is
+        the hull in any case.
+    """
+
+    vertices: tuple = ()
+    rotation: tuple = (0.0, 0.0, 0.0)
+    faces: tuple = ()
+
+    kind: ClassVar[str] = "mesh"
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
+        points = _table(self.vertices, f"{self.what}: vertices", "points [m]", float)
+        if not np.isfinite(points).all():
+            raise SceneError(f"{self.what}: vertices are to be finite; point {_first(~np.isfinite(points))} is not.")
+        values.keep(self, vertices=tuple(map(tuple, points.tolist())))
+        spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if len(points) > 3 else np.zeros(3)
+        if spread[2] <= FLAT * spread[0]:
+            raise SceneError(
+                f"{self.what}: its {len(points)} vertices lie in one plane, line or point; a solid needs four that do not."
+            )
+        faces = _table(self.faces, f"{self.what}: faces", "triples of numbers of vertices", int) if len(self.faces) else None
+        if faces is not None:
+            self._require_closed(faces, len(points))
+            values.keep(self, faces=tuple(map(tuple, faces.tolist())))
+
+    def _require_closed(self, faces: np.ndarray, count: int):
+        """Refuse faces without area, of vertices that do not exist, or that leave holes."""
+        if faces.min() < 0 or faces.max() >= count:
+            raise SceneError(
+                f"{self.what}: face {_first((faces < 0) | (faces >= count))} names a vertex beyond {count - 1}."
+            )
+        p = np.array(self.vertices)[faces]
+        double = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+        if (double <= FLAT * np.ptp(np.array(self.vertices), axis=0).max() ** 2).any():
+            raise SceneError(f"{self.what}: face {int(np.argmin(double))} has no area; leave it out.")
+        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        pairs, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+        if (uses != 2).any():
+            one, other = pairs[int(np.flatnonzero(uses != 2)[0])]
+            raise SceneError(
+                f"{self.what}: the mesh is open, {int((uses != 2).sum())} edges are not those of two faces, the first "
+                f"between vertices {one} and {other}; close it, or give no faces to take the hull of its vertices."
+            )
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Rotation (3, 3) from the axes of the vertices to the frame of the body."""
+        return values.rotation_matrix(self.rotation)
+
+    @cached_property
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        points = np.array(self.vertices)
+        return points.min(axis=0), points.max(axis=0)
+
+    @property
+    def half_edges(self) -> np.ndarray:
+        """Half edges (3,) of the box around it [m]."""
+        return 0.5 * (self._bounds[1] - self._bounds[0])
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle (3,) of that box, in the frame of the body [m]."""
+        return np.array(self.at) + self.axes @ (0.5 * (self._bounds[0] + self._bounds[1]))
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Vertices of the hull in the frame of the body [m]."""
+        return self.centre + self.hull[0] @ self.axes.T
+
+    @cached_property
+    def hull(self) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+        """Vertices (k, 3) of the hull from its centre [m], its faces as loops of them, and their normals (f, 3)."""
+        from scipy.spatial import ConvexHull  # few scenes need it
+
+        points = np.array(self.vertices)
+        points = points - 0.5 * (self._bounds[0] + self._bounds[1])
+        found = ConvexHull(points / np.abs(points).max())
+        number = {int(k): place for place, k in enumerate(found.vertices)}
+        own = points[found.vertices]
+        planes, owner = _planes(found.equations, COPLANAR)
+        loops = []
+        for k, plane in enumerate(planes):
+            members = np.array(sorted({number[int(i)] for i in found.simplices[owner == k].ravel()}))
+            around = own[members] @ rotations.along(plane[:3])
+            middle = around - around.mean(axis=0)
+            loops.append(members[np.argsort(np.arctan2(middle[:, 1], middle[:, 0]))])
+        return own, loops, planes[:, :3]
+
+
+def _planes(equations: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
+    """Planes of a hull without repetition, and the plane of each of its simplices."""
+    planes, count = np.empty((len(equations), 4)), 0
+    owner = np.empty(len(equations), dtype=int)
+    for i, one in enumerate(equations):
+        same = np.flatnonzero(np.abs(planes[:count] - one).max(axis=1) <= near)
+        owner[i] = same[0] if same.size else count
+        if not same.size:
+            planes[count], count = one, count + 1
+    return planes[:count], owner
+
+
+def _table(entries, what: str, of: str, kind: type) -> np.ndarray:
+    """Array (k, 3) of what was given."""
+    try:
+        found: np.ndarray = np.array(entries, dtype=kind)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.ndim != 2 or found.shape[1] != 3 or (kind is int and not np.array_equal(found, np.array(entries))):
+        raise SceneError(f"{what} are a list of {of}, each with three entries, got {_short(entries)}.")
+    return found
+
+
+def _short(entries) -> str:
+    text = repr(entries)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _first(wrong: np.ndarray) -> int:
+    return int(np.flatnonzero(wrong.any(axis=1))[0])
