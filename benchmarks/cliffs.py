@@ -72,6 +72,15 @@ def _shafts(count: int) -> gauss.Scene:
     return scene
 
 
+def _coupled_chain(count: int) -> gauss.Scene:
+    """Chain of links, every second hinge geared to the one before it."""
+    scene = gauss.load("spatial_chain", n=count)
+    hinges = [joint.name for joint in scene.joints.values()]
+    for inner, outer in zip(hinges[::2], hinges[1::2], strict=True):
+        scene.couple(f"{outer} to {inner}", outer, inner, ratio=-0.5)
+    return scene
+
+
 LARGE = ALONE, "drive, traced", "drive, opaque", "drive of poses, traced", "force, traced", "force, opaque", "spring"
 SCENES: dict[str, tuple[Callable[[], gauss.Scene], tuple[str, ...]]] = {
     "chain of 7": (lambda: gauss.load("spatial_chain", n=7), tuple(ELEMENTS)),
@@ -80,6 +89,8 @@ SCENES: dict[str, tuple[Callable[[], gauss.Scene], tuple[str, ...]]] = {
     "chain of 100": (lambda: gauss.load("spatial_chain", n=100), LARGE),
     "128 geared shafts": (lambda: _shafts(128), (ALONE,)),
     "130 geared shafts": (lambda: _shafts(130), (ALONE,)),
+    "chain of 66, coupled in pairs": (lambda: _coupled_chain(66), (ALONE,)),
+    "chain of 132, coupled in pairs": (lambda: _coupled_chain(132), (ALONE,)),
     "four-bar": (lambda: gauss.load("four_bar"), tuple(ELEMENTS)),
     "hung chain of 140": (lambda: gauss.load("hung_chain", n=140), LARGE),
 }

@@ -16,7 +16,6 @@ from gauss.codegen.cpython_layout import is_known
 from gauss.codegen.gpu.batches import DeviceKernel
 from gauss.codegen.gpu.cuda_driver import device_names
 from gauss.codegen.gpu.devices import device
-from gauss.codegen.machine import width
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.errors import DeviceError, MissingPackageError
 from gauss.io import load
@@ -99,8 +98,7 @@ def _tried(name: str, check: Callable[[], Finding]) -> Finding:
 
 def _environment() -> list[Finding]:
     _, machine, packages, *_ = header(*CORE)
-    lanes = f"{width()} doubles in a vector register"
-    return [Finding("environment", packages), Finding("machine", f"{machine.removeprefix('machine: ')}; {lanes}")]
+    return [Finding("environment", packages), Finding("machine", machine.removeprefix("machine: "))]
 
 
 def _machine_code() -> Finding:

@@ -10,6 +10,7 @@ from types import ModuleType
 import pytest
 
 import gauss
+from gauss.codegen.library_symbols import LAPACK
 from gauss.integrators.methods import LIBRARY_ORIGINS, ORIGINS
 from gauss.lazy import LazyTable
 from gauss.simulation import progress
@@ -28,6 +29,9 @@ UNUSED = (  # drivers, integrators and elements of scenes that a four-bar does n
     *("gauss.integrators.symplectic", "gauss.integrators.radau", "gauss.scene.gears", "gauss.scene.rolling"),
 )
 SIMULATE = "import gauss; gauss.simulate(gauss.load('four_bar'), 0.01, progress=False)"
+STEPPED = (  # by machine code that calls LAPACK
+    "import gauss; gauss.simulate(gauss.load('rolling_ball'), 0.01, integrator='time_stepping', step=1e-3, progress=False)"
+)
 HELP = "import sys, runpy; sys.argv = ['gauss', {}'--help']\ntry: runpy.run_module('gauss')\nexcept SystemExit: pass"
 
 
@@ -47,6 +51,8 @@ def _imported(code: str, names: tuple[str, ...]) -> set[str]:
         (HELP.format(""), HEAVY, {"typer"}),
         (HELP.format("'run', "), ("rich", "numpy", "llvmlite", "scipy", "gauss.scene.scene"), set()),
         (SIMULATE, OPTIONAL + UNUSED, set()),
+        (STEPPED, ("scipy.linalg", "scipy.sparse", "qpsolvers"), set()),
+        (STEPPED + "\nfrom scipy.linalg import cython_lapack, inv; inv([[1.0]])", (LAPACK,), {LAPACK}),
         ("import gauss; gauss.load('robot:ur5')", ("pinocchio", "scipy"), {"pinocchio"}),
         ("import gauss; gauss.Linkage", ("gauss.linkages", "gauss.rotors"), {"gauss.linkages"}),
     ],

@@ -26,7 +26,6 @@ from benchmarks.command import RESULTS, command
 from benchmarks.latency.report import chart, page
 from benchmarks.latency.scenes import scenes
 from gauss.bench.machine import header
-from gauss.codegen.machine import width
 from gauss.io.urdf.robots import robot
 
 ROOT = Path(__file__).parent.parent.parent
@@ -58,8 +57,7 @@ def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
             {"scene": name, "answer": "process", "cache": "", "round": number, "first": _process(script)}
             for name, script in ({} if only else SCALE).items()
         ]
-    conditions = header("numpy", "llvmlite", "pin")
-    return rows, [*conditions, f"vectors of {width()} doubles"]
+    return rows, header("numpy", "llvmlite", "pin")
 
 
 def _first_answer(scene: str, answer: str, folder: str, tier: str) -> dict:

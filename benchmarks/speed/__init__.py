@@ -7,7 +7,8 @@ Run it with:
 Every row is a contest: the same work done by gauss and by peers, in interleaved rounds in one process on one core. Times
 are CPU times of the process, so that other work on the machine counts little; medians are quoted, ratios are medians of the
 ratios of single rounds, with their quartiles. What was measured is written whatever it is, beside what it should be, to
-benchmarks/results: speed.csv (every round), speed.md, speed.png and speed.svg.
+benchmarks/results: speed.csv (every round), speed.md, speed.png and speed.svg. With ``GAUSS_VECTORS=4`` machine code and the
+matrix product are those of a processor without AVX-512, and the files are named speed_avx2.
 
 The Panda has its fingers fixed, in all engines; Talos stands on a fixed base.
 

@@ -71,7 +71,7 @@ def write_rounds(measured: list[Timings], header: list[str], path: Path):
     write_table(path, header, rows)
 
 
-def chart(rows: list[dict], header: list[str], folder: Path):
+def chart(rows: list[dict], header: list[str], path: Path):
     """Bars of the ratios on a logarithmic scale, with the goals; PNG and SVG."""
     shown = [row for row in rows if row["peer"] not in (DGEMM, SMALLER, TENTH)][::-1]
     figure, axes = plt.subplots(figsize=(11, 0.62 * len(shown) + 1.9), constrained_layout=True)
@@ -97,7 +97,7 @@ def chart(rows: list[dict], header: list[str], folder: Path):
     axes.legend(handles, ["goal met", "goal missed", "goal"], loc="lower right", fontsize=9)
     axes.set_title(f"Speed of gauss; {when_and_where(header)}", fontsize=10)
     for ending in ("png", "svg"):
-        figure.savefig(folder / f"speed.{ending}", dpi=130)
+        figure.savefig(path.with_suffix(f".{ending}"), dpi=130)
     plt.close(figure)
 
 

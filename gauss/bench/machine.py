@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gauss.codegen.processor import width
 from gauss.versions import version_of
 
 GIT_TIME = 10.0  # [s] that git may take
@@ -18,7 +19,8 @@ def header(*packages: str) -> list[str]:
     versions = [f"{name} {version_of(name) or 'not installed'}" for name in ("gauss", *packages)]
     lines = [
         f"date: {date.today().isoformat()}{_load()}",
-        f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
+        f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}, "
+        f"vectors of {width()} doubles",
         f"python {platform.python_version()}; " + ", ".join(versions),
     ]
     return [*lines, *_commit()]

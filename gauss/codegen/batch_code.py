@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import machine
+from gauss.codegen import machine, processor
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import counted_loop
@@ -80,7 +80,7 @@ def batch_code(function: Function | NativeFunction, interface: Interface) -> Bat
     """
     writer = Writer()
     try:
-        width, body = machine.width(), writer.body(function, machine.width())
+        width, body = processor.width(), writer.body(function, processor.width())
     except TypeError:  # it holds a function for one state at a time
         writer = Writer()
         width, body = 1, writer.body(function, 1)

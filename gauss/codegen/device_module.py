@@ -5,7 +5,7 @@ Code for such a module is that for one state at a time, without SIMD lanes insid
 
 from llvmlite import ir
 
-from gauss.codegen.object_code import width
+from gauss.codegen.processor import width
 
 
 class DeviceModule(ir.Module):

@@ -132,10 +132,10 @@ class Graph:
         if x.is_constant and y.is_constant:
             value = BINARY[op](x.value, y.value)  # most often zero with zero
             return x if value == x.value else y if value == y.value else self.constant(value)
-        simpler = SIMPLER[op](self, x, y) if op in SIMPLER else None
-        if simpler is not None:
+        simplified = SIMPLER.get(op)
+        if simplified is not None and (simpler := simplified(self, x, y)) is not None:
             return simpler
-        if op in COMMUTATIVE and x.index > y.index:
+        if x.index > y.index and op in COMMUTATIVE:
             x, y = y, x
         return self._make(op, (x, y))
 
@@ -162,12 +162,12 @@ class Graph:
 
     def copy(self, node: Expression, operands) -> Expression:
         """Node of another graph, with operands of this one, folded."""
+        if node.op in BINARY:
+            return self.binary(node.op, *operands)
         if node.op == "constant":
             return self.constant(node.value)
         if node.op in UNARY:
             return self.unary(node.op, *operands)
-        if node.op in BINARY:
-            return self.binary(node.op, *operands)
         if node.op == "select":
             return self.select(*operands)
         return self._make(node.op, tuple(operands), node.value)

@@ -4,7 +4,7 @@ import ctypes
 
 import numpy as np
 
-from gauss.codegen import machine
+from gauss.codegen import machine, processor
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function, write
 from gauss.codegen.native_function import NativeFunction
@@ -32,7 +32,7 @@ class Kernel:
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
         writer = Writer()
-        writer.over_states(function, (machine.width(),) if batch else ())
+        writer.over_states(function, (processor.width(),) if batch else ())
         self.code = machine.load(str(writer.module))
         self._bind()
 

@@ -1,7 +1,5 @@
 """Operations of the graph as LLVM instructions, on one state or on a SIMD vector of states."""
 
-import math
-
 from llvmlite import ir
 
 from gauss.codegen.device_module import DeviceModule, vector_width
@@ -10,8 +8,9 @@ from gauss.codegen.expression import Expression
 from gauss.codegen.intrinsics import external, intrinsic
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.sincos import SinCos
+from gauss.codegen.text_builder import BIT, TextValue, written
 
-DOUBLE, INTEGER, BIT = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
+DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
 INTRINSICS |= {"min": "llvm.minnum", "max": "llvm.maxnum"}
@@ -37,6 +36,8 @@ class Lanes:
     def __init__(self, module: ir.Module, width: int, builder: ir.IRBuilder):
         self.module, self.width, self.b = module, width, builder
         self.kind = kind(width)
+        self._constants: dict[float, TextValue] = {}
+        self._intrinsics: dict[str, ir.Function] = {}
         self.sincos_values: dict[int, tuple[ir.Value, ir.Value]] = {}
 
     def constant(self, value: float) -> ir.Constant:
@@ -88,15 +89,20 @@ class Lanes:
         """Result of a node from the values of its operands."""
         b, op = self.b, node.op
         if op == "constant":
-            return self.constant(node.value if math.isfinite(node.value) else float(node.value))
+            return self._written_constant(float(node.value))
         x = [values[operand.index] for operand in node.operands]
         if op == "select":
             condition = x[0] if _is_condition(x[0]) else b.fcmp_unordered("!=", x[0], self.constant(0.0))
             return b.select(condition, self.number(x[1]), self.number(x[2]))
-        x = [self.number(value) for value in x]
+        x = [value if value.type is self.kind else self.number(value) for value in x]
         if op in ("sin", "cos"):
             return self._sincos(node, x[0])
         return self._arithmetic(op, x)
+
+    def _written_constant(self, value: float) -> TextValue:
+        if value not in self._constants:
+            self._constants[value] = written(self.constant(value))
+        return self._constants[value]
 
     def _arithmetic(self, op: str, x: list):
         """Result of an operation on numbers."""
@@ -113,13 +119,18 @@ class Lanes:
             return b.call(elementary(self.module, op), x)
         if op == "atan2":
             return self._each_lane("atan2", x)
-        return b.call(intrinsic(self.module, INTRINSICS[op], self.kind, len(x)), x)
+        return b.call(self._intrinsic(INTRINSICS[op], len(x)), x)
 
     def fused(self, kind: str, x, y, z):
         """± x y ± z, rounded once where the processor has the instruction."""
         product, total = FUSED[kind]
         x, z = x if product > 0 else self.b.fneg(x), z if total > 0 else self.b.fneg(z)
-        return self.b.call(intrinsic(self.module, "llvm.fmuladd", self.kind, 3), [x, y, z])
+        return self.b.call(self._intrinsic("llvm.fmuladd", 3), [x, y, z])
+
+    def _intrinsic(self, name: str, arguments: int) -> ir.Function:
+        if name not in self._intrinsics:
+            self._intrinsics[name] = intrinsic(self.module, name, self.kind, arguments)
+        return self._intrinsics[name]
 
     def joined(self, values):
         """Concatenate the lanes of several values to one vector; the last is repeated up to a power of two."""

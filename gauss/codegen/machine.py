@@ -8,11 +8,11 @@ import os
 import zlib
 
 from gauss.codegen import object_cache, tiers
-from gauss.codegen.object_code import about, linked, optimised_objects, packed, quick_objects, unpacked, width
+from gauss.codegen.object_code import about, linked, optimised_objects, packed, quick_objects, unpacked
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, MachineCode
 
-__all__ = ["MachineCode", "load", "load_cached", "width"]
+__all__ = ["MachineCode", "load", "load_cached"]
 
 SHORT = 50_000  # characters of a module that is optimised at once, in less than 30 ms
 COMPRESSION = 1  # level of zlib: 4 ms for a megabyte

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from gauss.codegen.expression import Expression
 
 FUSED = {"fma": (1, 1), "fms": (1, -1), "fnma": (-1, 1)}  # ± x y ± z: signs of product and sum
+CONTRACTED = {"add": ("fma", "fma"), "sub": ("fms", "fnma")}  # where the first, the second operand is the product
 
 
 def fused(nodes: Sequence[Expression], outputs) -> list[Expression]:
@@ -24,9 +25,7 @@ def fused(nodes: Sequence[Expression], outputs) -> list[Expression]:
         found[node.index] = node
         if node.op in ("add", "sub"):
             x, y = node.operands
-            subtracted = "fnma" if node.op == "sub" else "fma"
-            taken_from = "fms" if node.op == "sub" else "fma"
-            for product, other, kind in ((y, x, subtracted), (x, y, taken_from)):
+            for product, other, kind in ((y, x, CONTRACTED[node.op][1]), (x, y, CONTRACTED[node.op][0])):
                 if product.op == "mul" and uses[product.index] == 1:
                     operands = (*found.pop(product.index).operands, other)
                     found[node.index] = Expression(node.graph, kind, operands, None, node.index)

@@ -17,6 +17,7 @@ import llvmlite.binding as llvm
 
 from gauss.codegen.library_symbols import register_symbols_of
 from gauss.codegen.module_units import ModuleUnits
+from gauss.codegen.processor import features
 
 OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
 PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
@@ -31,24 +32,16 @@ def target(level: int) -> llvm.TargetMachine:
     """Code generator of the host CPU for an optimisation level."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    features = llvm.get_host_cpu_features().flatten()
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=level, reloc=RELOCATION, codemodel="jitdefault"
+        cpu=llvm.get_host_cpu_name(), features=features(), opt=level, reloc=RELOCATION, codemodel="jitdefault"
     )
-
-
-@cache
-def width() -> int:
-    """Doubles in one vector register of this CPU: 8, 4 or 2."""
-    features = llvm.get_host_cpu_features()
-    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 
 
 def about(optimise: int) -> str:
     """Compiler, its settings, and processor: what object code depends on beside its module."""
     llvm_version = ".".join(map(str, llvm.llvm_version_info))
     compiler = f"{llvmlite.__version__} {llvm_version} {target(OPTIMISED if optimise else 0).triple} {PASSES} {RELOCATION}"
-    return f"{compiler} O{optimise} {llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+    return f"{compiler} O{optimise} {llvm.get_host_cpu_name()} {features()}"
 
 
 def quick_objects(ir_text: str) -> list[bytes]:

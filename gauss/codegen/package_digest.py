@@ -17,6 +17,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from gauss.codegen import object_cache
+from gauss.codegen.processor import features
 from gauss.lazy import BEGUN
 
 FOLDER = Path(__file__).parent.parent
@@ -33,7 +34,7 @@ def package_digest() -> bytes | None:
     if content is None:
         content = _content_of([path for path, *_ in files])
         object_cache.write(listed, content)
-    cpu = llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+    cpu = llvm.get_process_triple(), llvm.get_host_cpu_name(), features()
     about = *cpu, llvmlite.__version__, llvm.llvm_version_info, np.__version__, sys.version
     return hashlib.sha256(content + repr(about).encode()).digest()
 

@@ -48,30 +48,38 @@ class _Reassociation:
         self.new: dict[int, Expression] = {}
         self.inputs = [self.graph.symbol(x.value) for x in function.inputs]
         nodes = function.nodes
-        self.products = {x.index for x in _used_once(nodes, function.outputs) if x.op == "mul"}
-        sums, absorbed = _sums(nodes, function.outputs, self.products)
+        once = _used_once(nodes, function.outputs)
+        self.products = {x.index for x in once if x.op == "mul"}
+        sums, absorbed = _sums(nodes, self.products, {x.index for x in once if x.op in CHAIN})
+        new, copy = self.new, self.graph.copy
         for node in nodes:
             if node.index in sums:
-                self.new[node.index] = self._sum(sums[node.index])
+                new[node.index] = self._sum(sums[node.index])
             elif node.index not in absorbed:
-                self.new[node.index] = self.graph.copy(node, [self.new[x.index] for x in node.operands])
-        self.outputs = [self.new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
+                new[node.index] = copy(node, [new[x.index] for x in node.operands])
+        self.outputs = [new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
 
     def depth_first(self) -> list[Expression]:
         """Nodes on which the outputs depend, each right after its operands."""
-        found, seen, waiting = [], set(), [(x, False) for x in reversed(self.outputs) if isinstance(x, Expression)]
+        found, waiting = [], [x for x in reversed(self.outputs) if isinstance(x, Expression)]
         when = self._times()
+        is_open, is_done = bytearray(len(when)), bytearray(len(when))
         while waiting:
-            node, is_ready = waiting.pop()
-            if is_ready:
+            node = waiting.pop()
+            index, operands = node.index, node.operands
+            if is_done[index]:
+                continue
+            if is_open[index] or not operands:
+                is_done[index] = 1
                 found.append(node)
-            elif node.index not in seen:
-                seen.add(node.index)
-                if not node.operands:
-                    found.append(node)
-                    continue
-                waiting.append((node, True))
-                waiting += [(x, False) for x in sorted(node.operands, key=lambda x: when[x.index])]
+                continue
+            is_open[index] = 1
+            waiting.append(node)
+            if len(operands) == 2:  # sorted, without its overhead
+                x, y = operands
+                waiting += (x, y) if when[x.index] <= when[y.index] else (y, x)
+            else:
+                waiting += sorted(operands, key=lambda x: when[x.index])
         return found
 
     def _times(self) -> list[int]:
@@ -107,30 +115,33 @@ def _used_once(nodes, outputs) -> list[Expression]:
     return [node for node in nodes if uses[node.index] == 1 and node.index not in kept]
 
 
-def _sums(nodes, outputs, products) -> tuple[dict, set]:
-    """Sums of more than two terms, products among them, as {node: [(sign, term)]}, and the nodes inside them."""
-    within = {x.index for x in _used_once(nodes, outputs) if x.op in CHAIN}
-    within &= {x.index for node in nodes if node.op in CHAIN for x in node.operands}
-    within -= _plain_sums(nodes, products, within)
+def _sums(nodes, products, once) -> tuple[dict, set]:
+    """Sums of more than two terms, products among them, as {node: [(sign, term)]}, and the nodes inside them.
+
+    ``once`` are the sums with one use.
+    """
+    chains = [node for node in nodes if node.op in CHAIN]
+    within = once & {x.index for node in chains for x in node.operands}
+    within -= _plain_sums(chains, products, within)
     sums, absorbed = {}, set()
-    for node in nodes:
-        if node.op in CHAIN and node.index not in within:
+    for node in chains:
+        if node.index not in within and any(x.index in within for x in node.operands):
             terms, inside = _terms(node, within)
-            if inside and any(term.index in products for _, term in terms):
+            if any(term.index in products for _, term in terms):
                 sums[node.index] = terms
                 absorbed |= inside
     return sums, absorbed
 
 
-def _plain_sums(nodes, products, within) -> set:
+def _plain_sums(chains, products, within) -> set:
     """Sums of two or more terms without products among them."""
     plain, mixed = set(), set(products)
-    for node in nodes:
-        if node.op in CHAIN:
-            if any(x.index in mixed for x in node.operands if x.index in within or x.index in products):
-                mixed.add(node.index)
-            elif node.op != "neg":
-                plain.add(node.index)
+    inner = within | products
+    for node in chains:
+        if any(x.index in mixed and x.index in inner for x in node.operands):
+            mixed.add(node.index)
+        elif node.op != "neg":
+            plain.add(node.index)
     return plain
 
 
@@ -142,7 +153,8 @@ def _terms(root: Expression, within) -> tuple[list, set]:
         if node is not root and node.index not in within:
             terms.append((sign, node))
             continue
-        inside |= {node.index} - {root.index}
+        if node is not root:
+            inside.add(node.index)
         signs = (-sign,) if node.op == "neg" else (sign, sign if node.op == "add" else -sign)
         waiting += reversed(list(zip(signs, node.operands, strict=True)))
     return terms, inside

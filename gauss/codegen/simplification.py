@@ -33,14 +33,14 @@ def _sub(graph: "Graph", x: "Expression", y: "Expression") -> "Expression | None
 
 
 def _mul(graph: "Graph", x: "Expression", y: "Expression") -> "Expression | None":
-    for one, other in ((x, y), (y, x)):
-        if one.is_constant:
-            if one.value == 0:
-                return one
-            if one.value == 1:
-                return other
-            if one.value == -1:
-                return graph.unary("neg", other)
+    if x.is_constant or y.is_constant:
+        one, other = (x, y) if x.is_constant else (y, x)
+        if one.value == 0:
+            return one
+        if one.value == 1:
+            return other
+        if one.value == -1:
+            return graph.unary("neg", other)
     if x.op == "neg" or y.op == "neg":
         sign = (x.op == "neg") != (y.op == "neg")
         product = graph.binary("mul", *(e.operands[0] if e.op == "neg" else e for e in (x, y)))

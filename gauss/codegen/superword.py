@@ -3,6 +3,7 @@
 The legs of a parallel robot are such parts (Larsen and Amarasinghe, PLDI 2000; here whole connected components are packed).
 """
 
+from collections import Counter
 from collections.abc import Iterator
 
 from gauss.codegen.expression import Expression
@@ -16,11 +17,13 @@ IsomorphicPart = list[Expression]  # operations of a connected component in orde
 def superword_groups(scheduled: Schedule, at_most: int) -> list[list[IsomorphicPart]]:
     """Groups of two to ``at_most`` isomorphic parts: equal node by node, except for constants."""
     groups: dict[tuple, list[IsomorphicPart]] = {}
-    for part in _independent_parts(scheduled.nodes):
-        if all(node.op not in ("call", "item") for node in part):
+    parts = list(_independent_parts(scheduled.nodes))
+    lengths = Counter(map(len, parts))
+    for part in parts:  # the key takes time, and most functions are one part
+        if lengths[len(part)] > 1 and all(node.op not in ("call", "item") for node in part):
             groups.setdefault(_shape(part), []).append(part)
-    found = [parts[k : k + at_most] for parts in groups.values() for k in range(0, len(parts), at_most)]
-    return [parts for parts in found if len(parts) > 1]
+    found = [group[k : k + at_most] for group in groups.values() for k in range(0, len(group), at_most)]
+    return [group for group in found if len(group) > 1]
 
 
 def _independent_parts(nodes) -> Iterator[IsomorphicPart]:

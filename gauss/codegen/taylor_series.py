@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from llvmlite import ir
 
-from gauss.codegen import machine
+from gauss.codegen import processor
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER, counted_loop
@@ -72,7 +72,7 @@ class _SeriesWriter:
         self.plan, self.function, module = plan, function, function.module
         self.rows = self.function.args[0]
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
-        self.lanes, self.block = Lanes(module, 1, self.b), Lanes(module, machine.width(), self.b)
+        self.lanes, self.block = Lanes(module, 1, self.b), Lanes(module, processor.width(), self.b)
 
     def place(self, name, k):
         """Pointer and offset of the coefficient of order k of a series."""

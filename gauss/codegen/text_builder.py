@@ -9,17 +9,17 @@ from typing import NamedTuple
 
 from llvmlite import ir
 
-from gauss.codegen.lanes import BIT
-
+BIT = ir.IntType(1)
 ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "one"}
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
 
 
 class TextValue(NamedTuple):
-    """Result of an instruction: what llvmlite asks of an operand."""
+    """Result of an instruction: what llvmlite asks of an operand, and its type and name as they stand in the text."""
 
     type: ir.Type
     reference: str
+    typed: str
 
     def get_reference(self) -> str:
         """Name of the value in the text."""
@@ -32,18 +32,19 @@ class TextBuilder(ir.IRBuilder):
     def __init__(self, block: ir.Block):
         super().__init__(block)
         self._numbers = block.function.__dict__.setdefault("numbers_of_values", count())  # one sequence for all builders
+        self._called: dict[str, str] = {}  # beginning of the calls of each function
 
     def _value(self, kind: ir.Type, text: str) -> TextValue:
-        value = TextValue(kind, f"%t{next(self._numbers)}")
-        self._line(f"{value.reference} = {text}")
-        return value
+        name = f"%t{next(self._numbers)}"
+        self._line(f"{name} = {text}")
+        return TextValue(kind, name, f"{kind} {name}")
 
     def _line(self, text: str):
         self._block.instructions.insert(self._anchor, text)
         self._anchor += 1
 
     def _binary(self, operation: str, x, y, flags) -> TextValue:
-        return self._value(x.type, f"{_flagged(operation, flags)} {x.type} {x.get_reference()}, {y.get_reference()}")
+        return self._value(x.type, f"{_flagged(operation, flags)} {_typed(x)}, {y.get_reference()}")
 
     def fadd(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Sum."""
@@ -63,7 +64,7 @@ class TextBuilder(ir.IRBuilder):
 
     def fneg(self, arg, name="", flags=()) -> TextValue:
         """Negative."""
-        return self._value(arg.type, f"{_flagged('fneg', flags)} {arg.type} {arg.get_reference()}")
+        return self._value(arg.type, f"{_flagged('fneg', flags)} {_typed(arg)}")
 
     def mul(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Product of integers."""
@@ -79,7 +80,7 @@ class TextBuilder(ir.IRBuilder):
 
     def _compared(self, operation: str, x, y, flags) -> TextValue:
         kind = ir.VectorType(BIT, x.type.count) if isinstance(x.type, ir.VectorType) else BIT
-        return self._value(kind, f"{_flagged('fcmp', flags)} {operation} {x.type} {x.get_reference()}, {y.get_reference()}")
+        return self._value(kind, f"{_flagged('fcmp', flags)} {operation} {_typed(x)}, {y.get_reference()}")
 
     def select(self, cond, lhs, rhs, name="", flags=()) -> TextValue:
         """One of two values."""
@@ -108,17 +109,24 @@ class TextBuilder(ir.IRBuilder):
         """Call a function."""
         if how or not isinstance(fn, ir.Function):
             return super().call(fn, args, name, **how)
+        if fn.name not in self._called:
+            self._called[fn.name] = f"call {fn.ftype.return_type} {fn.get_reference()}"
         found = fn.ftype.return_type
-        text = f"call {found} {fn.get_reference()}({', '.join(map(_typed, args))})"
+        text = f"{self._called[fn.name]}({', '.join(map(_typed, args))})"
         return self._line(text) if isinstance(found, ir.VoidType) else self._value(found, text)
 
 
+def written(constant: ir.Constant) -> TextValue:
+    """A constant in the text, formatted once for all its uses."""
+    return TextValue(constant.type, reference := constant.get_reference(), f"{constant.type} {reference}")
+
+
 def _flagged(operation: str, flags) -> str:
-    return " ".join((operation, *flags))
+    return " ".join((operation, *flags)) if flags else operation
 
 
 def _typed(value) -> str:
-    return f"{value.type} {value.get_reference()}"
+    return value.typed if type(value) is TextValue else f"{value.type} {value.get_reference()}"
 
 
 def _aligned(align: int | None) -> str:

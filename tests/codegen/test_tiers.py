@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, terminal_line, tiers, write
+from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, processor, terminal_line, tiers, write
 from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.module_units import FUNCTION, ModuleUnits
@@ -40,7 +40,7 @@ def text(number: float) -> str:
     inner = write(lambda x: [np.sin(x[0]) * x[1] + number, np.exp(-(x[0] ** 2)) / (1.0 + x[1] ** 2)], 2, name="inner")
     outer = write(lambda x: [inner(x[:2])[0] * inner(x[1:])[1] + np.sqrt(x[2] ** 2 + 1.0), *inner(x[:2])], 3, name="outer")
     writer = Writer()
-    writer.over_states(outer, (machine.width(),))
+    writer.over_states(outer, (processor.width(),))
     return str(writer.module)
 
 

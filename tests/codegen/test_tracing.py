@@ -17,9 +17,9 @@ from gauss.codegen import (
     count,
     forward,
     jacobian,
-    machine,
     object_cache,
     object_code,
+    processor,
     reverse,
     substitute,
     trace,
@@ -82,7 +82,7 @@ def test_the_width_of_the_batch_changes_nothing_but_rounding():
 
 @pytest.mark.parametrize("width", [2, 4, 8])
 def test_registers_of_any_width(width, monkeypatch):
-    monkeypatch.setattr(machine, "width", lambda: width)
+    monkeypatch.setattr(processor, "width", lambda: width)
     x = np.random.default_rng(2).uniform(0.2, 1.2, (2, 2 * width + 1))
     expected = np.array(everything(x))
     assert np.abs(trace(lambda x: np.array(everything(x)), 2)(x) - expected).max() <= ROUNDING * np.abs(expected).max()
@@ -157,7 +157,7 @@ def test_sine_and_cosine_to_one_ulp(size, monkeypatch):
     with mp.workdps(50 + int(np.log10(size + 1.0))):
         exact = [[function(mp.mpf(value)) for value in x] for function in (mp.sin, mp.cos)]
     for width in (1, 2, 4, 8):
-        monkeypatch.setattr(machine, "width", lambda width=width: width)
+        monkeypatch.setattr(processor, "width", lambda width=width: width)
         found = trace(lambda x: np.array([np.sin(x[0]), np.cos(x[0])]), 1, batch=width > 1)(x[None])
         for numbers, expected in zip(found, exact, strict=True):
             off = [abs(mp.mpf(number) - value) for number, value in zip(numbers, expected, strict=True)]

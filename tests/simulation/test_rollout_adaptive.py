@@ -95,7 +95,7 @@ def test_lanes_are_refilled():
         many = gauss.rollout(system, np.full((160, 1), 0.3), v0, integrator="dop853", times=[1.0], **TOLERANCE)
     tried = many.steps + many.rejected
     assert tried.max() > 5 * np.median(tried)
-    width = gauss.codegen.machine.width()
+    width = gauss.codegen.processor.width()
     assert sum(turns) <= tried.sum() / width + 2 * tried.max() < 0.5 * tried.max() * len(tried) / width
 
 

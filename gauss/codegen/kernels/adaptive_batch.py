@@ -8,7 +8,7 @@ reached the end is refilled with the next motion of the queue. Lanes are indepen
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, Writer, intrinsic, machine
+from gauss.codegen import INTEGER, Writer, intrinsic, processor
 from gauss.codegen.kernels.adaptive import LAST_STEP_SHARE, PROJECTION_FAILED_FACTOR, TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
 from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD
@@ -80,8 +80,8 @@ class AdaptiveBatchLoop(BatchLoop):
     def __init__(self, method: Adaptive, written: slice):
         self.size, self.written = method.size, written
         writer = Writer()
-        write_adaptive_batch(writer, method, written, machine.width())
-        super().__init__(writer, NAME, MotionQueue, len(POINTERS) - 1, machine.width())
+        write_adaptive_batch(writer, method, written, processor.width())
+        super().__init__(writer, NAME, MotionQueue, len(POINTERS) - 1, processor.width())
 
     def lanes(self) -> np.ndarray:
         """Array (size + len(MOTION_RECORD) + 1, width) of empty lanes."""

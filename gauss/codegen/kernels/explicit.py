@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, Function, NativeFunction, Writer, machine
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer, processor
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS
 from gauss.codegen.kernels.row_code import RowCode
 from gauss.codegen.kernels.slope_sums import SlopeSums
@@ -18,7 +18,7 @@ from gauss.codegen.kernels.slope_sums import SlopeSums
 
 def stride(n_y: int) -> int:
     """Padded length of a row of n_y numbers."""
-    return -(-n_y // machine.width()) * machine.width()
+    return -(-n_y // processor.width()) * processor.width()
 
 
 @dataclass(frozen=True, eq=False)

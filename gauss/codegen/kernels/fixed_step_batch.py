@@ -6,7 +6,7 @@ begins, so that it stays in the first-level cache; a motion does not depend on t
 
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, Function, Writer, intrinsic, machine
+from gauss.codegen import INTEGER, Function, Writer, intrinsic, processor
 from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record
 from gauss.codegen.kernels.fixed_step import Fixed
@@ -76,7 +76,7 @@ class FixedStepBatchLoop(BatchLoop):
 
     def __init__(self, method: Fixed, start: Function, written: slice, inputs: int = 0, width: int | None = None):
         self.size, self.evaluations, self.written, self.inputs = method.size, method.evaluations, written, inputs
-        writer, width = Writer(), machine.width() if width is None else width
+        writer, width = Writer(), processor.width() if width is None else width
         write_fixed_step_batch(writer, method, start, written, inputs, width)
         super().__init__(writer, NAME, BatchSpan, len(POINTERS) - 1 + bool(inputs), width)
 
