@@ -64,14 +64,18 @@ from gauss.analysis.base_parameters import BaseParameters, base_parameters
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
+from gauss.analysis.excitation import Excitation, excitation
 from gauss.analysis.identification import Identification, identify
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
 from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion
+from gauss.analysis.mode_motion import mode_motion
+from gauss.analysis.motion_fit import MotionFit, fit_motion
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
 from gauss.analysis.planned_path import plan_path
 from gauss.analysis.recommendation import advise
 from gauss.analysis.regressor import Regressor, regressor
+from gauss.analysis.root_locus import RootLocus, root_locus
 from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
 from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget
 from gauss.backends import choose, solve
@@ -126,6 +130,9 @@ __all__ = [
     "LinearModel",
     "LinearModes",
     "Linkage",
+    "Excitation",
+    "MotionFit",
+    "RootLocus",
     "MotionGradient",
     "OptimalMotion",
     "Plan",
@@ -176,6 +183,10 @@ __all__ = [
     "load_rotors",
     "load_sweep",
     "mobility",
+    "mode_motion",
+    "excitation",
+    "fit_motion",
+    "root_locus",
     "motion_gradient",
     "optimal_motion",
     "paradoxes",

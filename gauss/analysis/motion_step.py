@@ -23,7 +23,7 @@ from gauss.errors import ArgumentError, did_you_mean
 from gauss.integrators import Point, Rates
 from gauss.integrators.step import Chart, stages
 from gauss.integrators.tableaus import DOP853, DOPRI5, RK4, Tableau
-from gauss.system import State, System
+from gauss.system import State, System, coordinate_rates
 
 TABLEAUS: dict[str, Tableau] = {"rk4": RK4, "dopri5": DOPRI5, "dop853": DOP853}
 PROJECTIONS = 2  # Newton steps in position after a step
@@ -90,9 +90,9 @@ class MotionStep:
         y = chart.start(point)
         K = stages(self.tableau, chart, y, chart.rate(y, point.rates), h)
         end = chart.state(t + h, y + h * (self.tableau.b @ K))
-        return np.concatenate(self._projected(end) if self.system.closes else [end.q, end.v])
+        return np.concatenate(self.projected(end) if self.system.closes else [end.q, end.v])
 
-    def _projected(self, state: State) -> list[np.ndarray]:
+    def projected(self, state: State) -> list[np.ndarray]:
         """Coordinates and rates on the constraints."""
         q, v, t = state.q, state.v, state.t
         for _ in range(PROJECTIONS):
@@ -134,6 +134,20 @@ class MotionStep:
             return reverse(weights @ self.moved(time, q, v, delta), [*q, *v, *inputs, *delta])
 
         return self._kernel("adjoint", gradient, self.n_x)
+
+    @cached_property
+    def rates(self) -> Kernel:
+        """((t, h), q, v, δ, u) → rates (n_q + n_v,) of the coordinates and accelerations."""
+
+        def rates(time, _, q, v, delta):
+            found = self.evaluate(State(time[0], q, v), delta).acceleration
+            return np.concatenate([coordinate_rates(self.system, q, v), found])
+
+        return self._kernel("rates", rates)
+
+    def rate(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Rates (n_q + n_v,) in a state under inputs u."""
+        return self.rates(np.concatenate([[t, 0.0], x, np.zeros(self.n_p), u]))
 
     def after(self, t: float, h: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """(q, v) after a step under inputs u."""

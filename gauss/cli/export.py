@@ -9,7 +9,7 @@ import gauss
 from gauss.cli.common import Read, Root, SceneName, load
 from gauss.errors import FileError, did_you_mean
 
-LANGUAGES = ("c", "casadi", "jax", "latex")
+LANGUAGES = ("c", "casadi", "jax", "latex", "fmu")
 
 
 def export(

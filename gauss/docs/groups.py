@@ -72,7 +72,7 @@ GROUPS = (
         "Pinocchio.",
         _of("gauss", "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes")
         + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps sensitivities Sensitivities")
-        + _of("gauss", "motion_gradient MotionGradient"),
+        + _of("gauss", "motion_gradient MotionGradient root_locus RootLocus mode_motion"),
     ),
     Group(
         "inverse_kinematics",
@@ -86,7 +86,8 @@ GROUPS = (
         "identification",
         "Identify parameters",
         "Masses, centres of mass, inertias and friction from measured motions and forces, loops included.",
-        _of("gauss", "identify Identification base_parameters BaseParameters regressor Regressor"),
+        _of("gauss", "identify Identification base_parameters BaseParameters regressor Regressor")
+        + _of("gauss", "fit_motion MotionFit excitation Excitation"),
     ),
     Group(
         "optimal",
@@ -112,7 +113,7 @@ GROUPS = (
         "actuators",
         "Actuators with states",
         "Motors, controllers, filters, muscles and friction with states of their own, made of :meth:`gauss.Scene.state`.",
-        _of("gauss.scene.actuators", "dc_motor pi_controller low_pass muscle lugre_friction"),
+        _of("gauss.scene.actuators", "dc_motor hydraulic_cylinder pi_controller low_pass muscle lugre_friction"),
     ),
     Group(
         "linkages",
@@ -130,7 +131,7 @@ GROUPS = (
     Group(
         "export",
         "Code of other languages",
-        "Functions of a state as C99, CasADi, JAX and formulas. Guide: :doc:`/guides/export`.",
+        "Functions of a state as C99, CasADi, JAX and formulas, and units of FMI 3. Guide: :doc:`/guides/export`.",
         _of("gauss.export"),
     ),
     Group(
@@ -179,6 +180,9 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.InverseKinematics": "gauss.inverse_kinematics",
     "gauss.LinearModel": "gauss.linearise",
     "gauss.LinearModes": ".modes",
+    "gauss.Excitation": "gauss.excitation",
+    "gauss.MotionFit": "gauss.fit_motion",
+    "gauss.RootLocus": "gauss.root_locus",
     "gauss.MotionGradient": "gauss.motion_gradient",
     "gauss.OptimalMotion": "gauss.optimal_motion",
     "gauss.PlannedMotion": "gauss.plan_motion",

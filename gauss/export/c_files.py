@@ -79,12 +79,13 @@ def to_c(system: System | Scene, names: Sequence[str] | str | None = None, name:
     >>> "void pendulum_mass_matrix(const double q[1], double t, double result[1]);" in code.header
     True
     """
-    functions = exported_functions(system, names)
     scene = system if isinstance(system, Scene) else system.scene
-    prefix = identifier(scene.name if name is None else name)
-    header = "\n".join(_header(prefix, scene, functions))
-    source = "\n".join(_source(prefix, functions))
-    return CCode(prefix, header, source)
+    return c_code(identifier(scene.name if name is None else name), scene, exported_functions(system, names))
+
+
+def c_code(prefix: str, scene: Scene, functions: list[ExportedFunction]) -> CCode:
+    """Header and source of exported functions of a scene, with a prefix of their names."""
+    return CCode(prefix, "\n".join(_header(prefix, scene, functions)), "\n".join(_source(prefix, functions)))
 
 
 def _header(prefix: str, scene: Scene, functions: list[ExportedFunction]) -> Iterator[str]:
@@ -127,9 +128,14 @@ def _source(prefix: str, functions: list[ExportedFunction]) -> Iterator[str]:
 
 
 def _signature(prefix: str, function: ExportedFunction) -> str:
-    given = [f"const double {name}[{prod(shape)}]" if shape else f"double {name}" for name, shape in function.inputs.items()]
-    given += [f"double {name}[{prod(shape)}]" for name, shape in function.outputs.items()]
+    given = [f"const double {name}{_size(shape)}" if shape else f"double {name}" for name, shape in function.inputs.items()]
+    given += [f"double {name}{_size(shape)}" for name, shape in function.outputs.items()]
     return f"void {prefix}_{function.identifier}({', '.join(given)})"
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    """Size of an array as an argument; none of an empty one, which C does not know."""
+    return f"[{prod(shape) or ''}]"
 
 
 def _batch_signature(prefix: str, function: ExportedFunction) -> str:
@@ -150,3 +156,4 @@ def _unused(function: ExportedFunction) -> Iterator[str]:
         values = [next(flat) for _ in range(prod(shape))]
         if used.isdisjoint(values):
             yield f"(void){name};"
+    yield from (f"(void){name};" for name, shape in function.outputs.items() if not prod(shape))

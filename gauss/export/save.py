@@ -20,7 +20,7 @@ def save_as(
         The system.
     language : str
         "c": a header and a source; "casadi": one file for each function, for ``casadi.Function.load``; "jax": a Python
-        module; "latex": a document with the equations of motion in symbols.
+        module; "latex": a document with the equations of motion in symbols; "fmu": a unit of FMI 3, see :func:`to_fmu`.
     folder : str or Path
         Folder of the files; it is made if it does not exist.
     names : sequence of str, optional
@@ -95,9 +95,18 @@ def _latex(system, names) -> str:
     return latex_document(system, names)
 
 
+def _save_fmu(system, folder: Path, names, name: str) -> list[Path]:
+    from gauss.export.fmu.unit import to_fmu
+
+    if names is not None:
+        raise ArgumentError("export: a unit of FMI has no functions to choose; its outputs are those of the scene.")
+    return [to_fmu(system, folder, name)]
+
+
 WRITERS: dict[str, Callable] = {
     "c": _save_c,
     "casadi": _save_casadi,
     "jax": _save_text(_jax, ".py"),
     "latex": _save_text(_latex, ".tex"),
+    "fmu": _save_fmu,
 }

@@ -180,3 +180,26 @@ def test_exported_functions_have_the_states():
     np.testing.assert_allclose(
         function([0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0])[:2], MOTOR @ [1.0, 2.0] + [0.0, VOLTAGE / INDUCTANCE]
     )
+
+
+AREA, VOLUME, MODULUS, SUPPLY, FLOW, RAM = 2e-3, 1e-3, 1.4e9, 2e7, 1e-7, 50.0
+
+
+def press(opening, **others):
+    scene = gauss.Scene("press", gravity=(0, 0, 0))
+    scene.prismatic("x", "ground", scene.body("ram", RAM))
+    oil = {"area": AREA, "rod_area": AREA, "volume": VOLUME, "bulk_modulus": MODULUS, "supply": SUPPLY, "flow": FLOW}
+    actuators.hydraulic_cylinder(scene, "jack", "x", opening, **oil | others)
+    return scene
+
+
+def test_oil_between_closed_valves_is_a_spring():
+    """ω² = 2 β A² / (V m) of a ram between two columns of oil (Merritt 1967, eq. 6-35)."""
+    found = np.abs(gauss.linearise(press(0.0)).eigenvalues.imag).max()
+    assert found == pytest.approx(np.sqrt(2.0 * MODULUS * AREA**2 / (VOLUME * RAM)), rel=1e-10)
+
+
+def test_an_unloaded_cylinder_moves_as_the_flow_fills_it():
+    """K u √(p / 2) = A v: each edge of the valve takes half of the supply pressure; leakage damps the oil."""
+    found = gauss.simulate(press(0.5, leakage=2e-12), 1.0, rtol=1e-8, progress=False)
+    assert found.rate("x")[-1] == pytest.approx(FLOW * 0.5 * np.sqrt(SUPPLY / 2.0) / AREA, rel=1e-4)

@@ -98,7 +98,7 @@ class Phase:
     ):
         whole, self.selector = selector.system, selector
         names = [whole.contacts.placed[i].name for i in held]
-        self.case, self.held, self.mode = (held, mode), np.array(held, dtype=int), mode
+        self.case, self.held, self.mode, self.places = (held, mode), np.array(held, dtype=int), mode, dict(places)
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
         self.signs = np.array([mode.set_valued[name] for name in selector.names], dtype=int)
         self.system, self.links, cut, self.margins = phase_parts(whole, tuple(names), mode, places)

@@ -25,6 +25,7 @@ UNITS = {
     "force": "N",
     "moment": "N m",
 }
+POSITIVE = ("mass", "length", "radius")  # of which no element may have 0
 PARAMETER = re.compile(r"^(?P<name>.+?)(?:\[(?P<number>\d+)\]|\.(?P<axis>[xyz]))?$")
 
 
@@ -172,6 +173,27 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
     group, element = having[0]
     element = replace(element, **{key: _entry(name, getattr(element, key), index, value)})
     return replace(scene, **{group: getattr(scene, group) | {owner: element}})
+
+
+def value_of(scene: Scene, name: str) -> float:
+    """Value of a number of a scene, by the names of :func:`changed`.
+
+    Raises
+    ------
+    SceneError
+        If there is no such number; the message says what there is.
+    """
+    changed(scene, name, 0.0 if name.rpartition(".")[2] not in POSITIVE else 1.0)  # its checks and messages
+    path, index = _parsed(name)
+    owner, _, key = path.rpartition(".")
+    found: Any
+    if path == "gravity":
+        found = scene.gravity
+    elif is_start(scene, name):
+        found = getattr(scene.starts.get(owner, Start(owner)), key)
+    else:
+        found = next(getattr(element, key) for _, element in _elements(scene, name, owner) if hasattr(element, key))
+    return float(found if index is None else found[index])
 
 
 def _elements(scene: Scene, name: str, owner: str) -> list[tuple[str, Any]]:

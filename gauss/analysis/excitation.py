@@ -1,0 +1,194 @@
+"""Excitation trajectories for identification: Fourier series whose regressor has the least condition number within limits.
+
+    q_i(t) = q̄_i + s Σ_k (a_ik sin(kωt) − b_ik cos(kωt)) / (kω),   k = 1 … n
+
+is periodic, so that samples of periods average out noise (Swevers, Ganseman, Tükel, De Schutter, Van Brussel, Optimal robot
+excitation and identification, IEEE Trans. Robotics and Automation 13(5), 1997). The factor s scales each coordinate to its
+limits; the condition number of the base columns in their units is minimised (Gautier and Khalil, Exciting trajectories for
+the identification of base inertial parameters of robots, IJRR 11(4), 1992).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from gauss.analysis.base_parameters import base_of, random_matrix
+from gauss.analysis.regressor import RegressorModel
+from gauss.arguments import named_arguments
+from gauss.errors import ArgumentError, SimulationError, did_you_mean, require
+from gauss.scene import Scene
+from gauss.simulation.tolerances import check_tolerances
+from gauss.system import System
+
+SAMPLES = 10  # of a period, for each harmonic: they resolve its extremes to 5 % of the limits, which are kept by MARGIN
+MARGIN = 1.0 / 0.95
+LIMITS = (1.0, 2.0, 10.0)  # of coordinates about their centre, rates and accelerations where none are given [rad or m, s]
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A periodic motion that excites the parameters of a system.
+
+    Parameters
+    ----------
+    coordinates : tuple of str
+        Names of the coordinates.
+    centre : ndarray, shape (n,)
+        Constant parts q̄ [rad, m].
+    sines, cosines : ndarray, shape (n, harmonics)
+        Amplitudes s a and s b of the rates [rad/s, m/s].
+    frequency : float
+        Frequency ω of the first harmonic [rad/s].
+    condition : float
+        Condition number of the base columns of the regressor over a period, in the units of the scene.
+    random_condition : float
+        Median of this number over the random series from which it was sought.
+    """
+
+    coordinates: tuple[str, ...]
+    centre: np.ndarray
+    sines: np.ndarray
+    cosines: np.ndarray
+    frequency: float
+    condition: float
+    random_condition: float
+
+    @property
+    def period(self) -> float:
+        """Period [s]."""
+        return 2.0 * np.pi / self.frequency
+
+    def at(self, t) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates, rates and accelerations (k, n) at times (k,) [s]."""
+        q, v, a = _series(np.asarray(t, dtype=float), self.frequency, self.sines, self.cosines)
+        return self.centre + q, v, a
+
+
+@named_arguments
+def excitation(
+    system: System | Scene,
+    period: float,
+    *,
+    harmonics: int = 5,
+    limits: Mapping[str, tuple[tuple[float, float], float, float]] | None = None,
+    friction=(),
+    trials: int = 20,
+    seed: int = 0,
+) -> Excitation:
+    """Periodic motion within limits that identifies the base parameters of a system best.
+
+    Parameters
+    ----------
+    system : System or Scene
+        A system without loops, of joints of one freedom.
+    period : float
+        Period [s].
+    harmonics : int
+        Number of harmonics of each coordinate.
+    limits : mapping of str to ((float, float), float, float), optional
+        Least and largest coordinate, largest rate and acceleration of each joint [rad, m, s]; those of the joint, or one
+        about the reference configuration, with 2/s and 10/s² when not given.
+    friction : sequence of str
+        Joints whose friction is to be found, see :func:`gauss.identify`.
+    trials : int
+        Random series, of which the best is improved.
+    seed : int
+        Seed of these.
+
+    Returns
+    -------
+    Excitation
+        The series; ``at(t)`` gives the motion.
+
+    Raises
+    ------
+    ArgumentError
+        If an argument does not fit.
+    SimulationError
+        If the system has loops or joints of several freedoms, by name, or the duration is no positive number.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> series = gauss.excitation(gauss.load("double_pendulum"), 5.0, harmonics=3, trials=5)
+    >>> bool(series.condition < series.random_condition)
+    True
+    """
+    require(system, (System, Scene), "excitation")
+    check_tolerances(duration=period, step=period)
+    for name, value in (("harmonics", harmonics), ("trials", trials)):
+        if not isinstance(value, int) or value < 1:
+            raise ArgumentError(f"excitation: {name}: expected a number ≥ 1, got {value!r}.")
+    model = RegressorModel(system, None, friction)
+    problem = _SeriesProblem(model, period, harmonics, limits)
+    rng = np.random.default_rng(seed)
+    starts = rng.normal(size=(trials, 2 * harmonics * problem.n))
+    found = [problem.value(start) for start in starts]
+    first = starts[int(np.argmin(found))]
+    best = minimize(problem.value, first, method="L-BFGS-B", options={"maxiter": 15 * problem.n}).x
+    sines, cosines = problem.scaled(best)
+    condition, usual = float(np.exp(problem.value(best))), float(np.exp(np.median(found)))
+    return Excitation(problem.names, problem.centre, sines, cosines, problem.frequency, condition, usual)
+
+
+class _SeriesProblem:
+    """Logarithm of the condition number, as a function of the amplitudes."""
+
+    def __init__(self, model: RegressorModel, period: float, harmonics: int, limits):
+        system = model.system
+        if system.has_closures or system.n_q != system.n_v:
+            wide = [joint.name for joint in system.joints if joint.pair.n_v > 1]
+            what = f"joints of several freedoms, {', '.join(wide)}" if wide else "loops"
+            raise SimulationError(f"excitation: scene {system.scene.name!r} has {what}; give motions of your own.")
+        self.model, self.names, self.n = model, tuple(system.coordinates), system.n_v
+        self.base = list(base_of(model, random_matrix(model, 0)).base)
+        self.frequency = 2.0 * np.pi / period
+        self.t = np.linspace(0.0, period, SAMPLES * harmonics, endpoint=False)
+        self.centre, self.largest = self._limits(dict(limits or {}))
+
+    def _limits(self, given: dict) -> tuple[np.ndarray, np.ndarray]:
+        """Centres (n,), and largest displacements, rates and accelerations (3, n)."""
+        system = self.model.system
+        for name in given:
+            if name not in self.names:
+                raise ArgumentError(f"excitation: limits of {name!r}. {did_you_mean(name, self.names)}")
+        centre, largest = np.zeros(self.n), np.zeros((3, self.n))
+        for k, name in enumerate(self.names):
+            own = getattr(system.scene.joints.get(name), "limits", None)
+            middle = system.reference.q[k]
+            (low, high), rate, acceleration = given.get(
+                name, (own or (middle - LIMITS[0], middle + LIMITS[0]), LIMITS[1], LIMITS[2])
+            )
+            if not (low < high and rate > 0.0 and acceleration > 0.0):
+                raise ArgumentError(f"excitation: limits of {name!r}: expected ((low, high), rate, acceleration).")
+            centre[k], largest[:, k] = 0.5 * (low + high), (0.5 * (high - low), rate, acceleration)
+        return centre, largest
+
+    def scaled(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes (n, harmonics) of the largest series within the limits."""
+        sines, cosines = x.reshape(2, self.n, -1)
+        parts = _series(self.t, self.frequency, sines, cosines)
+        sizes = np.array([np.abs(part).max(axis=0) for part in parts])
+        factor = (self.largest / (MARGIN * np.maximum(sizes, np.finfo(float).tiny))).min(axis=0)
+        return sines * factor[:, None], cosines * factor[:, None]
+
+    def value(self, x: np.ndarray) -> float:
+        """Logarithm of the condition number."""
+        q, v, a = _series(self.t, self.frequency, *self.scaled(x))
+        rows = self.model.matrix(self.centre + q, v, a)[:, :, self.base] * self.model.units[self.base]
+        rows = rows / self.model.row_units[:, None]
+        sizes = np.linalg.svd(rows.reshape(-1, len(self.base)), compute_uv=False)
+        return float(np.log(sizes[0] / max(sizes[-1], 1e-300)))
+
+
+def _series(t: np.ndarray, frequency: float, sines: np.ndarray, cosines: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Displacements, rates and accelerations (k, n) of a series."""
+    omega = frequency * np.arange(1, sines.shape[1] + 1)
+    s, c = np.sin(np.outer(t, omega)), np.cos(np.outer(t, omega))
+    return (
+        (s / omega) @ sines.T - (c / omega) @ cosines.T,
+        c @ sines.T + s @ cosines.T,
+        (c * omega) @ cosines.T - (s * omega) @ sines.T,
+    )

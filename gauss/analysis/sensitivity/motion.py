@@ -1,0 +1,174 @@
+"""A motion in steps, and the linear maps of small changes over each: smooth steps, and events between them."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from gauss.analysis.motion_step import MotionStep
+from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
+from gauss.analysis.sensitivity.saltation import Transition
+from gauss.analysis.tangents import Tangents
+from gauss.dynamics import compile_scene
+from gauss.errors import ArgumentError, SimulationError, require
+from gauss.scene import Scene
+from gauss.simulation.tolerances import check_tolerances
+from gauss.system import State, System, coordinate_rates
+
+WHOLE = 1e-9  # share of a step by which the duration may differ from a whole number of steps
+SHORTEST = 1e-13  # of a step: what is left between an event and a node is rounding
+
+
+class Piece(Protocol):
+    """Linear map of small changes of (state, inputs, parameters), (n_given,), to those of the state, (n_x,)."""
+
+    def change(self, directions: np.ndarray) -> np.ndarray:
+        """Changes (n_x, k) of the state at its end along directions (n_given, k)."""
+
+    def gradient(self, weights: np.ndarray) -> np.ndarray:
+        """Gradient (n_given,) of weights · state at its end."""
+
+
+@dataclass(frozen=True)
+class SmoothStep:
+    """Linear map of one smooth step.
+
+    Parameters
+    ----------
+    step : MotionStep
+        Dynamics.
+    t, h : float
+        Its start and its length [s].
+    x, u : ndarray, shape (n_x,), (n_u,)
+        State at its start, and inputs.
+    """
+
+    step: MotionStep
+    t: float
+    h: float
+    x: np.ndarray
+    u: np.ndarray
+
+    def change(self, directions: np.ndarray) -> np.ndarray:
+        """Changes (n_x, k) of the state at its end along directions (n_given, k)."""
+        return self.step.change(self.t, self.h, self.x, self.u, directions)
+
+    def gradient(self, weights: np.ndarray) -> np.ndarray:
+        """Gradient (n_given,) of weights · state at its end."""
+        return self.step.gradient(self.t, self.h, self.x, self.u, weights)
+
+
+class Motion:
+    """Motion of fixed steps, before its derivatives.
+
+    Parameters
+    ----------
+    system, duration, step, state, inputs, parameters, integrator
+        As for :func:`gauss.sensitivities`.
+
+    Attributes
+    ----------
+    t, x : ndarray, shape (k,), (k, n_x)
+        Its times and states.
+    pieces : list of list of Piece
+        Linear maps of each step, in order.
+    """
+
+    def __init__(self, system, duration, step, state, inputs, parameters, integrator):
+        require(system, (System, Scene), "sensitivities")
+        system = compile_scene(system) if isinstance(system, Scene) else system
+        check_tolerances(duration=duration, step=step)
+        self.steps = round(duration / step)
+        if self.steps < 1 or abs(self.steps * step - duration) > WHOLE * step:
+            raise ArgumentError(f"sensitivities: duration {duration} s is no whole number of steps of {step} s.")
+        self.h, self.start = step, system.initial_state() if state is None else state
+        require(self.start, (State,), "sensitivities: state")
+        self.parameters = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+        self.integrator, self.system = integrator, system
+        shape = self.steps, len(system.scene.inputs)
+        self.inputs = np.zeros(shape) if inputs is None else np.array(inputs, dtype=float)
+        if self.inputs.shape != shape:
+            raise ArgumentError(f"sensitivities: inputs: expected shape {shape}, got {self.inputs.shape}.")
+        self.t = self.start.t + step * np.arange(self.steps + 1)
+        if system.scene.nonsmooth:
+            self._through_events()
+        else:
+            self._smoothly()
+        if not np.isfinite(self.x).all():
+            late = self.t[np.flatnonzero(~np.isfinite(self.x).all(axis=1))[0]]
+            raise SimulationError(f"sensitivities: the motion is not finite at t = {late:.6g} s; take shorter steps.")
+
+    @property
+    def states(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times, coordinates and rates."""
+        n_q = self.system.n_q
+        return self.t, self.x[:, :n_q], self.x[:, n_q:]
+
+    def directions(self) -> tuple[np.ndarray, tuple[str, ...]]:
+        """Changes (n_x, m) of the start along independent coordinates and rates, and their names."""
+        system = self.step.system
+        tangents = Tangents(system, self.start)
+        N, D, rate = tangents.position, tangents.change, tangents.rate
+        moved = (
+            np.array([coordinate_rates(system, self.start.q, column) for column in N.T]).reshape(N.shape[1], system.n_q).T
+        )
+        still = np.zeros((system.n_q, rate.shape[1]))
+        names = [system.coordinates[k] for k in tangents.independent_coordinates]
+        names += [f"{system.coordinates[k]} rate" for k in tangents.independent_rates]
+        return np.block([[moved, still], [D, rate]]), tuple(names)
+
+    def _smoothly(self):
+        """Equal steps of one smooth system."""
+        self.step = MotionStep(self.system, self.integrator, self.parameters)
+        self.x = np.empty((self.steps + 1, self.step.n_x))
+        self.x[0] = packed(self.start)
+        for k in range(self.steps):
+            self.x[k + 1] = self.step.after(self.t[k], self.h, self.x[k], self.inputs[k])
+        steps = zip(self.t, self.x, self.inputs, strict=False)
+        self.pieces: list[list[Piece]] = [[SmoothStep(self.step, t, self.h, x, u)] for t, x, u in steps]
+
+    def _through_events(self):
+        """Steps that end at the nodes and at the events of the motion of :func:`gauss.simulate`."""
+        self._refuse_events()
+        record, self.x = recorded_motion(self.system, self.h * self.steps, self.start, self.t, self.inputs)
+        self.start = record[0].start
+        self.pieces = [[] for _ in range(self.steps)]
+        made: dict[int, MotionStep] = {}
+        steps = [self._step_of(one, made) for one in record]
+        self.step = steps[0]
+        for k, (one, times) in enumerate(zip(record, phase_times(record, self.t), strict=True)):
+            if k:
+                row = self._row(one.start.t)
+                between = Transition(self.system, record[k - 1], one, (steps[k - 1], steps[k]), self.inputs[row])
+                self.pieces[row].append(between.saltation())
+            self._append_steps(steps[k], one, times)
+
+    def _step_of(self, one: RecordedPhase, made: dict[int, MotionStep]) -> MotionStep:
+        """Smooth dynamics of a phase."""
+        system = one.system(self.system)
+        return made.setdefault(id(system), MotionStep(system, self.integrator, self.parameters))
+
+    def _append_steps(self, step: MotionStep, one: RecordedPhase, times: np.ndarray):
+        """Smooth steps between the times of a phase."""
+        x = packed(one.start)
+        for begin, end in zip(times[:-1], times[1:], strict=True):
+            row = self._row(0.5 * (begin + end))
+            if end - begin > SHORTEST * self.h:
+                self.pieces[row].append(SmoothStep(step, begin, end - begin, x, self.inputs[row]))
+            node = np.flatnonzero(self.t == end)
+            x = self.x[node[0]] if node.size else x  # the end of a phase is no start of a step
+
+    def _row(self, t: float) -> int:
+        """Number of the step in which a time lies."""
+        return int(np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, self.steps - 1))
+
+    def _refuse_events(self):
+        """Raise a SimulationError for elements whose events have no derivatives here."""
+        scene = self.system.scene
+        names = [*scene.losses, *scene.backlashes, *(placed.name for placed in self.system.slips.placed)]
+        names = [name for name in dict.fromkeys(names) if name not in scene.set_valued]
+        if names:
+            raise SimulationError(
+                f"scene {scene.name!r} cannot be differentiated: events of {', '.join(map(repr, names))} (losses, backlash, "
+                "friction of contacts) have no derivatives here; leave them out, or make them smooth loads."
+            )

@@ -1,0 +1,105 @@
+"""``modelDescription.xml`` of a unit (FMI 3.0, section 2.4), and ``buildDescription.xml`` of its sources."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import NamedTuple
+from xml.sax.saxutils import quoteattr
+
+from gauss.system import State, System
+from gauss.system.coordinate_names import coordinate_units, rate_units
+from gauss.versions import VERSION
+
+
+class Variable(NamedTuple):
+    """A variable of a unit.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    reference : int
+        Its value reference.
+    attributes : dict of str to str
+        Attributes of its element.
+    """
+
+    name: str
+    reference: int
+    attributes: dict[str, str]
+
+    def __str__(self) -> str:
+        pairs = {"name": self.name, "valueReference": str(self.reference), "variability": "continuous"} | self.attributes
+        return f"    <Float64 {' '.join(f'{key}={quoteattr(value)}' for key, value in pairs.items())}/>"
+
+
+def state_names(system: System) -> dict[str, str]:
+    """Names and units of the states: coordinates, then rates; states of one's own have their names."""
+    coordinates, rates, own = coordinate_units(system), rate_units(system), system.scene.states
+    named = {f"integral of {name}" if name in own else name: unit for name, unit in coordinates.items()}
+    return named | {name if name in own else f"{name} rate": "1" if name in own else unit for name, unit in rates.items()}
+
+
+def variables(system: System, start: State) -> dict[str, list[Variable]]:
+    """Variables of a unit by kind, in the order of their value references."""
+    scene, states = system.scene, state_names(system)
+    kinds: dict[str, list[Variable]] = {kind: [] for kind in ("time", "states", "derivatives", "inputs", "outputs")}
+    kinds["time"].append(Variable("time", 0, {"causality": "independent"}))
+    reference, values = 1, [*start.q, *start.v]
+    shown = "local" if scene.outputs else "output"
+    for (name, unit), value in zip(states.items(), values, strict=True):
+        given = {"causality": shown, "initial": "exact", "start": repr(float(value)), "description": f"[{unit}]"}
+        kinds["states"].append(Variable(name, reference, given))
+        reference += 1
+    for k, name in enumerate(states):
+        kinds["derivatives"].append(
+            Variable(f"der({name})", reference, {"causality": "local", "initial": "calculated", "derivative": str(k + 1)})
+        )
+        reference += 1
+    for name in scene.inputs:
+        kinds["inputs"].append(Variable(name, reference, {"causality": "input", "start": "0.0"}))
+        reference += 1
+    for output in scene.outputs.values():
+        size = output.size(scene)
+        for k in range(size):
+            name = output.name if size == 1 else f"{output.name}[{k}]"
+            taken = name in states or name in scene.inputs
+            label = f"output {name}" if taken else name
+            kinds["outputs"].append(Variable(label, reference, {"causality": "output", "initial": "calculated"}))
+            reference += 1
+    return kinds
+
+
+def model_description(system: System, identifier: str, token: str, found: dict[str, list[Variable]]) -> str:
+    """Text of ``modelDescription.xml``."""
+    return "\n".join(_description(system, identifier, token, found))
+
+
+def _description(system: System, identifier: str, token: str, found: dict[str, list[Variable]]) -> Iterator[str]:
+    yield '<?xml version="1.0" encoding="UTF-8"?>'
+    yield f'<fmiModelDescription fmiVersion="3.0" modelName={quoteattr(system.scene.name)}'
+    made = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    yield f'    instantiationToken="{token}" generationTool="gauss {VERSION}" generationDateAndTime="{made}">'
+    yield f'  <ModelExchange modelIdentifier="{identifier}" needsCompletedIntegratorStep="true"/>'
+    yield f'  <CoSimulation modelIdentifier="{identifier}" canHandleVariableCommunicationStepSize="true"/>'
+    yield '  <DefaultExperiment startTime="0" stopTime="1"/>'
+    yield "  <ModelVariables>"
+    yield from (str(variable) for kind in found.values() for variable in kind)
+    yield "  </ModelVariables>"
+    yield "  <ModelStructure>"
+    outputs = [one for kind in found.values() for one in kind if one.attributes["causality"] == "output"]
+    yield from (f'    <Output valueReference="{one.reference}"/>' for one in outputs)
+    yield from (f'    <ContinuousStateDerivative valueReference="{one.reference}"/>' for one in found["derivatives"])
+    unknown = [*found["derivatives"], *found["outputs"]]
+    yield from (f'    <InitialUnknown valueReference="{one.reference}"/>' for one in unknown)
+    yield "  </ModelStructure>"
+    yield "</fmiModelDescription>\n"
+
+
+def build_description(identifier: str, sources: list[str]) -> str:
+    """Text of ``sources/buildDescription.xml``."""
+    files = "\n".join(f'      <SourceFile name="{name}"/>' for name in sources)
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
+        f'  <BuildConfiguration modelIdentifier="{identifier}">\n    <SourceFileSet language="C99">\n{files}\n'
+        "    </SourceFileSet>\n  </BuildConfiguration>\n</fmiBuildDescription>\n"
+    )

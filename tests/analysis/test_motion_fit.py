@@ -1,0 +1,140 @@
+import numpy as np
+import pytest
+
+import gauss
+from gauss.errors import ArgumentError, SceneError, SimulationError, StateError
+
+EXACT = 1e-5  # relative: the steps of the fit have errors of 1e-9, times the condition of the parameters
+NOISE = 1e-3  # rad
+RUNS, WITHIN = 8, 5.0  # noisy fits, and standard deviations of the sums of their squared errors
+
+
+def sprung():
+    scene = gauss.load("four_bar")
+    scene.joint_spring("spring", "A", stiffness=5.0, damping=0.3, rest=0.2)
+    return scene
+
+
+def driven():
+    scene = gauss.load("cart_pole")
+    scene.input("push", "rail", limits=(-50.0, 50.0))
+    return scene
+
+
+# scene, duration, measured, parameters with first values, true values
+CASES = {
+    "pendulum": (
+        lambda: gauss.load("pendulum"),
+        1.0,
+        ("A",),
+        {"gravity.y": -9.0, "A.rate": 0.1},
+        {"gravity.y": -9.81, "A.rate": 0.0},
+    ),
+    "four-bar": (
+        sprung,
+        0.5,
+        ("A", "D"),
+        {"spring.stiffness": 4.0, "spring.damping": 0.2, "A.rate": 9.0},
+        {"spring.stiffness": 5.0, "spring.damping": 0.3, "A.rate": 10.0},
+    ),
+    "double pendulum": (
+        lambda: gauss.load("double_pendulum"),
+        0.5,
+        ("A", "B rate"),
+        {"lower.mass": 1.4, "lower.com.x": 0.45},
+        None,
+    ),
+}
+
+
+def motion(scene, duration, columns, count=51):
+    t = np.linspace(0.0, duration, count)
+    found = gauss.simulate(scene, duration, times=t, progress=False)
+    names = [*found.system.coordinates]
+    take = lambda name: (found.v if name.endswith(" rate") else found.q)[:, names.index(name.removesuffix(" rate"))]  # noqa: E731
+    return t, {name: take(name) for name in columns}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_exact_motions_give_the_true_parameters(name):
+    make, duration, columns, first, true = CASES[name]
+    scene = make()
+    t, measured = motion(scene, duration, columns)
+    found = gauss.fit_motion(scene, t, measured, first, step=0.005)
+    true = true or {"lower.mass": scene.bodies["lower"].mass, "lower.com.x": scene.bodies["lower"].com[0]}
+    for parameter, value in true.items():
+        assert found.values[parameter] == pytest.approx(value, rel=EXACT, abs=EXACT)
+    assert str(found) and found.residual.max() <= EXACT
+
+
+@pytest.mark.slow
+def test_confidence_of_noisy_motions():
+    """Σ (p − p̂)ᵀ C⁻¹ (p − p̂) over independent runs is χ² of all their degrees."""
+    scene, rng = gauss.load("pendulum"), np.random.default_rng(5)
+    t, measured = motion(scene, 1.0, ("A",))
+    true = {"gravity.y": -9.81, "A.rate": 0.0}
+    total, wanted = 0.0, RUNS * len(true)
+    for _ in range(RUNS):
+        noisy = {"A": measured["A"] + NOISE * rng.standard_normal(t.size)}
+        found = gauss.fit_motion(scene, t, noisy, {"gravity.y": -9.5, "A.rate": 0.05}, step=0.02, noise=[NOISE])
+        error = np.array([found.values[key] - true[key] for key in true])
+        total += error @ np.linalg.solve(found.covariance, error)
+    assert abs(total - wanted) <= WITHIN * np.sqrt(2.0 * wanted)
+
+
+@pytest.mark.slow
+def test_inputs_are_held_between_samples():
+    scene, t = driven(), np.linspace(0.0, 0.4, 41)
+    table = np.sin(np.arange(40))[:, None]
+    true = gauss.simulate(scene, 0.4, times=t, control=table, rate=100.0, progress=False)
+    found = gauss.fit_motion(
+        scene, t, {"rail": true.q[:, 0]}, {"pole.mass": 0.9 * scene.bodies["pole"].mass}, step=0.01, inputs=table
+    )
+    assert found.values["pole.mass"] == pytest.approx(scene.bodies["pole"].mass, rel=EXACT)
+
+
+def test_parameters_that_are_not_identified_are_named():
+    scene = gauss.load("pendulum")
+    t, measured = motion(scene, 0.5, ("A",), 11)
+    with pytest.raises(StateError, match="rod.mass.*gravity.y|gravity.y.*rod.mass"):
+        gauss.fit_motion(scene, t, measured, ["rod.mass", "rod.inertia[2]", "gravity.y"], step=0.05)
+    with pytest.raises(StateError, match="gravity.z"):
+        gauss.fit_motion(scene, t, measured, {"gravity.y": -9.0, "gravity.z": 0.1}, step=0.05)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"times": [0.0, 0.0, 1.0]}, ArgumentError, "increasing"),
+        ({"measured": {"B": [0.0, 0.0]}}, ArgumentError, "'B'"),
+        ({"measured": {"A": [0.0, np.nan]}}, ArgumentError, "finite"),
+        ({"parameters": ["rod.mas"]}, SceneError, "mass"),
+        ({"parameters": []}, ArgumentError, "names"),
+        ({"bounds": {"gravity.y": (1.0, 2.0)}}, ArgumentError, "between"),
+        ({"noise": [-1.0]}, ArgumentError, "noise"),
+        ({"step": 0.0}, ArgumentError, "step"),
+        ({"inputs": [[1.0]]}, ArgumentError, "shape"),
+        ({"integrator": "euler"}, ArgumentError, "rk4"),
+        ({"confidence": 95}, ArgumentError, "confidence"),
+    ],
+)
+def test_bad_input_is_refused(change, error, words):
+    given = {"times": [0.0, 0.1], "measured": {"A": [0.0, 0.01]}, "parameters": ["gravity.y"], "step": 0.01} | change
+    with pytest.raises(error, match=words):
+        gauss.fit_motion(gauss.load("pendulum"), **given)
+
+
+def test_events_are_refused_by_name():
+    scene = gauss.load("pendulum")
+    scene.stop("A", highest=1.0, name="buffer")
+    with pytest.raises(SimulationError, match="buffer"):
+        gauss.fit_motion(scene, [0.0, 0.1], {"A": [0.0, 0.0]}, ["gravity.y"], step=0.01)
+
+
+def test_the_figure_shows_each_column():
+    pytest.importorskip("matplotlib")
+    scene = gauss.load("pendulum")
+    t, measured = motion(scene, 0.5, ("A", "A rate"), 11)
+    figure = gauss.fit_motion(scene, t, measured, ["gravity.y"], step=0.05).plot()
+    assert [axes.get_ylabel() for axes in figure.axes[::2]] == ["A", "A rate"]

@@ -1,0 +1,109 @@
+import shutil
+import subprocess
+import zipfile
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import export
+from gauss.errors import ArgumentError, SimulationError
+from gauss.scene import actuators
+
+COMPILER = shutil.which("cc")
+pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+ACCURACY = 1e-5  # of motions of two integrators with tolerances of 1e-8, relative to the largest value
+SPAN = 0.4
+
+
+def cart():
+    scene = gauss.load("cart_pole")
+    scene.input("push", "rail", limits=(-50.0, 50.0))
+    scene.output("tip", "position", of="pole", at=(0, 0, 0.3))
+    scene.output("felt", "acceleration", of="pole")
+    return scene
+
+
+def motor():
+    scene = gauss.load("pendulum")
+    actuators.dc_motor(scene, "motor", "A", 12.0, resistance=1.0, inductance=0.02, constant=0.3, ratio=4.0)
+    return scene
+
+
+def top():
+    scene = gauss.Scene("spinning", gravity=(0, 0, -9.81))
+    scene.ball("pivot", "ground", scene.body("top", 1.0, (0.01, 0.01, 0.02), com=(0, 0, 0.2)))
+    scene.start("pivot", rate=(1.0, 0.5, 20.0))
+    return scene
+
+
+SCENES = {"four-bar": lambda: gauss.load("four_bar"), "cart-pole": cart, "motor": motor, "ball joint": top}
+
+
+@pytest.mark.peer
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+@pytest.mark.parametrize("name", SCENES)
+def test_units_move_as_the_scene_does(name, kind, tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    from fmpy.validation import validate_fmu
+
+    system = gauss.compile_scene(SCENES[name]())
+    path = str(export.to_fmu(system, tmp_path))
+    assert validate_fmu(path) == []
+    states = [
+        one.name
+        for one in fmpy.read_model_description(path).modelVariables
+        if one.initial == "exact" and one.causality != "input"
+    ]
+    given = {"start_values": {"push": 3.0}} if system.scene.inputs else {}
+    found = fmpy.simulate_fmu(
+        path, stop_time=SPAN, output_interval=0.01, fmi_type=kind, relative_tolerance=1e-8, output=states, **given
+    )
+    held = {"control": lambda t, q, v: [3.0], "rate": 100.0} if system.scene.inputs else {}
+    wanted = gauss.simulate(system, SPAN, progress=False, **held)
+    expected = np.concatenate([wanted.q[-1], wanted.v[-1]])
+    np.testing.assert_allclose(list(found[-1])[1:], expected, rtol=0.0, atol=ACCURACY * np.abs(expected).max())
+
+
+@pytest.mark.peer
+@pytest.mark.slow
+def test_outputs_of_a_unit_are_those_of_the_scene(tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    system = gauss.compile_scene(cart())
+    path = str(export.to_fmu(system, tmp_path, "unit"))
+    names = [f"{output}[{k}]" for output in ("tip", "felt") for k in range(3)]
+    found = fmpy.simulate_fmu(path, stop_time=SPAN, output_interval=0.01, fmi_type="CoSimulation", output=names)
+    wanted = gauss.simulate(system, SPAN, progress=False)
+    expected = np.concatenate([wanted.output("tip")[-1], wanted.output("felt")[-1]])
+    np.testing.assert_allclose(list(found[-1])[1:], expected, rtol=0.0, atol=ACCURACY * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_sources_are_within_the_unit_and_strict(tmp_path):
+    path = export.to_fmu(cart(), tmp_path)
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path)
+    sources = [str(tmp_path / "sources" / name) for name in ("unit.c", "model.c")]
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fPIC", "-shared"]
+    subprocess.run([COMPILER, *flags, *sources, "-o", str(tmp_path / "unit.so"), "-lm"], check=True)
+
+
+def with_stop():
+    scene = gauss.load("pendulum")
+    scene.stop("A", highest=1.0, name="buffer")
+    return scene
+
+
+def with_force_output():
+    scene = gauss.load("pendulum")
+    scene.output("bearing", "joint_force", of="A")
+    return scene
+
+
+@pytest.mark.parametrize(("make", "named"), [(with_stop, "buffer"), (with_force_output, "bearing")])
+def test_what_no_unit_can_hold_is_named(make, named, tmp_path):
+    with pytest.raises(SimulationError, match=f"cannot be exported: .*{named}"):
+        export.to_fmu(make(), tmp_path)
+    with pytest.raises(ArgumentError, match="no functions to choose"):
+        export.save_as(gauss.load("pendulum"), "fmu", tmp_path, ["mass_matrix"])
