@@ -68,15 +68,17 @@ from gauss.analysis.excitation import Excitation, excitation
 from gauss.analysis.identification import Identification, identify
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
-from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion
 from gauss.analysis.mode_motion import mode_motion
 from gauss.analysis.motion_fit import MotionFit, fit_motion
+from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
 from gauss.analysis.planned_path import plan_path
 from gauss.analysis.recommendation import advise
 from gauss.analysis.regressor import Regressor, regressor
 from gauss.analysis.root_locus import RootLocus, root_locus
 from gauss.analysis.sensitivities import MotionGradient, Sensitivities, motion_gradient, sensitivities
+from gauss.analysis.sensitivity.jax_functions import jax_dynamics, jax_motion
+from gauss.analysis.sensitivity.torch_functions import torch_dynamics, torch_motion
 from gauss.analysis.targets import CenterOfMassTarget, DistanceTarget, PointTarget, PoseTarget, PostureTarget
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
@@ -187,7 +189,11 @@ __all__ = [
     "excitation",
     "fit_motion",
     "root_locus",
+    "jax_dynamics",
+    "jax_motion",
     "motion_gradient",
+    "torch_dynamics",
+    "torch_motion",
     "optimal_motion",
     "paradoxes",
     "plan_motion",

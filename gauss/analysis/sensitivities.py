@@ -2,7 +2,7 @@
 
 Forward, X₊ = F′ (X, du, dp) along the motion, a column for each direction; adjoint, λ = F′ᵀ λ₊ back along it, for the
 gradient of one number at the cost of some motions, whatever the number of inputs. Both are exact derivatives of the computed
-steps (:mod:`gauss.analysis.motion_step`); with loops, those by parameters to the order of the method, for stages are off the
+steps (:mod:`gauss.dynamics.motion_step`); with loops, those by parameters to the order of the method, for stages are off the
 constraints. Events lie between steps, with matrices of their own (:mod:`gauss.analysis.sensitivity.saltation`).
 """
 

@@ -4,9 +4,7 @@ from gauss.export.exported_function import DEFAULTS, ExportedFunction, exported_
 from gauss.export.fmu.unit import to_fmu
 from gauss.export.formulas import Formulas, latex_document, to_sympy
 from gauss.export.jax_module import jax_source, to_jax
-from gauss.export.jax_motion import jax_dynamics, jax_motion
 from gauss.export.save import save_as
-from gauss.export.torch_function import torch_dynamics, torch_motion
 
 __all__ = [
     "CCode",
@@ -14,8 +12,6 @@ __all__ = [
     "ExportedFunction",
     "Formulas",
     "exported_functions",
-    "jax_dynamics",
-    "jax_motion",
     "jax_source",
     "latex_document",
     "save_as",
@@ -24,6 +20,4 @@ __all__ = [
     "to_fmu",
     "to_jax",
     "to_sympy",
-    "torch_dynamics",
-    "torch_motion",
 ]

@@ -39,6 +39,13 @@ class FourBarDesign:
         Distance from the prescribed points [m], errors of the prescribed angles [rad], or of the poses [m].
     turned : float
         Angle from the coupler to the frame whose poses are prescribed, or from the rocker to the output [rad].
+
+    Examples
+    --------
+    >>> from gauss import linkages
+    >>> design = linkages.function_generation([0.7, 1.2, 1.7], [1.6, 2.0, 2.4])
+    >>> design.linkage().name
+    'four-bar'
     """
 
     dimensions: dict[str, float]

@@ -335,6 +335,17 @@ def hydraulic_cylinder(
     -------
     Drive
         Drive of the joint.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.scene import actuators
+    >>> press = gauss.Scene("press", gravity=(0, 0, 0))
+    >>> slide = press.prismatic("slide", "ground", press.body("ram", 50.0, (1.0, 1.0, 1.0)), axis=(1, 0, 0))
+    >>> oil = {"volume": 5e-4, "bulk_modulus": 1.4e9, "supply": 2e7, "flow": 1e-7}
+    >>> drive = actuators.hydraulic_cylinder(press, "lift", slide, 0.5, area=1e-3, rod_area=5e-4, **oil)
+    >>> round(float(gauss.simulate(press, 0.5).v[-1, 0]), 3)  # m/s
+    0.214
     """
     what = f"cylinder {text(name, 'name of a cylinder')!r}"
     _positive(what, area=area, rod_area=rod_area, volume=volume, bulk_modulus=bulk_modulus, flow=flow)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.analysis.motion_step import TABLEAUS
+from gauss.dynamics.motion_step import TABLEAUS
 from gauss.errors import ArgumentError, SimulationError, StateError
 
 ACCURACY = 1e-8  # of extrapolated differences, relative to the largest derivative of the motion

@@ -11,6 +11,7 @@ from gauss.docs.groups import GROUPS
 
 NEEDS = {"gauss.gym": "gymnasium", "gauss.view": "viser", "gauss.export.to_sympy": "sympy", "gauss.export.Formulas": "sympy"}
 NEEDS |= {"gauss.export.latex_document": "sympy", "gauss.export.to_casadi": "casadi", "gauss.export.to_jax": "jax"}
+NEEDS |= {"gauss.jax_": "jax", "gauss.torch_": "torch"}
 FINDER = doctest.DocTestFinder(recurse=True)
 
 

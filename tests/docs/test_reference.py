@@ -9,6 +9,11 @@ from gauss.docs.uses import names_in, uses
 from gauss.dynamics.plan import MOTIONS
 from tests.docs.test_doctests import EXAMPLES
 
+ABSENT = (
+    "torch_",
+    "jax_",
+)  # functions of libraries that the pages cannot count on: an example of the docstring stands for them
+
 GROUPED = [name for group in GROUPS for name in group.names]
 PACKAGES = (
     "gauss",
@@ -33,7 +38,8 @@ def test_every_public_name_is_in_one_group():
 
 def test_every_name_of_gauss_is_used_by_a_page_or_an_example():
     used = uses()
-    assert [name for name in gauss.__all__ if f"gauss.{name}" not in used] == []
+    typed = [name for name in gauss.__all__ if not name.startswith(ABSENT)]
+    assert [name for name in typed if f"gauss.{name}" not in used] == []
 
 
 def test_every_public_name_has_an_example():

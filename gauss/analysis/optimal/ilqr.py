@@ -1,7 +1,7 @@
 """Iterative LQR with limited inputs: optimal inputs of a motion of fixed steps, with the feedback gains about it.
 
 Backward, the quadratic model of the cost to go, Q = ℓ + V⁺(F), with the exact first derivatives of compiled steps
-(:mod:`gauss.analysis.motion_step`) and exact ones of the cost; forward, u = û + α k + K (x − x̂) with a line search on α
+(:mod:`gauss.dynamics.motion_step`) and exact ones of the cost; forward, u = û + α k + K (x − x̂) with a line search on α
 (Li and Todorov 2004; Tassa, Mansard and Todorov, Control-limited differential dynamic programming, ICRA 2014).
 """
 
@@ -11,13 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
-from gauss.analysis.motion_step import MotionStep
 from gauss.analysis.optimal.box_qp import box_minimum
 from gauss.analysis.optimal.cost_derivatives import CostDerivatives
 from gauss.analysis.optimal.equations import unlimited
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, reverse
 from gauss.dynamics import compile_scene
+from gauss.dynamics.motion_step import MotionStep
 from gauss.errors import ArgumentError, SimulationError, judged_later, require
 from gauss.scene import Scene
 from gauss.simulation.tolerances import check_tolerances

@@ -1,6 +1,6 @@
 """Error of a mesh: each interval is integrated again from its start by compiled steps of gauss, under the found inputs.
 
-The steps are those of :mod:`gauss.analysis.motion_step`, Runge–Kutta of order 4 with a projection onto the constraints, so
+The steps are those of :mod:`gauss.dynamics.motion_step`, Runge–Kutta of order 4 with a projection onto the constraints, so
 short that their own error is small against that of the collocation.
 """
 
@@ -8,9 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from gauss.analysis.motion_step import MotionStep
 from gauss.analysis.optimal.equations import OptimalEquations
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.dynamics.motion_step import MotionStep
 from gauss.integrators import Rates
 from gauss.system import State
 

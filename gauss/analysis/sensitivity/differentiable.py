@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.analysis.motion_step import MotionStep
 from gauss.analysis.sensitivity.motion import Motion, SmoothStep
 from gauss.dynamics import compile_scene
+from gauss.dynamics.motion_step import MotionStep
 from gauss.errors import ArgumentError, require
 from gauss.scene import Scene
 from gauss.system import System, coordinate_rates

@@ -5,11 +5,11 @@ from typing import Protocol
 
 import numpy as np
 
-from gauss.analysis.motion_step import MotionStep
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
 from gauss.analysis.sensitivity.saltation import Transition
 from gauss.analysis.tangents import Tangents
 from gauss.dynamics import compile_scene
+from gauss.dynamics.motion_step import MotionStep
 from gauss.errors import ArgumentError, SimulationError, require
 from gauss.scene import Scene
 from gauss.simulation.tolerances import check_tolerances

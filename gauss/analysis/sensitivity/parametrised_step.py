@@ -9,11 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
-from gauss.analysis.motion_step import TABLEAUS, MotionStep
 from gauss.codegen import Kernel, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.motion_step import TABLEAUS, MotionStep
 from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.rules import Question

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.analysis.motion_step import MotionStep
 from gauss.analysis.sensitivity.event_derivatives import EventDerivatives
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, smooth_system
 from gauss.dynamics.constraint_scales import gap_scales
+from gauss.dynamics.motion_step import MotionStep
 from gauss.dynamics.parameter_terms import OF_JOINTS
 from gauss.errors import SimulationError
 from gauss.scene import Stop

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from gauss.analysis.motion_step import MotionStep
 from gauss.codegen import Function, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.motion_step import MotionStep
 from gauss.dynamics.outputs import FORCES, measured
 from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question

@@ -35,8 +35,7 @@ def jax_dynamics(system: System | Scene) -> Callable:
     Examples
     --------
     >>> import gauss
-    >>> from gauss import export
-    >>> accelerations = export.jax_dynamics(gauss.load("cart_pole"))  # doctest: +SKIP
+    >>> accelerations = gauss.jax_dynamics(gauss.load("cart_pole"))
     """
     own = DifferentiableDynamics(system)
     return _function(own, lambda q, v, load: v.shape)
@@ -70,8 +69,7 @@ def jax_motion(system: System | Scene, duration: float, *, step: float, integrat
     Examples
     --------
     >>> import gauss
-    >>> from gauss import export
-    >>> motion = export.jax_motion(gauss.load("cart_pole"), 1.0, step=0.01)  # doctest: +SKIP
+    >>> motion = gauss.jax_motion(gauss.load("cart_pole"), 1.0, step=0.01)
     """
     own = DifferentiableMotion(system, duration, step, integrator)
     return _function(own, lambda q, v, inputs: (own.steps + 1, q.shape[-1] + v.shape[-1]))

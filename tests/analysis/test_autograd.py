@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss import export
 
 DIFFERENCE, ACCURACY = 1e-5, 1e-8  # central differences, relative to the largest derivative
 DURATION, STEP = 0.2, 0.01
@@ -77,7 +76,7 @@ def route(request):
 @pytest.mark.parametrize("make", [cart, lambda: gauss.load("four_bar")], ids=["cart-pole", "four-bar"])
 def test_gradients_of_accelerations(route, make):
     system, rng = gauss.compile_scene(make()), np.random.default_rng(1)
-    function = getattr(export, f"{route}_dynamics")(system)
+    function = getattr(gauss, f"{route}_dynamics")(system)
     arguments = [system.initial_state().q, system.initial_state().v, rng.normal(size=system.n_v)]
     weights = rng.normal(size=system.n_v)
     found = ROUTES[route][0](function, arguments, weights)
@@ -91,7 +90,7 @@ def test_gradients_of_accelerations(route, make):
 def test_gradients_of_motions_are_those_of_motion_gradient(route, make):
     """Weights of the last state alone, along its directions that keep the constraints: all, without loops."""
     system, steps = gauss.compile_scene(make()), round(DURATION / STEP)
-    function = getattr(export, f"{route}_motion")(system, DURATION, step=STEP)
+    function = getattr(gauss, f"{route}_motion")(system, DURATION, step=STEP)
     q, v, inputs = given(system, steps)
     inputs = inputs * (make is cart)  # between events, laws of inputs are called from Python: slow
     weights = np.zeros((steps + 1, system.n_q + system.n_v))
@@ -107,7 +106,7 @@ def test_gradients_of_motions_are_those_of_motion_gradient(route, make):
 def test_gradients_of_whole_motions(route):
     """Weights of all states, against differences of an input and of the start."""
     system, steps = gauss.compile_scene(cart()), 5
-    function = getattr(export, f"{route}_motion")(system, steps * STEP, step=STEP)
+    function = getattr(gauss, f"{route}_motion")(system, steps * STEP, step=STEP)
     arguments = given(system, steps)
     weights = np.random.default_rng(2).normal(size=(steps + 1, system.n_q + system.n_v))
     value = lambda *x: float((np.array(function(*tensors(route, *x))) * weights).sum())  # noqa: E731

@@ -35,8 +35,7 @@ def torch_dynamics(system: System | Scene) -> Callable:
     Examples
     --------
     >>> import gauss
-    >>> from gauss import export
-    >>> accelerations = export.torch_dynamics(gauss.load("cart_pole"))  # doctest: +SKIP
+    >>> accelerations = gauss.torch_dynamics(gauss.load("cart_pole"))
     """
     return _function(DifferentiableDynamics(system))
 
@@ -68,8 +67,7 @@ def torch_motion(system: System | Scene, duration: float, *, step: float, integr
     Examples
     --------
     >>> import gauss
-    >>> from gauss import export
-    >>> motion = export.torch_motion(gauss.load("cart_pole"), 1.0, step=0.01)  # doctest: +SKIP
+    >>> motion = gauss.torch_motion(gauss.load("cart_pole"), 1.0, step=0.01)
     """
     return _function(DifferentiableMotion(system, duration, step, integrator))
 
