@@ -1,10 +1,11 @@
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import gauss
-from gauss.errors import SimulationError
+from gauss.errors import SimulationError, SwitchingWarning
 
 ACCURACY = 1e-8  # of extrapolated differences of motions of tolerance 1e-13, relative to the largest derivative
 DIFFERENCE = 1e-4  # largest of the differences that are extrapolated, in the unit of what is changed
@@ -224,3 +225,25 @@ def test_events_without_a_derivative_are_refused_by_name(make, words):
     system, start = make()
     with pytest.raises(SimulationError, match=words):
         gauss.sensitivities(system, 0.4, step=0.01, state=start)
+
+
+@pytest.mark.parametrize(
+    ("law", "switches"),
+    [
+        (lambda t, at: gauss.math.where(at.position("cart")[0] > 0.1, -5.0, 0.0), True),
+        (lambda t, at: gauss.math.floor(10.0 * at.position("cart")[0]), True),
+        (lambda t, at: gauss.math.where(at.position("cart")[0] > 10.0, -5.0, 0.0), False),
+        (lambda t, at: gauss.math.maximum(at.position("cart")[0] - 0.1, 0.0), False),
+        (lambda t: gauss.math.where(t > 0.1, -5.0, 0.0), False),
+    ],
+)
+def test_laws_that_jump_along_a_motion_are_named(law, switches):
+    scene = gauss.Scene("cart", gravity=(0, 0, 0))
+    scene.prismatic("rail", "ground", scene.body("cart", 1.0), axis=(1, 0, 0))
+    scene.drive("rail", force=law, name="push")
+    system, start = started(scene, {"rail": 1.0})
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        gauss.sensitivities(system, 0.3, step=0.01, state=start)
+    told = [one for one in found if issubclass(one.category, SwitchingWarning)]
+    assert [("push" in str(one.message), one.filename == __file__) for one in told] == [(True, True)] * switches

@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from gauss.analysis.sensitivity.law_jumps import warn_of_jumps
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
 from gauss.analysis.sensitivity.saltation import Transition
 from gauss.analysis.tangents import Tangents
@@ -97,6 +98,7 @@ class Motion:
         if not np.isfinite(self.x).all():
             late = self.t[np.flatnonzero(~np.isfinite(self.x).all(axis=1))[0]]
             raise SimulationError(f"sensitivities: the motion is not finite at t = {late:.6g} s; take shorter steps.")
+        warn_of_jumps(system, self.t, self.x)
 
     @property
     def states(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
