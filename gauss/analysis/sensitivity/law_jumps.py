@@ -42,18 +42,21 @@ def _crossings(system: System, t: np.ndarray, x: np.ndarray) -> list[tuple[float
         return []
     state = functions.motion.state
     assert isinstance(state.t, Expression)
-    timed = {node.index for node in of_time(functions.outputs, state.t)}
-    nodes = [node for node in reachable(functions.outputs) if node.op in JUMPS and node.index not in timed]
+    nodes = _conditions(functions.outputs, state.t)
     symbols = [state.t, *state.q, *state.v]
     given = {symbol.index: Interval.point(values) for symbol, values in zip(symbols, [t, *x.T], strict=True)}
     with np.errstate(all="ignore"):
         found = [np.broadcast_to(value.low, t.shape) for value in enclose(nodes, given)]
-    asking = {
-        node.index: [name for name, function in functions.functions if node in reachable(function.outputs)] for node in nodes
-    }
+    asking = [[name for name, law in functions.functions if node in reachable(law.outputs)] for node in nodes]
     changes = [
-        (float(t[k + 1]), asking[node.index])
-        for node, values in zip(nodes, found, strict=True)
+        (float(t[k + 1]), names)
+        for names, values in zip(asking, found, strict=True)
         for k in np.flatnonzero(np.diff(values))
     ]
     return sorted(changes, key=lambda change: change[0])
+
+
+def _conditions(outputs: list[Expression], clock: Expression) -> list[Expression]:
+    """Conditions at which laws may jump, other than those of time."""
+    timed = {node.index for node in of_time(outputs, clock)}
+    return [node for node in reachable(outputs) if node.op in JUMPS and node.index not in timed]
