@@ -10,6 +10,7 @@ from gauss.codegen import processor
 from gauss.errors import ArgumentError
 
 SCRIPT = """
+import numpy as np
 import gauss
 from gauss.codegen import processor
 system = gauss.compile_scene(gauss.load("double_pendulum"))
