@@ -153,7 +153,7 @@ def ilqr(
     >>> cart = gauss.load("cart_pole")
     >>> push = cart.input("push", "rail", limits=20.0)
     >>> upright = lambda q, v: 100 * (q @ q + v @ v)
-    >>> motion = gauss.ilqr(cart, 1.0, step=0.02, cost=lambda t, q, v, u: 0.01 * u @ u, final=upright)
+    >>> motion = gauss.ilqr(cart, 1.2, step=0.02, cost=lambda t, q, v, u: 0.01 * u @ u, final=upright)
     >>> bool(abs(motion.q[-1]).max() < 0.05)
     True
     """
