@@ -34,6 +34,12 @@ def _opaque() -> Scene:
     return scene
 
 
+def _opaque_friction() -> Scene:
+    scene = _opaque()
+    scene.joint_friction("J2", 0.1)
+    return scene
+
+
 def _asking() -> Scene:
     scene = mechanisms.rods(2)
     scene.drive("J1", torque=lambda t, motion: float(motion.position("rod1")[2]))
@@ -125,6 +131,12 @@ CASES = {
         {"integrator": "time_stepping", "step": 1e-3, "backend": "kkt"},
         ("time stepping", "certified"),
         ["time stepping", "time stepping"],
+    ),
+    "steps, an opaque law": (
+        _opaque_friction,
+        {"integrator": "time_stepping", "step": 1e-3},
+        ("time stepping", "callbacks"),
+        ["time stepping"],
     ),
     "steps of many contacts": (
         lambda: free_bodies.stack(2),
