@@ -199,6 +199,6 @@ def test_many_motions_are_labelled(tmp_path):
 
 
 @pytest.mark.parametrize("thing", [np.zeros(3), "motion", None])
-def test_what_is_no_motion_is_not_saved(thing, tmp_path):
-    with pytest.raises(ArgumentError, match="a Scene or a motion"):
+def test_what_is_no_result_is_not_saved(thing, tmp_path):
+    with pytest.raises(ArgumentError, match=type(thing).__name__):
         gauss.save(thing, tmp_path / "thing.nc")
