@@ -70,7 +70,7 @@ def show(
     running.wait()
 
 
-def _kept(path: str, scene: gauss.Scene) -> list:
+def _kept(path: str, scene: "gauss.Scene") -> list:
     """Meshes kept with a motion; of a file without them those of its robot."""
     if not scene.source:
         return []
