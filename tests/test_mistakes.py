@@ -228,7 +228,7 @@ MISTAKES = {
     "scene for a motion": (lambda: gauss.to_dataset(door()), ArgumentError, r"gauss.simulate\(scene, .* returns one"),
     "scene for a system": (lambda: gauss.mobility(door()), ArgumentError, r"gauss.compile_scene\(scene\) makes one"),
     "effort of what is not driven": (lambda: gauss.drive_forces(motion(), "hinge"), StateError, "add a drive"),
-    "unknown ending": (lambda: gauss.save(motion(), "motion.mat"), FileError, "written as .npz or .csv or .nc or .zarr"),
+    "unknown ending": (lambda: gauss.save(motion(), "motion.mat"), FileError, "written as .npz or .csv"),
     "folder that is not there": (lambda: gauss.save(motion(), "none/motion.npz"), FileError, "there is no folder 'none'"),
     "path and motion swapped": (lambda: gauss.save("motion.npz", motion()), ArgumentError, "got a Trajectory"),
     "name for a scene, swept": (lambda: gauss.sweep("door", {}, 1.0), ArgumentError, r"gauss.load\(name\)"),
