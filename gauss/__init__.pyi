@@ -67,7 +67,8 @@ from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibriu
 from gauss.analysis.excitation import Excitation, excitation
 from gauss.analysis.identification import Identification, identify
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
-from gauss.analysis.linear_model import LinearModel, LinearModes, linearise
+from gauss.analysis.linear_model import LinearModel, linearise
+from gauss.analysis.linear_modes import LinearModes
 from gauss.analysis.mode_motion import mode_motion
 from gauss.analysis.motion_fit import MotionFit, fit_motion
 from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion

@@ -14,6 +14,8 @@ import numpy as np
 
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.frozen_time import state_at
+from gauss.analysis.linear_modes import LinearModes
+from gauss.analysis.regulator import gain, unreached, weights
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, write
@@ -28,43 +30,6 @@ from gauss.system import State, System, coordinate_rates
 
 STEADY = 1e-8  # share of the accelerations that forces could cause, below which a state is an equilibrium
 MARGINAL = 1e-7  # real parts below this share of the largest eigenvalue count as zero: round-off of double eigenvalues is √ε
-
-
-@dataclass(frozen=True)
-class LinearModes:
-    """Eigenmodes of a linear model, slowest first; one of each pair of conjugate ones.
-
-    Parameters
-    ----------
-    eigenvalues : ndarray of complex, shape (m,)
-        Eigenvalues [1/s].
-    shapes : ndarray of complex, shape (m, n_v)
-        Displacements along all rates of the system, the largest in its unit being 1.
-    coordinates : tuple of str
-        Names of the displacements.
-    """
-
-    eigenvalues: np.ndarray
-    shapes: np.ndarray
-    coordinates: tuple[str, ...]
-
-    @property
-    def frequencies(self) -> np.ndarray:
-        """Frequencies of the oscillations [Hz], 0 where none is."""
-        return np.abs(self.eigenvalues.imag) / (2.0 * np.pi)
-
-    @property
-    def damping(self) -> np.ndarray:
-        """Damping ratios ``−Re λ / |λ|``; NaN where λ = 0."""
-        with np.errstate(invalid="ignore"):
-            return -self.eigenvalues.real / np.abs(self.eigenvalues)
-
-    def __str__(self):
-        lines = [f"{'Hz':>12}{'damping':>12}  moves most"]
-        for frequency, damping, shape in zip(self.frequencies, self.damping, self.shapes, strict=True):
-            largest = [self.coordinates[k] for k in np.argsort(-np.abs(shape))[:3] if abs(shape[k]) > 0.1]
-            lines.append(f"{frequency:12.6g}{damping:12.4g}  {', '.join(largest)}")
-        return "\n".join(lines)
 
 
 @dataclass(frozen=True)
@@ -115,13 +80,79 @@ class LinearModel:
 
     def modes(self) -> LinearModes:
         """Eigenmodes."""
-        found, vectors = np.linalg.eig(self.A)
+        return self._modes(*np.linalg.eig(self.A))
+
+    def _modes(self, found: np.ndarray, vectors: np.ndarray) -> LinearModes:
+        """Modes of eigenvalues (m,) and of vectors (n, m) of the states."""
         order = [k for k in np.argsort(np.abs(found), kind="stable") if found[k].imag >= 0.0]
         shapes = (self.displacements @ vectors[: self.displacements.shape[1]]).T[order]
         shares = shapes / self.system.scale.coordinates
         peaks = shares[np.arange(len(shares)), np.abs(shares).argmax(axis=1)] if shares.size else np.ones(len(shares))
         scaled = shapes / np.where(peaks == 0.0, 1.0, peaks)[:, None]
         return LinearModes(found[order], scaled, tuple(self.system.coordinates))
+
+    def uncontrollable(self) -> LinearModes:
+        """Eigenmodes that no input reaches.
+
+        Returns
+        -------
+        LinearModes
+            Those modes; none where every mode is reached.
+        """
+        units = self._units[:, None]
+        eigenvalues, vectors = unreached(self.A * units.T / units, self.B / units)
+        return self._modes(eigenvalues, units * vectors)
+
+    def lqr(self, Q=None, R=None) -> np.ndarray:
+        """Gain K of the linear-quadratic regulator u = −K x, which minimises ∫ xᵀ Q x + uᵀ R u dt.
+
+        Parameters
+        ----------
+        Q : array_like, shape (n, n) or (n,), optional
+            Weights of the states, or their diagonal; when not given one over the squares of the units of the scene.
+        R : array_like, shape (m, m) or (m,), optional
+            Weights of the inputs; ones when not given.
+
+        Returns
+        -------
+        ndarray, shape (m, n)
+            The gain.
+
+        Raises
+        ------
+        ArgumentError
+            If weights do not fit.
+        SimulationError
+            If the model has no inputs, or no input reaches a mode that is not stable, by the coordinates that it moves.
+
+        Examples
+        --------
+        >>> import gauss
+        >>> cart = gauss.load("cart_pole")
+        >>> push = cart.input("push", "rail")
+        >>> model = gauss.linearise(cart)
+        >>> K = model.lqr(Q=[1, 10, 1, 1])
+        >>> bool((abs(K) > 0).all())
+        True
+        """
+        if not self.inputs:
+            raise SimulationError("lqr: expected a model with inputs; name some in linearise, or by scene.input.")
+        left = self.uncontrollable()
+        moving = left.eigenvalues.real > -MARGINAL * np.abs(self.eigenvalues).max(initial=0.0)
+        if moving.any():
+            named = str(LinearModes(left.eigenvalues[moving], left.shapes[moving], left.coordinates))
+            raise SimulationError(
+                f"lqr: {', '.join(map(repr, self.inputs))} do not reach these modes, which are not stable:\n{named}"
+            )
+        return gain(self.A, self.B, weights(Q, self._units**-2.0, "Q"), weights(R, np.ones(len(self.inputs)), "R"))
+
+    @property
+    def _units(self) -> np.ndarray:
+        """Units (n,) of the states."""
+        scale, names = self.system.scale, list(self.system.coordinates)
+        of = {name: unit for name, unit in zip(names, scale.coordinates, strict=True)}
+        of |= {f"{name} rate": unit for name, unit in zip(names, scale.rates, strict=True)}
+        return np.array([of.get(name, 1.0) for name in self.states])
 
     def state_space(self):
         """The model as a ``control.StateSpace`` of python-control, with the names.

@@ -16,6 +16,7 @@ from tests.support import mechanisms
 STEP = 1e-5  # of central differences, in units of the scene
 DIFFERENCES = 1e-6  # relative to the largest entry of A: truncation h² and round-off ε / h
 EXACT = 1e-9  # closed forms
+RICCATI = 1e-8  # gains by two solvers of the Riccati equation, relative
 SCENES = {
     "open": lambda: gauss.load("double_pendulum"),
     "damped": lambda: gauss.load("cart_pole"),
@@ -176,3 +177,68 @@ def test_a_state_space_of_python_control_has_the_names():
     assert model.state_space().state_labels == list(model.states)
     with pytest.raises(SimulationError, match="inputs"):
         gauss.linearise(system).state_space()
+
+
+def two_pendulums(coupled):
+    """Two upright pendulums, the first driven; a spring between them, or none."""
+    scene = gauss.Scene("two", gravity=(0, 0, -9.81))
+    for place, name in enumerate("AB"):
+        rod = scene.body(f"rod {name}", 1.0, (0.1, 0.1, 0.1), com=(0, 0, 0.5), position=(0, place, 0))
+        scene.revolute(name, "ground", rod, at=(0, place, 0), axis=(1, 0, 0))
+    if coupled:
+        scene.spring("spring", "rod A", "rod B", at=(0, 0, 0.5), other_at=(0, 0, 0.5), stiffness=3.0, length=0.5)
+    scene.input("push", "A")
+    return scene
+
+
+def test_the_regulator_of_a_mass_is_the_closed_form():
+    scene = gauss.Scene("mass", gravity=(0, 0, 0))
+    scene.prismatic("x", "ground", scene.body("m", 2.0), axis=(1, 0, 0))
+    scene.input("push", "x")
+    model = gauss.linearise(scene)
+    for a, b, r in ((1.0, 1.0, 1.0), (9.0, 0.5, 0.04)):
+        stiff = np.sqrt(a / r)
+        assert model.lqr([a, b], [r]) == pytest.approx(np.array([[stiff, np.sqrt(b / r + 4.0 * stiff)]]), rel=RICCATI)
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: two_pendulums(True), lambda: driven("four_bar", "A"), lambda: driven("cart_pole", "rail")]
+)
+def test_the_regulator_is_that_of_python_control_and_stabilises(make):
+    control = pytest.importorskip("control")
+    model = gauss.linearise(make())
+    Q, R = np.diag(np.arange(1.0, len(model.A) + 1.0)), np.array([[0.3]])
+    K = model.lqr(Q, R)
+    assert K == pytest.approx(control.lqr(model.A, model.B, Q, R)[0], rel=RICCATI)
+    assert np.linalg.eigvals(model.A - model.B @ K).real.max() < 0.0
+    assert not len(model.uncontrollable().eigenvalues)
+
+
+def driven(name, joint):
+    """A shipped scene with an input."""
+    scene = gauss.load(name)
+    scene.input("push", joint)
+    return scene
+
+
+def test_modes_that_no_input_reaches_are_named():
+    model = gauss.linearise(two_pendulums(False))
+    left = model.uncontrollable()
+    rate = np.sqrt(9.81 * 0.5 / (0.1 + 0.25))
+    assert sorted(left.eigenvalues.real) == pytest.approx([-rate, rate])
+    assert np.abs(left.shapes) == pytest.approx(np.tile([0.0, 1.0], (2, 1)), abs=1e-9)
+    with pytest.raises(SimulationError, match="'push' do not reach .*\n.*\n.* B$"):
+        model.lqr()
+
+
+@pytest.mark.parametrize(
+    "weights", [{"Q": [1.0]}, {"Q": [1.0, -1.0, 1.0, 1.0]}, {"R": "x"}, {"R": [[np.nan]]}, {"Q": [[0, 1], [0, 0]]}]
+)
+def test_weights_that_do_not_fit_are_refused(weights):
+    with pytest.raises(ArgumentError, match=next(iter(weights))):
+        gauss.linearise(two_pendulums(True)).lqr(**weights)
+
+
+def test_a_model_without_inputs_has_no_regulator():
+    with pytest.raises(SimulationError, match="inputs"):
+        gauss.linearise(gauss.load("pendulum")).lqr()

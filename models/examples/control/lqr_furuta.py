@@ -6,7 +6,6 @@ A pendulum on a driven arm, balanced upright: linear model, Riccati equation, no
 """
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 import gauss
 from gauss import view
@@ -21,7 +20,7 @@ scene.input("torque", "turn", limits=2.0)
 upright = gauss.linearise(scene)
 print("poles of the pendulum:", upright.eigenvalues.round(3))
 Q, R = np.diag([1.0, 10.0, 0.1, 0.1]), np.eye(1)
-K = np.linalg.solve(R, upright.B.T @ solve_continuous_are(upright.A, upright.B, Q, R))
+K = upright.lqr(Q, R)
 print("poles under the law:", np.linalg.eigvals(upright.A - upright.B @ K).round(3))
 
 scene.start("tilt", 0.2)
