@@ -65,12 +65,13 @@ from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.equilibrium import StaticEquilibrium, equilibria, equilibrium
 from gauss.analysis.excitation import Excitation, excitation
+from gauss.analysis.fitted_motion import MotionFit
 from gauss.analysis.identification import Identification, identify
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.linear_modes import LinearModes
 from gauss.analysis.mode_motion import mode_motion
-from gauss.analysis.motion_fit import MotionFit, fit_motion
+from gauss.analysis.motion_fit import fit_motion
 from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
 from gauss.analysis.planned_path import plan_path

@@ -7,125 +7,27 @@ parameters is differentiated by central differences: that is smooth, and costs n
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 from scipy.optimize import least_squares
 
+from gauss.analysis.fitted_motion import MotionFit
 from gauss.analysis.sensitivity.parametrised_step import ParametrisedStep
 from gauss.arguments import named_arguments
 from gauss.dynamics import compile_scene
 from gauss.dynamics.parameters import numbers
 from gauss.dynamics.parametrised_system import parametrised
-from gauss.errors import ArgumentError, GaussError, SceneError, StateError, did_you_mean, extra, require
+from gauss.errors import ArgumentError, GaussError, SceneError, StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation.sweeps.parameters import POSITIVE, scene_of, value_of
 from gauss.system.coordinate_names import coordinate_units, rate_units
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 DIFFERENCE = 1e-5  # of parameters in their units: errors of central differences are 1e-10 of them
 UNIDENTIFIABLE = 1e-8  # singular values below this share of the largest: round-off of the derivatives
 NAMED = 0.1  # share of a parameter in a direction without effect from which it is named
 MOST_EVALUATIONS = 100  # motions of one fit; few of them converge in more than ten
 CONVERGED = 1e-12  # relative change of the sum of squares, of the parameters, and of the gradient
-
-
-@dataclass(frozen=True)
-class MotionFit:
-    """Parameters of a fitted motion.
-
-    Parameters
-    ----------
-    values, half_widths : dict of str to float
-        Parameters, and half widths of their confidence intervals.
-    covariance : ndarray, shape (p, p)
-        Covariance of the parameters.
-    confidence : float
-        Probability of the intervals, under Gaussian noise and a linear model about the found parameters.
-    noise : ndarray, shape (n,)
-        Standard deviation of each measured column.
-    condition : float
-        Condition number of the weighted derivatives with columns of unit length.
-    t : ndarray, shape (k,)
-        Times [s].
-    columns : tuple of str
-        Names of the measured coordinates and rates.
-    measured, fitted : ndarray, shape (k, n)
-        Measured values, and those of the fitted motion.
-    scene : Scene
-        Scene with the found parameters.
-    """
-
-    values: dict[str, float]
-    half_widths: dict[str, float]
-    covariance: np.ndarray
-    confidence: float
-    noise: np.ndarray
-    condition: float
-    t: np.ndarray
-    columns: tuple[str, ...]
-    measured: np.ndarray
-    fitted: np.ndarray
-    scene: Scene
-
-    @property
-    def residual(self) -> np.ndarray:
-        """Root mean squares (n,) of measured less fitted values."""
-        return np.sqrt(((self.measured - self.fitted) ** 2).mean(axis=0))
-
-    @property
-    def correlation(self) -> np.ndarray:
-        """Correlation (p, p) of the parameters."""
-        sizes = np.sqrt(np.diag(self.covariance))
-        return self.covariance / np.outer(sizes, sizes)
-
-    def __str__(self) -> str:
-        lines = [f"{len(self.values)} parameters from {self.t.size} samples, condition number {self.condition:.3g}"]
-        lines.append(f"{'value':>14} {f'± ({self.confidence:.0%})':>12}  parameter")
-        lines += [f"{value:14.7g} {self.half_widths[name]:12.2g}  {name}" for name, value in self.values.items()]
-        lines.append(f"{'residual':>14} {'':>12}  column")
-        lines += [f"{one:14.3g} {'':>12}  {name}" for one, name in zip(self.residual, self.columns, strict=True)]
-        return "\n".join(lines)
-
-    def plot(self, path=None) -> "Figure":
-        """Figure of the measured and the fitted motion, and of their differences.
-
-        Parameters
-        ----------
-        path : str or Path, optional
-            Where to save it: .png, .svg or .pdf.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure.
-
-        Raises
-        ------
-        MissingPackageError
-            If matplotlib is not installed.
-        """
-        with extra("view"):
-            from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(9.0, 0.8 + 1.8 * len(self.columns)), layout="constrained")
-        rows = figure.subplots(len(self.columns), 2, squeeze=False, sharex=True)
-        for (left, right), name, one, other in zip(rows, self.columns, self.measured.T, self.fitted.T, strict=True):
-            left.plot(self.t, one, ".", markersize=2, label="measured")
-            left.plot(self.t, other, linewidth=1.0, label="fitted")
-            right.plot(self.t, one - other, ".", markersize=2)
-            left.set(ylabel=name)
-            right.set(ylabel="difference")
-        rows[0, 0].legend()
-        for axes in rows[-1]:
-            axes.set(xlabel="t [s]")
-        if path is not None:
-            figure.savefig(path)
-        return figure
 
 
 @named_arguments

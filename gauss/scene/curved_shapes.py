@@ -1,5 +1,6 @@
 """Collision shapes with curved surfaces: ellipsoid, cylinder and cone."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,18 +12,18 @@ from gauss.scene import values
 from gauss.scene.collision import Collider
 
 
-class ConvexCollider(Collider):
+class ConvexCollider(Collider, ABC):
     """Convex shape within a box around its centre, ``half_edges`` (3,) along its ``axes`` (3, 3) [m]."""
 
     @property
+    @abstractmethod
     def half_edges(self) -> np.ndarray:
         """Half edges (3,) of that box [m]."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def axes(self) -> np.ndarray:
         """Rotation (3, 3) from its edges to the frame of the body."""
-        raise NotImplementedError
 
     @property
     def is_round(self) -> bool:

@@ -44,13 +44,8 @@ FAILURES = {
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
 }
 MOST_STEPS = 10**8  # of one call: their times fill the memory
-STEPS = {
-    ("compiled loop", "compiled"),
-    ("compiled loop", "callbacks"),
-    ("time stepping", "compiled"),
-    ("time stepping", "pair kernels"),
-    ("time stepping", "callbacks"),
-}
+STEPS = {("compiled loop", code) for code in ("compiled", "callbacks")}
+STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
 
 
 class SimulatorState(NamedTuple):

@@ -245,5 +245,5 @@ def test_laws_that_jump_along_a_motion_are_named(law, switches):
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         gauss.sensitivities(system, 0.3, step=0.01, state=start)
-    told = [one for one in found if issubclass(one.category, SwitchingWarning)]
-    assert [("push" in str(one.message), one.filename == __file__) for one in told] == [(True, True)] * switches
+    named = [one for one in found if issubclass(one.category, SwitchingWarning)]
+    assert [("push" in str(one.message), one.filename == __file__) for one in named] == [(True, True)] * switches

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.analysis.sensitivity.motion import Motion, SmoothStep
+from gauss.analysis.sensitivity.motion import Motion, smooth_motion
 from gauss.dynamics import compile_scene
 from gauss.dynamics.motion_step import MotionStep
 from gauss.errors import ArgumentError, require
@@ -80,11 +80,7 @@ class DifferentiableMotion:
             state = replace(self.system.initial_state(), q=q, v=v)
             motion = Motion(self.system, state=state, inputs=inputs, **self.settings)
             return motion.x, motion.pieces
-        x = np.empty((self.steps + 1, q.size + v.size))
-        x[0] = np.concatenate([q, v])
-        for k in range(self.steps):
-            x[k + 1] = self.smooth.after(self.t[k], self.h, x[k], inputs[k])
-        return x, [[SmoothStep(self.smooth, self.t[k], self.h, x[k], inputs[k])] for k in range(self.steps)]
+        return smooth_motion(self.smooth, self.t, self.h, np.concatenate([q, v]), inputs)
 
     def value(self, q: np.ndarray, v: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """States (steps + 1, n_q + n_v) of a motion."""

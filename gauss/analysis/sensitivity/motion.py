@@ -59,6 +59,15 @@ class SmoothStep:
         return self.step.gradient(self.t, self.h, self.x, self.u, weights)
 
 
+def smooth_motion(step: MotionStep, t, h: float, start: np.ndarray, inputs) -> tuple[np.ndarray, list[list[Piece]]]:
+    """States (k, n_x) of equal steps h [s] from the times t (k,), and their linear maps."""
+    x = np.empty((len(inputs) + 1, start.size))
+    x[0] = start
+    for k, u in enumerate(inputs):
+        x[k + 1] = step.after(t[k], h, x[k], u)
+    return x, [[SmoothStep(step, t[k], h, x[k], u)] for k, u in enumerate(inputs)]
+
+
 class Motion:
     """Motion of fixed steps, before its derivatives.
 
@@ -122,12 +131,8 @@ class Motion:
     def _smoothly(self):
         """Equal steps of one smooth system."""
         self.step = MotionStep(self.system, self.integrator, self.parameters)
-        self.x = np.empty((self.steps + 1, self.step.n_x))
-        self.x[0] = packed(self.start)
-        for k in range(self.steps):
-            self.x[k + 1] = self.step.after(self.t[k], self.h, self.x[k], self.inputs[k])
-        steps = zip(self.t, self.x, self.inputs, strict=False)
-        self.pieces: list[list[Piece]] = [[SmoothStep(self.step, t, self.h, x, u)] for t, x, u in steps]
+        self.pieces: list[list[Piece]]
+        self.x, self.pieces = smooth_motion(self.step, self.t, self.h, packed(self.start), self.inputs)
 
     def _through_events(self):
         """Steps that end at the nodes and at the events of the motion of :func:`gauss.simulate`."""

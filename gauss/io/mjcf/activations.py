@@ -4,7 +4,7 @@
     muscle:      ȧ = (u − a)/τ(u − a, a),   F = −F₀ (f_L(l) f_V(l̇) a + f_P(l))
 
 MuJoCo's documentation, "Computation: Actuation model" and "Modeling: Muscles"; Millard et al. 2013 for τ. What is
-integrated stays in its range, as no rate leads out of it there. MuJoCo acts a step earlier where it is told to (actearly);
+integrated stays in its range, as no rate leads out of it there. MuJoCo acts a step earlier with actearly;
 here time is continuous.
 """
 
