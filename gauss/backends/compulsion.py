@@ -8,11 +8,12 @@ Mathematik 4, 1829; Udwadia and Kalaba, Analytical Dynamics, 1996, ch. 3). Φ is
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gauss.backends.columns import Columns, from_blocks
 from gauss.backends.structure import ConstraintRows, Structure
 from gauss.codegen import Expression, Scalar
 from gauss.shapes import Shaped
@@ -20,10 +21,9 @@ from gauss.shapes import Shaped
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 else:
-    csc_array = object  # scipy.sparse is imported where a matrix is made: it takes as long as all of gauss
+    csc_array = object
 
 VECTORS = ("Phi", "impressed", "P", "C", "D", "G", "h", "units")  # arrays of a compulsion that are not kept by blocks
-KEPT_PATTERNS = 64  # number of sparsity patterns of matrices that are kept
 
 
 @dataclass(frozen=True)
@@ -131,16 +131,26 @@ class Compulsion:
     @cached_property
     def A_sparse(self) -> csc_array:
         """Sparse A (r, 6n); every entry of a block is stored, so that the sparsity pattern depends on the scene only."""
+        return self.A_columns.csc()
+
+    @cached_property
+    def A_columns(self) -> Columns:
+        """A (r, 6n) by columns, with the full pattern of its blocks."""
         starts = [[6 * body for body in c.bodies] for c in self.structure.constraints]
-        return self._sparse(self.A_blocks, starts, 6 * self.structure.n_bodies)
+        return self._columns(self.A_blocks, starts, 6 * self.structure.n_bodies)
 
     @cached_property
     def B_sparse(self) -> csc_array:
         """Sparse B (r, p), with the full pattern of its blocks."""
-        starts = [[columns.start for columns in c.columns] for c in self.structure.constraints]
-        return self._sparse(self.B_blocks, starts, self.structure.n_columns)
+        return self.B_columns.csc()
 
-    def _sparse(self, all_blocks, all_starts, width: int) -> csc_array:
+    @cached_property
+    def B_columns(self) -> Columns:
+        """B (r, p) by columns, with the full pattern of its blocks."""
+        starts = [[columns.start for columns in c.columns] for c in self.structure.constraints]
+        return self._columns(self.B_blocks, starts, self.structure.n_columns)
+
+    def _columns(self, all_blocks, all_starts, width: int) -> Columns:
         entries = [
             (block, constraint.rows.start, start)
             for constraint, blocks, starts in zip(self.structure.constraints, all_blocks, all_starts, strict=True)
@@ -247,31 +257,4 @@ def _view(array: np.ndarray) -> np.ndarray:
     """Array on the same numbers that cannot be written to."""
     found = array.view()
     found.flags.writeable = False
-    return found
-
-
-def from_blocks(entries, shape) -> csc_array:
-    """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept; overlapping blocks are added.
-
-    Blocks of one pattern share their index arrays, which are read-only.
-    """
-    from scipy import sparse
-
-    if not entries:
-        return sparse.csc_array(shape)
-    place, indices, indptr = _pattern(tuple((block.shape, r, c) for block, r, c in entries), shape)
-    data = np.bincount(place, np.concatenate([block.ravel() for block, _, _ in entries]), minlength=indices.size)
-    return sparse.csc_array((data, indices, indptr), shape=shape)
-
-
-@lru_cache(maxsize=KEPT_PATTERNS)
-def _pattern(blocks, shape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Index of every entry of the blocks among those stored, the row indices of these, and the column pointers."""
-    rows = np.concatenate([np.repeat(np.arange(r, r + m), n) for (m, n), r, _ in blocks])
-    columns = np.concatenate([np.tile(np.arange(c, c + n), m) for (m, n), _, c in blocks])
-    stored, place = np.unique(columns * shape[0] + rows, return_inverse=True)
-    begins = np.searchsorted(stored, np.arange(shape[1] + 1) * shape[0])
-    found = place.ravel(), (stored % shape[0]).astype(np.int32), begins.astype(np.int32)
-    for array in found:
-        array.flags.writeable = False
     return found

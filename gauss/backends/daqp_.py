@@ -22,6 +22,7 @@ class DAQP:
     """
 
     name = "daqp"
+    dense = True
 
     def __init__(self, **settings):
         self.settings = settings
@@ -29,12 +30,17 @@ class DAQP:
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
         m, s = programme.d.size, programme.k.size
-        rows = np.concatenate([programme.K.toarray(), programme.C.toarray()])
+        H, C, K = map(_array, (programme.H, programme.C, programme.K))
         upper = np.concatenate([programme.k, programme.d])
         sense = np.zeros(s + m, dtype=np.intc)
         sense[s:] = EQUALITY
         lower = np.full(s + m, UNBOUNDED)
-        x, _, flag, info = daqp.solve(programme.H.toarray(), programme.c, rows, upper, lower, sense, **self.settings)
+        x, _, flag, info = daqp.solve(H, programme.c, np.concatenate([K, C]), upper, lower, sense, **self.settings)
         if not flag > 0:
             return Outcome(None, None, None, False, "daqp: found no solution")
         return Outcome(np.asarray(x), info["lam"][s:], info["lam"][:s], True, "daqp: solved")
+
+
+def _array(matrix) -> np.ndarray:
+    """Dense array of a matrix, which programmes made elsewhere keep sparse."""
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()

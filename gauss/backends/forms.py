@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.backends.compulsion import Compulsion, csc_array, from_blocks
+from gauss.backends.columns import Columns, from_blocks
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
@@ -45,7 +46,7 @@ class Eliminated:
         Elimination of q̈, cluster by cluster.
     weights : ndarray, shape (6n,)
         Diagonal of W: Φ in F2, ones in F2s.
-    C : csc_array, shape (m, 6n)
+    C : Columns, shape (m, 6n)
         Equality rows, of unit length in F2s, with the pattern of their blocks.
     d, x_free : ndarray
         Right-hand side (m,) and free solution (6n,).
@@ -60,7 +61,7 @@ class Eliminated:
     compulsion: Compulsion
     clusters: tuple[Cluster, ...]
     weights: np.ndarray
-    C: csc_array
+    C: Columns
     d: np.ndarray
     x_free: np.ndarray
     K: np.ndarray
@@ -136,7 +137,7 @@ def scaled(compulsion: Compulsion) -> Eliminated:
     entries = C.data / np.repeat(root, np.diff(C.indptr))
     lengths = np.sqrt(np.bincount(C.indices, entries**2, minlength=C.shape[0]))
     lengths[lengths == 0] = 1.0
-    C = type(C)((entries / lengths[C.indices], C.indices, C.indptr), shape=C.shape)
+    C = replace(C, data=entries / lengths[C.indices])
     return replace(
         form,
         weights=np.ones(root.size),

@@ -24,7 +24,7 @@ class Gradient:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         form = scaled(compulsion)
-        C = form.C.tocsr()
+        C = form.C.csc().tocsr()
         y, total = np.zeros(form.d.size), 0
         residual = C @ form.x_free - form.d
         size = scale = np.linalg.norm(residual)

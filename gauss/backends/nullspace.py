@@ -25,7 +25,7 @@ class NullSpace:
         form = scaled(compulsion)
         if not form.d.size:
             return form.answer(form.x_free, np.zeros(0))
-        Q, R, pivots = qr(form.C.T.toarray(), mode="economic", pivoting=True)
+        Q, R, pivots = qr(form.C.toarray().T, mode="economic", pivoting=True)
         rank = numerical_rank(np.abs(np.diag(R)), ROWS_RANK)
         Q, R, kept = Q[:, :rank], R[:rank, :rank], pivots[:rank]
         particular = solve_triangular(R, form.d[kept], trans="T")

@@ -8,17 +8,22 @@ they differ in which solvers take them, in speed, and in the digits that are los
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
-from scipy import sparse
 
 from gauss.backends.answering import call, real_array, truth, whole_number
+from gauss.backends.columns import Columns
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.coordinates import Coordinates
 from gauss.backends.forms import Eliminated, eliminated, massless, scaled
 from gauss.backends.solution import Answer, failure
 from gauss.errors import BackendError, did_you_mean
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+else:
+    csc_matrix = object
 
 
 @dataclass(frozen=True)
@@ -29,24 +34,24 @@ class Programme:
     ----------
     form : str
         "F1", "F2", "F2s" or "F3".
-    H : csc_matrix, shape (n, n)
-        Hessian.
+    H : csc_matrix or ndarray, shape (n, n)
+        Hessian; all matrices are dense for a solver that is ``dense``.
     c : ndarray, shape (n,)
         Linear term.
-    C, d : csc_matrix, shape (m, n), and ndarray, shape (m,)
+    C, d : csc_matrix or ndarray, shape (m, n), and ndarray, shape (m,)
         Equality rows.
-    K, k : csc_matrix, shape (s, n), and ndarray, shape (s,)
+    K, k : csc_matrix or ndarray, shape (s, n), and ndarray, shape (s,)
         Inequality rows.
     answer : callable
         ``answer(x, y, z, **outcome)`` turns a solution and its multipliers into an :class:`gauss.backends.solution.Answer`.
     """
 
     form: str
-    H: sparse.csc_matrix
+    H: Any
     c: np.ndarray
-    C: sparse.csc_matrix
+    C: Any
     d: np.ndarray
-    K: sparse.csc_matrix
+    K: Any
     k: np.ndarray
     answer: Callable
 
@@ -62,7 +67,7 @@ class Programme:
     @property
     def lengths(self) -> np.ndarray:
         """Lengths (s,) of the inequality rows; 1 of one that is zero."""
-        found = np.sqrt(np.asarray(self.K.multiply(self.K).sum(axis=1)).ravel())
+        found = np.sqrt(np.asarray(_times(self.K, self.K).sum(axis=1)).ravel())
         return np.where(found > 0.0, found, 1.0)
 
     @property
@@ -75,7 +80,7 @@ class Programme:
         """The same programme with inequality rows of unit length, whose multipliers are longer by as much."""
         if not self.k.size:
             return self
-        return replace(self, K=sparse.csc_matrix(self.K.multiply(1.0 / self.lengths[:, None])), k=self.k / self.lengths)
+        return replace(self, K=_times(self.K, 1.0 / self.lengths[:, None]), k=self.k / self.lengths)
 
     def divided(self, size: float) -> "Programme":
         """The same programme for x/size, whose multipliers are divided, too."""
@@ -120,7 +125,10 @@ class Outcome:
 
 @runtime_checkable
 class Solver(Protocol):
-    """A QP solver: called with a programme, it returns an outcome."""
+    """A QP solver: called with a programme, it returns an outcome.
+
+    One with a true attribute ``dense`` gets dense matrices, others csc_matrices.
+    """
 
     name: str
 
@@ -152,7 +160,7 @@ class Programmed:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         fitting = "F3" if massless(compulsion) else "F2s"
-        programme = FORMS[self.form or fitting](compulsion)
+        programme = FORMS[self.form or fitting](compulsion, dense if getattr(self.solver, "dense", False) else compressed)
         if not programme.d.size and not programme.k.size and programme.form in ("F2", "F2s"):
             free = -programme.c / programme.H.diagonal()  # no rows bind the bodies
             return programme.answer(free, np.zeros(0), np.zeros(0))
@@ -219,41 +227,55 @@ def _public(target) -> list[str]:
     return [name for name in dir(target) if not name.startswith("_")]
 
 
-def full(compulsion: Compulsion) -> Programme:
+def compressed(matrix: Columns | np.ndarray) -> csc_matrix:
+    """The matrix as a csc_matrix."""
+    from scipy import sparse  # takes as long to import as all of gauss
+
+    return sparse.csc_matrix(matrix.csc() if isinstance(matrix, Columns) else matrix)
+
+
+def dense(matrix: Columns | np.ndarray) -> np.ndarray:
+    """The matrix as a dense array."""
+    return matrix.toarray() if isinstance(matrix, Columns) else matrix
+
+
+def _times(matrix, factors):
+    """Products of the entries, in the storage of the matrix."""
+    return matrix * factors if isinstance(matrix, np.ndarray) else type(matrix)(matrix.multiply(factors))
+
+
+def full(compulsion: Compulsion, stored: Callable = compressed) -> Programme:
     """F1: unknowns (a, q̈); the Hessian is singular in q̈."""
     n = compulsion.Phi.size
 
     def answer(x, y, z, **outcome) -> Answer:
         return Answer(x[:n], x[n:], y, z, **outcome)
 
-    H = sparse.csc_matrix(sparse.diags_array(np.concatenate([compulsion.Phi, np.zeros(compulsion.P.size)])))
+    H = Columns.diagonal(np.concatenate([compulsion.Phi, np.zeros(compulsion.P.size)]))
     c = -np.concatenate([compulsion.impressed, compulsion.P])
-    C = sparse.csc_matrix(sparse.hstack([compulsion.A_sparse, compulsion.B_sparse]))
-    return Programme("F1", H, c, C, compulsion.D.copy(), sparse.csc_matrix(compulsion.G), compulsion.h.copy(), answer)
+    C, K = compulsion.A_columns.beside(compulsion.B_columns), compulsion.G
+    return Programme("F1", stored(H), c, stored(C), compulsion.D.copy(), stored(K), compulsion.h.copy(), answer)
 
 
-def accelerations(compulsion: Compulsion) -> Programme:
+def accelerations(compulsion: Compulsion, stored: Callable = compressed) -> Programme:
     """F2: unknowns a."""
-    return _of_accelerations("F2", eliminated(compulsion))
+    return _of_accelerations("F2", eliminated(compulsion), stored)
 
 
-def scaled_accelerations(compulsion: Compulsion) -> Programme:
+def scaled_accelerations(compulsion: Compulsion, stored: Callable = compressed) -> Programme:
     """F2s: unknowns Φ^½ a, rows of unit length."""
-    return _of_accelerations("F2s", scaled(compulsion))
+    return _of_accelerations("F2s", scaled(compulsion), stored)
 
 
-def coordinates(compulsion: Compulsion) -> Programme:
+def coordinates(compulsion: Compulsion, stored: Callable = compressed) -> Programme:
     """F3: unknowns q̈ of the tree; its inertia matrix is the Hessian."""
     form = Coordinates(compulsion)
-    H, C, K = (sparse.csc_matrix(matrix) for matrix in (form.M, form.C, form.K))
-    return Programme("F3", H, -form.force, C, form.d, K, form.k, form.answer)
+    return Programme("F3", stored(form.M), -form.force, stored(form.C), form.d, stored(form.K), form.k, form.answer)
 
 
-def _of_accelerations(name: str, form: Eliminated) -> Programme:
-    n = form.weights.size
-    H = sparse.csc_matrix((form.weights, np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32)))
-    C, K = sparse.csc_matrix(form.C), sparse.csc_matrix(form.K)
-    return Programme(name, H, -form.weights * form.x_free, C, form.d, K, form.k, form.answer)
+def _of_accelerations(name: str, form: Eliminated, stored: Callable) -> Programme:
+    H, c = Columns.diagonal(form.weights), -form.weights * form.x_free
+    return Programme(name, stored(H), c, stored(form.C), form.d, stored(form.K), form.k, form.answer)
 
 
 FORMS = {"F1": full, "F2": accelerations, "F2s": scaled_accelerations, "F3": coordinates}

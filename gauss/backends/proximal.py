@@ -25,7 +25,7 @@ class Proximal:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         form = scaled(compulsion)
-        C, m = form.C, form.d.size
+        C, m = form.C.csc(), form.d.size
         factor = cho_factor((C @ C.T).toarray() + PROXIMAL_WEIGHT * np.eye(m)) if m else None
         x, y = form.x_free, np.zeros(m)
         iterations = 0

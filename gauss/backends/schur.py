@@ -20,7 +20,7 @@ class Schur:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         form = scaled(compulsion)
-        C = form.C
+        C = form.C.csc()
         S = (C @ C.T).toarray()
         factor, pivots, rank, _ = lapack.dpstrf(S, tol=SCHUR_RANK, lower=0)
         kept = pivots[:rank] - 1

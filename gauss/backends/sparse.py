@@ -25,15 +25,16 @@ class Sparse:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         form = scaled(compulsion)
+        C = form.C.csc()
         n, m = form.x_free.size, form.d.size
         one = sparse.eye_array(n)
-        matrix = sparse.block_array([[one, form.C.T], [form.C, -REGULARISATION * sparse.eye_array(m)]], format="csc")
+        matrix = sparse.block_array([[one, C.T], [C, -REGULARISATION * sparse.eye_array(m)]], format="csc")
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         x, y = np.zeros(n), np.zeros(m)
         last = float(np.inf)
         steps = 0
         for _ in range(MOST_REFINEMENTS):
-            residual = np.concatenate([form.x_free - x - form.C.T @ y, form.d - form.C @ x])
+            residual = np.concatenate([form.x_free - x - C.T @ y, form.d - C @ x])
             step = factor.solve(residual)
             x, y = x + step[:n], y + step[n:]
             steps += 1
