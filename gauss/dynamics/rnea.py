@@ -118,12 +118,15 @@ class KinematicTree:
         wrenches : dict, optional
             External wrenches (6,) on bodies in link frames, {body: wrench}.
         """
-        accelerations, forces = self.accelerations(rates), {}
-        for body in self.joint_kinematics:
-            forces[body] = inertial(self.links[body], self.omegas[body], accelerations[body])
+        forces = self.inertia_forces(rates)
         for body, wrench in (wrenches or {}).items():
             forces[body] = forces[body] - wrench
         return self.projected(forces)
+
+    def inertia_forces(self, rates) -> dict[int, np.ndarray]:
+        """Wrench (6,) that each link needs, in its frame, to move with joint accelerations (n_v,) under gravity."""
+        accelerations = self.accelerations(rates)
+        return {body: inertial(self.links[body], self.omegas[body], accelerations[body]) for body in self.joint_kinematics}
 
     def projected(self, forces) -> np.ndarray:
         """Generalised forces (n_v,) Jᵀ f of wrenches (6,) on links, in link frames, {body: force}."""

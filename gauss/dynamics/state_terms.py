@@ -1,9 +1,7 @@
 """Terms of the equations of motion in one state, over symbols: M(q), C(q, v), h(q, v), g(q), frames, Jacobians, momentum.
 
 M by composite inertias, I_λ^c += X_iᵀ I_i^c X_i and M_ij = S_jᵀ X … I_i^c S_i (Featherstone, Rigid Body Dynamics
-Algorithms, 2008, sec. 6.2); h by inverse dynamics at q̈ = 0; C from h, which is quadratic in v. With [v, w] the bracket of
-the rates, zero but for angular velocities about the axes of a moving body, C w = ½ (∂h/∂v) w + ½ M [v, w]: so Ṁ = C + Cᵀ
-(Christoffel symbols in a moving basis: Echeandia and Wensing, Numerical methods to compute the Coriolis matrix, 2021).
+Algorithms, 2008, sec. 6.2); h by inverse dynamics at q̈ = 0; C by composite bodies (:mod:`gauss.dynamics.composite_bodies`).
 Spatial vectors are (angular, linear). Where joints close loops, these are the terms of the spanning tree.
 """
 
@@ -12,12 +10,12 @@ from functools import cached_property
 import numpy as np
 
 from gauss import rotations
-from gauss.codegen import Scalar, forward, jacobian
+from gauss.codegen import Scalar, forward
 from gauss.dynamics import energies
-from gauss.dynamics.aba import add, inertia_to_inner
+from gauss.dynamics.composite_bodies import CompositeBodies, composite_inertias
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.rnea import KinematicTree, apply, force_to_inner
-from gauss.rotations import cross, skew
+from gauss.rotations import cross
 from gauss.system import PlacedFrame, State, System, coordinate_rates, whole
 
 REFERENCES = ("local_world_aligned", "world", "local")
@@ -52,13 +50,7 @@ class StateTerms:
     @cached_property
     def composites(self) -> dict:
         """Inertia of each link with all links that it carries, in its link frame."""
-        tree = self.still
-        found = {body: tree.links[body].inertia for body in tree.joint_kinematics}
-        for edge in reversed(tree.edges):
-            if edge.inner >= 0:
-                carried = inertia_to_inner(tree.links[edge.outer], tree.joint_kinematics[edge.outer], found[edge.outer])
-                found[edge.inner] = add(found[edge.inner], carried)
-        return found
+        return composite_inertias(self.still)
 
     @property
     def mass_matrix(self) -> np.ndarray:
@@ -117,13 +109,7 @@ class StateTerms:
     @cached_property
     def tree_coriolis_matrix(self) -> np.ndarray:
         """C (n_v, n_v) with Ṁ = C + Cᵀ."""
-        turning = np.zeros((self.system.n_v, self.system.n_v), dtype=object)
-        for joint in self.system.joints:
-            if joint.pair.quaternion is not None:
-                place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
-                turning[place, place] = skew(self.v[place])
-        found = jacobian(self.tree_bias_forces, self.v)
-        return 0.5 * (found if self.system.is_flat else found + self.tree_mass_matrix @ turning)
+        return CompositeBodies(self.tree, self.v, self.rate).coriolis_matrix()
 
     def frame_pose(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
         """Rotation (3, 3) to world and origin (3,) of a body frame or named frame."""

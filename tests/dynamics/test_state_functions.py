@@ -158,6 +158,22 @@ def test_the_terms_agree_with_each_other(name):
     assert rate(system.potential_energy) == pytest.approx(g @ v, rel=OF_STEPS)
 
 
+@pytest.mark.parametrize("name", TREES)
+def test_the_coriolis_matrix_has_the_symmetry_of_christoffel_symbols(name):
+    """C(v) w − C(w) v = M [v, w], the bracket of rates: v × w of angular velocities about moving axes, else zero."""
+    system = gauss.compile_scene(TREES[name]())
+    rng = np.random.default_rng(2)
+    q, v, w = random_state(system, rng).q, *rng.standard_normal((2, system.n_v))
+    bracket = np.zeros(system.n_v)
+    for joint in system.joints:
+        if joint.pair.quaternion is not None:
+            place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
+            bracket[place] = np.cross(v[place], w[place])
+    torsion = system.coriolis_matrix(q, v) @ w - system.coriolis_matrix(q, w) @ v
+    size = np.abs(system.coriolis_matrix(q, v) @ w).max()
+    assert np.abs(torsion - system.mass_matrix(q) @ bracket).max() <= AGREEMENT * size
+
+
 @pytest.mark.parametrize("name", LOOPS)
 def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(name):
     scene, joint = LOOPS[name]
