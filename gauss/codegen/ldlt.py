@@ -13,7 +13,7 @@ from gauss.codegen.expression import Expression, as_number
 
 
 class LDLT:
-    """Factorisation of a symmetric quasi-definite matrix of numbers or expressions; no pivot may be a constant zero.
+    """Factorisation of a symmetric quasi-definite matrix of numbers or expressions.
 
     Parameters
     ----------
@@ -28,6 +28,11 @@ class LDLT:
         Entries of L below the diagonal, {column: {row: entry}}.
     inverse_pivots : dict
         Entries of D⁻¹.
+
+    Raises
+    ------
+    ZeroDivisionError
+        If a pivot is a constant zero.
     """
 
     def __init__(self, A: np.ndarray):
@@ -48,10 +53,19 @@ class LDLT:
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solution x (n,) of A x = b."""
+        return self.backward(self.forward(b))
+
+    def forward(self, b: np.ndarray) -> np.ndarray:
+        """L⁻¹ b (n,): bᵀ A⁻¹ b is the sum of its squares over the pivots."""
         x = list(b)
         for j in self.order:
             for i, entry in self.columns[j].items():
                 x[i] = x[i] - entry * x[j]
+        return np.array([*x, None], dtype=object)[:-1]
+
+    def backward(self, b: np.ndarray) -> np.ndarray:
+        """L⁻ᵀ D⁻¹ b (n,)."""
+        x = list(b)
         for j in reversed(self.order):
             x[j] = x[j] * self.inverse_pivots[j]
             for i, entry in self.columns[j].items():
@@ -61,6 +75,8 @@ class LDLT:
 
 def _eliminate(rest: dict, j: int, place: dict[int, int]) -> tuple[dict, Expression | float]:
     """Column j of L and its inverse pivot; ``rest`` becomes the Schur complement."""
+    if (j, j) not in rest:
+        raise ZeroDivisionError(f"pivot {j} is a constant zero.")
     inverse = 1.0 / rest[j, j]
     below = {i: entry for (i, k), entry in rest.items() if k == j and i != j}
     column = {i: entry * inverse for i, entry in below.items()}

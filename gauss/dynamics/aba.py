@@ -50,26 +50,30 @@ class ArticulatedBody:
         self.eliminations = self._eliminate()
 
     def _eliminate(self) -> dict[int, Elimination]:
-        tree = self.tree
-        inertias = {body: link.inertia for body, link in tree.links.items()}
-        found = {}
+        inertias = {body: link.inertia for body, link in self.tree.links.items()}
+        found: dict[int, Elimination] = {}
         for cluster in reversed(self.clusters):
-            inner = cluster[0][0].inner
-            if len(cluster) == 1:
-                body = cluster[0][0].outer
-                found[body] = eliminate(tree.joint_kinematics[body], inertias[body])
-            else:
-                found |= self._eliminate_train(cluster, inertias)
-            if inner < 0:
-                continue
-            for edge, _ in cluster:
-                body = edge.outer
-                moved = inertia_to_inner(tree.links[body], tree.joint_kinematics[body], found[body].projected)
-                inertias[inner] = add(inertias[inner], moved)
-            if len(cluster) > 1:
-                U = sum(self._to_inner(edge, found[edge.outer].U[:, 0]) for edge, _ in cluster)
-                D_inverse = found[cluster[0][0].outer].D_inverse
-                inertias[inner] = add(inertias[inner], _blocks(-np.outer(U, D_inverse @ U[None])))
+            found |= self._eliminate_cluster(cluster, inertias)
+        return found
+
+    def _eliminate_cluster(self, cluster, inertias) -> dict[int, Elimination]:
+        """Elimination of the joints of a cluster; its inertia is added to that of the inner link in place."""
+        tree, inner = self.tree, cluster[0][0].inner
+        if len(cluster) == 1:
+            body = cluster[0][0].outer
+            found = {body: eliminate(tree.joint_kinematics[body], inertias[body])}
+        else:
+            found = self._eliminate_train(cluster, inertias)
+        if inner < 0:
+            return found
+        for edge, _ in cluster:
+            body = edge.outer
+            moved = inertia_to_inner(tree.links[body], tree.joint_kinematics[body], found[body].projected)
+            inertias[inner] = add(inertias[inner], moved)
+        if len(cluster) > 1:
+            U = sum(self._to_inner(edge, found[edge.outer].U[:, 0]) for edge, _ in cluster)
+            D_inverse = found[cluster[0][0].outer].D_inverse
+            inertias[inner] = add(inertias[inner], blocks(-np.outer(U, D_inverse @ U[None])))
         return found
 
     def _eliminate_train(self, cluster, inertias) -> dict[int, Elimination]:
@@ -115,60 +119,66 @@ class ArticulatedBody:
     def _solve(self, forces, biases, base, tau):
         """Accelerations by joint and by body; missing entries, given or found, are zero."""
         u, loaded = self._inward(forces, biases, tau)
-        accelerations, rates = {} if base is None else {-1: base}, {}
+        accelerations, rates = {} if base is None else {-1: base}, dict[int, np.ndarray]()
         moved = self._outward_of(loaded if base is None else range(len(self.clusters)))
         for cluster in (self.clusters[place] for place in sorted(moved)):
-            first = cluster[0][0]
-            own_u = u.get(first.outer, np.zeros(1))
-            carried = {
-                edge.outer: to_outer(
-                    self.tree.links[edge.outer],
-                    self.tree.joint_kinematics[edge.outer],
-                    accelerations.get(edge.inner, ZERO),
-                )
-                + biases.get(edge.outer, ZERO)
-                for edge, _ in cluster
-            }
-            if len(cluster) > 1:  # all links of a gear train act on its one coordinate
-                own_u = own_u - sum(self.eliminations[body].U.T @ own for body, own in carried.items())
-            for edge, ratio in cluster:
-                body, kin, elimination = edge.outer, self.tree.joint_kinematics[edge.outer], self.eliminations[edge.outer]
-                if len(cluster) == 1:
-                    rates[edge.constraint], accelerations[body] = acceleration_outward(
-                        kin, elimination, own_u, carried[body]
-                    )
-                else:
-                    rates[edge.constraint] = ratio * (elimination.D_inverse @ own_u)
-                    accelerations[body] = carried[body] + kin.S @ rates[edge.constraint]
+            self._carry_outward(cluster, u.get(cluster[0][0].outer, np.zeros(1)), biases, rates, accelerations)
         return rates, accelerations
+
+    def _carry_outward(self, cluster, own_u, biases, rates: dict, accelerations: dict):
+        """Add the accelerations of the joints and links of a cluster."""
+        carried = {edge.outer: self._to_outer(edge, accelerations, biases) for edge, _ in cluster}
+        if len(cluster) > 1:  # all links of a gear train act on its one coordinate
+            own_u = own_u - sum(self.eliminations[body].U.T @ own for body, own in carried.items())
+        for edge, ratio in cluster:
+            body, kin, elimination = edge.outer, self.tree.joint_kinematics[edge.outer], self.eliminations[edge.outer]
+            if len(cluster) == 1:
+                rates[edge.constraint], accelerations[body] = acceleration_outward(kin, elimination, own_u, carried[body])
+            else:
+                rates[edge.constraint] = ratio * (elimination.D_inverse @ own_u)
+                accelerations[body] = carried[body] + kin.S @ rates[edge.constraint]
+
+    def _to_outer(self, edge: Edge, accelerations: dict, biases: dict) -> np.ndarray:
+        """Acceleration of the inner link carried to the outer link frame, with the bias of the joint."""
+        body = edge.outer
+        carried = to_outer(self.tree.links[body], self.tree.joint_kinematics[body], accelerations.get(edge.inner, ZERO))
+        return carried + biases.get(body, ZERO)
 
     def _inward(self, forces, biases, tau) -> tuple[dict, set[int]]:
         """Forces u = τ − Sᵀ p by the first body of each cluster, and places of clusters that forces or biases reach."""
-        joints, u = self.tree.subsystem.joints, {}
+        u = {}
         forces = dict(forces)
         loaded = self._loaded(forces, biases, tau)
         for cluster in (self.clusters[place] for place in sorted(loaded, reverse=True)):
-            driven = {edge.outer: tau[joints[edge.constraint].v] for edge, _ in cluster}
             first = cluster[0][0]
-            if len(cluster) == 1:
-                body = first.outer
-                given = forces.get(body, ZERO), biases.get(body, ZERO), driven[body]
-                u[body], onward = force_inward(self.tree.joint_kinematics[body], self.eliminations[body], *given)
-                passed = {body: onward}
-            else:
-                u[first.outer], passed = self._train_force_inward(cluster, forces, biases, driven)
+            u[first.outer], passed = self._pass_inward(cluster, forces, biases, tau)
             if first.inner >= 0:
-                for edge, _ in cluster:
-                    forces[edge.inner] = forces.get(edge.inner, ZERO) + self._to_inner(edge, passed[edge.outer])
+                self._gather(cluster, passed, forces)
         return u, loaded
+
+    def _pass_inward(self, cluster, forces, biases, tau) -> tuple[np.ndarray, dict]:
+        """Joint force u of a cluster, and the bias forces of its links that are passed on to the inner link."""
+        joints = self.tree.subsystem.joints
+        driven = {edge.outer: tau[joints[edge.constraint].v] for edge, _ in cluster}
+        if len(cluster) > 1:
+            return self._train_force_inward(cluster, forces, biases, driven)
+        body = cluster[0][0].outer
+        given = forces.get(body, ZERO), biases.get(body, ZERO), driven[body]
+        u, onward = force_inward(self.tree.joint_kinematics[body], self.eliminations[body], *given)
+        return u, {body: onward}
+
+    def _gather(self, cluster, passed, forces: dict):
+        """Add the forces that the links of a cluster pass on to those of the inner link."""
+        for edge, _ in cluster:
+            forces[edge.inner] = forces.get(edge.inner, ZERO) + self._to_inner(edge, passed[edge.outer])
 
     def _loaded(self, forces, biases, tau) -> set[int]:
         """Places of the clusters with a force or bias, on them or further out."""
         seeds = {self.places[body] for body in (*forces, *biases)}
         if tau.dtype == object or tau.any():
             joints = self.tree.subsystem.joints
-            is_zero = lambda edge: _is_zero(tau[joints[edge.constraint].v])  # noqa: E731
-            seeds |= {self.places[edge.outer] for cluster in self.clusters for edge, _ in cluster if not is_zero(edge)}
+            is_idle = lambda edge: is_zero(tau[joints[edge.constraint].v])  # noqa: E731
+            seeds |= {self.places[edge.outer] for cluster in self.clusters for edge, _ in cluster if not is_idle(edge)}
         found: set[int] = set()
         for seed in seeds:
             place: int | None = seed
@@ -224,7 +234,8 @@ def acceleration_outward(kin: JointKinematics, elimination: Elimination, u, carr
     return rates, carried + kin.S @ rates
 
 
-def _is_zero(part: np.ndarray) -> bool:
+def is_zero(part: np.ndarray) -> bool:
+    """Whether all entries are constant zeros."""
     return not any(as_number(entry) != 0 for entry in part)
 
 
@@ -268,19 +279,25 @@ def _project(inertia, U, D_inverse, S):
     """Î − U D⁻¹ Uᵀ; along a coordinate axis that the joint frees it is exactly zero."""
     A, B, C = inertia
     removed = U @ D_inverse @ U.T
-    blocks = A - removed[:3, :3], B - removed[:3, 3:], C - removed[3:, 3:]
-    full = np.concatenate([np.concatenate(blocks[:2], axis=1), np.concatenate([blocks[1].T, blocks[2]], axis=1)])
-    for axis in _free_axes(S):
+    full = whole_inertia((A - removed[:3, :3], B - removed[:3, 3:], C - removed[3:, 3:]))
+    for axis in free_axes(S):
         full[axis, :] = 0.0
         full[:, axis] = 0.0
-    return _blocks(_symmetric(full))
+    return blocks(_symmetric(full))
 
 
-def _blocks(full: np.ndarray):
+def whole_inertia(inertia) -> np.ndarray:
+    """Inertia (6, 6) of its blocks A, B, C."""
+    A, B, C = inertia
+    return np.concatenate([np.concatenate([A, B], axis=1), np.concatenate([B.T, C], axis=1)])
+
+
+def blocks(full: np.ndarray):
+    """Blocks A, B, C of a symmetric matrix (6, 6)."""
     return full[:3, :3], full[:3, 3:], full[3:, 3:]
 
 
-def _free_axes(S: np.ndarray) -> list[int]:
+def free_axes(S: np.ndarray) -> list[int]:
     """Coordinate axes among the columns of the subspace."""
     columns = [[as_number(entry) for entry in column] for column in S.T]
     known = [np.array(column) for column in columns if None not in column]

@@ -34,7 +34,7 @@ from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.plan import ACCELERATIONS, DEVICE_FUNCTIONS, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import cached, cached_on_disk
-from gauss.dynamics.traced_refinement import refined, refined_once
+from gauss.dynamics.traced_refinement import embedded_once, refined, refined_once
 from gauss.dynamics.traced_system import FINITE, Program
 from gauss.system import State, System
 
@@ -147,7 +147,8 @@ def forward_dynamics_on_device(system: System, device) -> "DeviceFunction":
 def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
     """Machine code of the dynamics under the traced loads.
 
-    Results that fail the check are certified, or, above the compile threshold, refined to round-off by machine code.
+    Results that fail the check are certified, or, above the compile threshold, refined to round-off by machine code; those
+    of embedded loops are left to the general elimination first.
     """
 
     def make():
@@ -159,16 +160,20 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
             rows = batched(by_kernels, interface, lambda: by_kernels(system, laws.traced))
             return fastcall(entry, interface, last, NAME, DOC, rows)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
+        once = embedded_once if plan.dynamics == "embedded loops" else refined_once
 
         def to_roundoff():
             strict = replace(interface, limits=(TOLERANCE, RESIDUAL_TOLERANCE, FINITE))
             entry = written(refined, strict, lambda: write(partial(refined, program), *sizes, name=NAME))
             return fastcall(entry, strict, last, NAME, DOC)
 
-        once = lambda: write(partial(refined_once, program), *sizes, name=NAME)  # noqa: E731
-        rows = batched(refined_once, interface, once)
-        entry = written(refined_once, interface, once)
-        return fastcall(entry, interface, TieredFunction(last, to_roundoff), NAME, DOC, rows)
+        def traced():
+            return write(partial(once, program), *sizes, name=NAME)
+
+        general = replace(plan, dynamics=plan.fallback)
+        further = to_roundoff if once is refined_once else partial(compiled, system, laws, general)
+        entry, rows = written(once, interface, traced), batched(once, interface, traced)
+        return fastcall(entry, interface, TieredFunction(last, further), NAME, DOC, rows)
 
     def written(what: Callable, interface: Interface, trace: Callable[[], Function | NativeFunction]) -> EntryCode:
         return cached_on_disk(system, (entry_code, what, laws.key), lambda: entry_code(trace(), interface))

@@ -1,6 +1,5 @@
 """Assembly of the compulsion: A, B, C, D, Φ, a_free and P of one state."""
 
-from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from gauss import math
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import Scalar
-from gauss.dynamics.constraint_rows import joint_distance, joint_residual, joint_rows
+from gauss.dynamics.constraint_rows import joint_distance, joint_rate_residual, joint_residual, joint_rows
 from gauss.dynamics.constraint_scales import constraint_scales, loop_distance_scales
 from gauss.dynamics.gap_functions import with_contacts
 from gauss.dynamics.kinematics import Kinematics, kinematics
@@ -76,7 +75,7 @@ def assemble_motion(motion: Kinematics, applied: Applied, load=None) -> Compulsi
         B_blocks.append(rows.B)
         C[constraint.rows] = rows.C
         D.append(rows.D)
-    compulsion = Compulsion(
+    return Compulsion(
         structure=system.structure,
         Phi=system.Phi,
         impressed=impressed(motion, applied),
@@ -88,9 +87,7 @@ def assemble_motion(motion: Kinematics, applied: Applied, load=None) -> Compulsi
         G=np.zeros((0, system.Phi.size + system.n_v)),
         h=np.zeros(0),
         units=units(system),
-    )
-    return (
-        replace(compulsion, constraint_residual=_state_residual(motion, compulsion)) if system.has_closures else compulsion
+        constraint_residual=state_residual(motion) if system.has_closures else 0.0,
     )
 
 
@@ -101,12 +98,13 @@ def units(system: System) -> np.ndarray:
     )
 
 
-def _state_residual(motion: Kinematics, compulsion: Compulsion) -> Scalar:
-    """Largest constraint residual of the state: in position, and in velocity relative to the rates, over the row scales."""
-    system, rates = motion.system, motion.state.v
-    _, residual, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
-    fastest = math.maximum(1.0 / system.scale.time, _largest(rates * (1.0 / system.scale.coordinates)))
-    moving = _largest(residual * (1.0 / constraint_scales(system))) / fastest
+def state_residual(motion: Kinematics) -> Scalar:
+    """Largest residual of the loop constraints, over the row scales: in position, and in velocity relative to the rates."""
+    system, scales = motion.system, constraint_scales(motion.system)
+    rows = [system.structure.constraints[index].rows for index in system.structure.closures]
+    scales = np.concatenate([scales[own] for own in rows])
+    fastest = math.maximum(1.0 / system.scale.time, _largest(motion.state.v * (1.0 / system.scale.coordinates)))
+    moving = _largest(closure_rates(motion) * (1.0 / scales)) / fastest
     return math.maximum(_largest(closure_distances(motion) * (1.0 / loop_distance_scales(system))), moving)
 
 
@@ -122,6 +120,25 @@ def closure_distances(motion: Kinematics) -> np.ndarray:
     parts = [joint_distance(motion, system.joints[index], motion.joints[index]) for index in joints]
     parts += [np.array([coupling_residual(motion, coupling)]) for coupling in system.scene.couplings.values()]
     return np.concatenate([*parts, *(rows.gap for _, rows in relation_rows(motion))])
+
+
+def closure_rates(motion: Kinematics) -> np.ndarray:
+    """Velocity residual A v + B q̇ − C of every row of a loop constraint; that of tree joints is zero."""
+    system, rates = motion.system, motion.state.v
+    joints = [index for index in system.structure.closures if index < len(system.joints)]
+    parts = [joint_rate_residual(motion, system.joints[index], motion.joints[index]) for index in joints]
+    for coupling in system.scene.couplings.values():
+        driven, driver = (rates[system.column(name)] for name in (coupling.driven, coupling.driver))
+        parts.append(np.array([driven - coupling.ratio * driver]))
+    v = motion.quasi_velocities() if system.relations.placed else ()
+    for constraint, rows in relation_rows(motion):
+        found = -rows.C
+        for body, A in zip(constraint.bodies, rows.A, strict=True):
+            found = found + A @ v[6 * body : 6 * body + 6]
+        for columns, B in zip(constraint.columns, rows.B, strict=True):
+            found = found + B @ rates[columns]
+        parts.append(found)
+    return np.concatenate(parts)
 
 
 def coupling_residual(motion: Kinematics, coupling) -> Scalar:

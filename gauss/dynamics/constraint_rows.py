@@ -37,6 +37,14 @@ def _block(R: np.ndarray, arm: np.ndarray) -> np.ndarray:
     return block
 
 
+def joint_rate_residual(motion: Kinematics, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
+    """Velocity residual A v + B q̇ (6,) of :func:`joint_rows` [rad/s, m/s]."""
+    p, c = joint.parent, joint.child
+    rates, W_p, W_c = motion.state.v[joint.v], motion.W[p], motion.W[c]
+    linear = motion.u[c] + cross(W_c, at.r) - motion.u[p] - cross(W_p, at.s)
+    return np.concatenate([W_c - W_p - at.E_omega @ rates, linear - at.E_v @ rates])
+
+
 def joint_residual(motion: Kinematics, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
     """Pose of the child relative to its pose by parent and coordinates (6,): rotation vector [rad], distance [m]."""
     R_actual = motion.R[joint.child] @ joint.R_child

@@ -21,6 +21,7 @@ COSTS = {  # s, and s per body, of an evaluation by a driver and a kind of dynam
     ("Python loop", "call graph"): (1e-4, 5e-7),
     ("certified",): (1e-3, 3.5e-4),
     ("state", "compiled"): (3e-6, 1e-7),
+    ("state", "embedded loops"): (2e-6, 5e-8),
 }
 CLIFF = 100.0  # ratio of the costs of the route that is taken and of one that is not, above which a motion warns
 LEAST_WASTE = 1.0  # s of estimated cost of a motion below which it does not

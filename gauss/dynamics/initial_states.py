@@ -3,11 +3,10 @@
 import numpy as np
 
 from gauss.codegen import Kernel, write
-from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.assemble import state_residual
 from gauss.dynamics.consistent_states import changed_starts, consistent, violations
 from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.loads import Applied
 from gauss.dynamics.projection import RESIDUAL_ROUNDOFF, within_limits
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.system import State, System
@@ -62,8 +61,7 @@ def _residual(system: System) -> TieredFunction:
     """Constraint residual of a state, in position and velocity, relative: that of the compulsion."""
 
     def residual(state: State):
-        motion = kinematics(system, state)
-        return assemble_motion(motion, Applied(motion, ())).constraint_residual
+        return state_residual(kinematics(system, state))
 
     def compiled():
         flat = lambda t, q, v: [residual(State(t[0], q, v))]  # noqa: E731

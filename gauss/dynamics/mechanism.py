@@ -51,11 +51,13 @@ class Mechanism:
         Subsystems of another stage of the reduction; those of the system when not given.
     """
 
+    of_subsystem: type[ConstrainedArticulatedBody] = ConstrainedArticulatedBody  # dynamics of each subsystem
+
     def __init__(self, system: System, q, v, t: Scalar = 0.0, subsystems=None):
         relations = _relations(system, State(t, q, v))
         self.system, self.q, self.t = system, q, t
         self.bodies = [
-            ConstrainedArticulatedBody(one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
+            self.of_subsystem(one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
             for one in (system.subsystems if subsystems is None else subsystems)
         ]
 

@@ -26,7 +26,8 @@ Python loop         certified       all other scenes
 ==================  ==============  =====================================================================================
 
 Single states: "unilateral" where frictionless contacts are the only non-smooth elements, "call graph" for many loops, "tree
-recursion" for large trees, "compiled", and "certified" for all others. See :class:`gauss.dynamics.rules.Plan`.
+recursion" for large trees, "embedded loops" for loops with independent constraints, "compiled", and "certified" for all
+others. See :class:`gauss.dynamics.rules.Plan`.
 """
 
 from collections.abc import Callable, Hashable
@@ -56,6 +57,7 @@ from gauss.dynamics.conditions import (
     traced_laws,
     written_out,
 )
+from gauss.dynamics.front_rank import has_loops, independent_fronts
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.dynamics.store import cached
@@ -199,6 +201,7 @@ def _of_states(*laws: Condition) -> tuple[Rule, ...]:
         _unilateral(*laws),
         Rule("state", "call graph", "certified", large_loops, (compilable,)),
         Rule("state", "tree recursion", "certified", large_tree, (compilable,)),
+        Rule("state", "embedded loops", "compiled", has_loops, (written_out, compilable, *laws, independent_fronts)),
         Rule("state", "compiled", "certified", conditions=(written_out, compilable, *laws)),
     )
 

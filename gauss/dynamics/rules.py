@@ -46,7 +46,8 @@ class Plan:
         "library", "batch", "samples" (one motion from each sample of a control law to the next), or "constant" without
         degrees of freedom; "state" for a single state.
     dynamics : str
-        Where accelerations come from: "compiled" (straight-line code of the scene), "call graph" (a kernel for each kind of
+        Where accelerations come from: "compiled" (straight-line code of the scene), "embedded loops" (the same, with loops
+        eliminated where they close), "call graph" (a kernel for each kind of
         link and loop), "tree recursion" (a kernel for each kind of link), "callbacks" (compiled, calling opaque laws),
         "unilateral" (compiled, with an active set of contacts), "pair kernels" (kernels of pairs of shapes, shared by all
         scenes), "certified" (a QP backend solves every state, with a certificate), or "none".

@@ -9,12 +9,13 @@ import numpy as np
 from gauss import math
 from gauss.backends.estimate import SHARE_AT_REST
 from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK
+from gauss.dynamics.embedded_aba import EmbeddedMechanism
 from gauss.dynamics.mechanism import Mechanism, refined_forward_dynamics
 from gauss.dynamics.traced_system import Program, applied_loads, largest
 from gauss.system import State
 
 
-def refined_once(program: Program, q, v, tau, t):
+def refined_once(program: Program, q, v, tau, t, elimination: type[Mechanism] = Mechanism):
     """q̈ after one refinement, and [its error, constraint residual of the state, sum of all inputs].
 
     The error is the size of the refinement and of the remaining residual of the loop constraints, not zero near singular
@@ -23,13 +24,18 @@ def refined_once(program: Program, q, v, tau, t):
     """
     state, system = State(t[0], q, v), program.system
     own, forces, _ = applied_loads(system, program.loads, state)
-    mechanism, total = Mechanism(system, q, v, state.t), own + tau
+    mechanism, total = elimination(system, q, v, state.t), own + tau
     found, multipliers = mechanism.motion(total, forces)
     change, _ = mechanism.response(*mechanism.residual(found, multipliers, total, forces))
     rows = mechanism.acceleration_residual(found + change)
     left = np.abs(change * program.own).sum() + np.abs(rows * program.shares).sum()
     error = left / math.maximum(largest(found * program.own), program.error_scale(v))
     return found + change, [error, program.residual(state), _sum(q, v, total, t)]
+
+
+def embedded_once(program: Program, q, v, tau, t):
+    """The same with loops eliminated where they close."""
+    return refined_once(program, q, v, tau, t, EmbeddedMechanism)
 
 
 def refined(program: Program, q, v, tau, t):

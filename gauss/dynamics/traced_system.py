@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, Kernel, write
-from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.assemble import state_residual
 from gauss.dynamics.energies import look_at_energies
 from gauss.dynamics.error_scale import (
     ACCELERATION_TOLERANCE,
@@ -188,8 +188,7 @@ class Program:
         """Constraint residual of a state, in position and velocity, relative; of all constraints of the system."""
         residual = off_unit(self.system, state.q)
         if self.system.has_closures:
-            motion = kinematics(self.system, state)
-            residual = residual + assemble_motion(motion, Applied(motion, ())).constraint_residual
+            residual = residual + state_residual(kinematics(self.system, state))
         return residual
 
     def evaluate(self, state: State) -> Rates:

@@ -184,6 +184,33 @@ def test_a_body_without_joints_floats_and_colliders_are_named(tmp_path):
     assert scene.joints["a floats"].kind == "free"
 
 
+def test_limits_of_cones_and_of_several_freedoms_are_named(tmp_path):
+    """A cone of 40°, a plane within 1 m; cones that do not limit, and the range of a hinge, which is read, are not."""
+    writer = _Writer(tmp_path)
+    for name in "abcd":
+        writer.body(name, 1.0, (0.1, 0.1, 0.1), (0, 0, 0), (0, 0, 0))
+    cone = writer.joint(UsdPhysics.SphericalJoint, "cone", "", "a")
+    cone.CreateConeAngle0LimitAttr(40.0)
+    cone.CreateConeAngle1LimitAttr(-1.0)
+    writer.joint(UsdPhysics.SphericalJoint, "wide", "", "b")
+    for name, body in (("plane", "c"), ("hinge", "d")):
+        joint = writer.joint(UsdPhysics.Joint, name, "", body)
+        for freedom in ("transX", "transY", "transZ", "rotX", "rotY", "rotZ"):
+            if freedom not in (D6["planar"] if name == "plane" else D6["revolute"]):
+                limit = UsdPhysics.LimitAPI.Apply(joint.GetPrim(), freedom)
+                limit.CreateLowAttr(1.0)
+                limit.CreateHighAttr(-1.0)
+    for joint, freedom in (("plane", "transX"), ("hinge", "rotY")):
+        limit = UsdPhysics.LimitAPI.Apply(writer.stage.GetPrimAtPath(f"/robot/{joint}"), freedom)
+        limit.CreateLowAttr(-1.0)
+        limit.CreateHighAttr(1.0)
+    with pytest.warns(NotImportedWarning) as caught:
+        writer.load()
+    (message,) = (str(one.message) for one in caught)
+    named = ("cone (physics:coneAngle0Limit)", "plane (limit:transX)")
+    assert all(part in message for part in named) and not any(part in message for part in ("wide", "hinge"))
+
+
 def _without_mass(writer):
     UsdPhysics.MassAPI.Get(writer.stage, "/robot/a").GetMassAttr().Set(0.0)
 

@@ -145,6 +145,22 @@ def _by_freedoms(prim: Usd.Prim, units: StageUnits) -> tuple:
     return kind, axis, limits_of(prim, *ranges[free[0]], kind, units), free[0]
 
 
+def unread_limits(prim: Usd.Prim) -> list[str]:
+    """Names of the limits of a joint that are not read: cones of ball joints, ranges of several freedoms."""
+    if prim.IsA(UsdPhysics.SphericalJoint):
+        joint = UsdPhysics.SphericalJoint(prim)
+        cones = joint.GetConeAngle0LimitAttr(), joint.GetConeAngle1LimitAttr()
+        return [str(cone.GetName()) for cone in cones if 0.0 <= float(cone.Get()) < inf]  # negative: not limited
+    if prim.GetTypeName() != "PhysicsJoint":
+        return []
+    limited = {name: UsdPhysics.LimitAPI(prim, name) for name in FREEDOMS if prim.HasAPI(UsdPhysics.LimitAPI, name)}
+    ranges = [(name, float(one.GetLowAttr().Get()), float(one.GetHighAttr().Get())) for name, one in limited.items()]
+    locked = sum(low > high for _, low, high in ranges)
+    if len(FREEDOMS) - locked < 2:
+        return []  # that of a single freedom is read
+    return [f"limit:{name}" for name, low, high in ranges if low <= high and (low, high) != (-inf, inf)]
+
+
 def limits_of(prim: Usd.Prim, low: float, high: float, kind: str, units: StageUnits) -> tuple[float, float] | None:
     """Limits of a joint of one freedom in rad or m; None where neither end is limited."""
     if low == -inf and high == inf:

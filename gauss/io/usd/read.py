@@ -15,7 +15,7 @@ from gauss import math
 from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean, extra
 from gauss.io.usd.bodies import add_body, moving_prims, rigid_bodies
 from gauss.io.usd.guard import opened_stage
-from gauss.io.usd.joints import UsdJoint, joints_of
+from gauss.io.usd.joints import UsdJoint, joints_of, unread_limits
 from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits
 from gauss.rotations import to_quaternion
 from gauss.scene import GROUND, Scene
@@ -67,9 +67,22 @@ def read_usd(path, limits: str = "start", root_folder=None) -> Scene:
         raise FileError(f"{path}: USD refuses it, or a value is not of the type of its schema: {error}") from error
     left = [prim.GetName() for prim in moving_prims(stage) if prim.HasAPI(UsdPhysics.CollisionAPI)]
     if left:
-        shown = f"{', '.join(left[:8])}{', …' if len(left) > 8 else ''}"
-        warnings.warn(f"{path}: not read: contacts of {shown}.", NotImportedWarning, stacklevel=2)
+        warnings.warn(f"{path}: not read: contacts of {_shown(left)}.", NotImportedWarning, stacklevel=2)
+    limits_left = [f"{prim.GetName()} ({', '.join(names)})" for prim, names in _unread_limits(stage)]
+    if limits_left:
+        warnings.warn(f"{path}: not read: limits of {_shown(limits_left)}.", NotImportedWarning, stacklevel=2)
     return scene
+
+
+def _shown(names: list[str]) -> str:
+    return f"{', '.join(names[:8])}{', …' if len(names) > 8 else ''}"
+
+
+def _unread_limits(stage: Usd.Stage) -> list[tuple[Usd.Prim, list[str]]]:
+    """Joints with limits that are not read, and the names of these."""
+    joints = [prim for prim in moving_prims(stage) if prim.IsA(UsdPhysics.Joint)]
+    found = [(prim, unread_limits(prim)) for prim in joints if UsdPhysics.Joint(prim).GetJointEnabledAttr().Get()]
+    return [(prim, names) for prim, names in found if names]
 
 
 def _scene(stage: Usd.Stage, name: str) -> Scene:

@@ -1,0 +1,137 @@
+"""Loops eliminated where they close, against the general elimination and against the certified solution."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.dynamics.embedded_aba import EmbeddedMechanism
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import Mechanism
+from gauss.dynamics.plan import FUNCTIONS
+from gauss.dynamics.rules import Question
+from tests.support import mechanisms
+
+ROUNDING = 1e-10  # relative to the largest entry: both eliminations lose digits near singular states
+CERTIFIED = 1e-9  # of accelerations that passed the check
+
+
+def _platform(last: str = "revolute", reach: float = 1.4):
+    """Platform on four legs of six freedoms, whose last is a hinge or a slider on the platform.
+
+    The lower and the upper rod of the first leg, 1 m each, are stretched to ``reach``.
+    """
+    scene = gauss.Scene(f"{last} platform")
+    scene.body("platform", 3.0, (0.3, 0.3, 0.5), position=(0.0, 0.0, 1.0))
+    for k in range(4):
+        angle = k * np.pi / 2.0 + 0.2 * k
+        outward = np.array([np.cos(angle), np.sin(angle), 0.0])
+        long = reach if k == 0 else 1.4 + 0.05 * k
+        ankle = np.array([0.0, 0.0, 1.0]) + 0.3 * outward
+        foot = ankle + long * (0.6 * outward - [0.0, 0.0, 0.8])
+        bend = np.cross(outward, [0.1 * k, 0.2, 1.0])
+        knee = (ankle + foot) / 2.0 + bend / np.linalg.norm(bend) * np.sqrt(max(0.0, 1.0 - long**2 / 4.0))
+        for name, one, two in (("lower", foot, knee), ("upper", knee, ankle)):
+            scene.body(f"{name}{k}", 1.0 + 0.1 * k, (0.02, 0.08, 0.08), position=tuple((one + two) / 2.0))
+        scene.ball(f"foot{k}", "ground", f"lower{k}", at=tuple(foot))
+        first = np.cross(knee - foot, ankle - foot + 0.1 * bend)
+        first, second = first / np.linalg.norm(first), np.cross(first, knee - ankle)
+        axes = {"axis": tuple(first), "second_axis": tuple(second / np.linalg.norm(second))}
+        scene.universal(f"knee{k}", f"lower{k}", f"upper{k}", at=tuple(knee), **axes)
+        make = scene.revolute if last == "revolute" else scene.prismatic
+        make(f"ankle{k}", f"upper{k}", "platform", at=tuple(ankle), axis=(0.6 - 0.4 * k, 0.8, 0.3))
+    return scene
+
+
+def _crossed():
+    """Two four-bars on a free base, and a third loop that runs through both."""
+    scene = gauss.Scene("crossed")
+    scene.body("base", 5.0, (0.4, 0.5, 0.6))
+    scene.free("root", "ground", "base")
+    for side, y in (("left", 0.3), ("right", -0.3)):
+        points = {"hip": (0, y, 0), "knee": (0.1, y, -0.5), "ankle": (0.4, y, -0.6), "heel": (0.35, y, 0.05)}
+        rods = {"thigh": ("hip", "knee"), "shin": ("knee", "ankle"), "rod": ("heel", "ankle")}
+        for name, ends in rods.items():
+            middle = np.mean([points[end] for end in ends], axis=0)
+            scene.body(f"{side} {name}", 1.0, (0.03, 0.04, 0.05), position=tuple(middle))
+        scene.revolute(f"{side} hip", "base", f"{side} thigh", at=points["hip"], axis=(0.0, 1.0, 0.0))
+        scene.revolute(f"{side} knee", f"{side} thigh", f"{side} shin", at=points["knee"], axis=(0.1, 1.0, 0.0))
+        scene.ball(f"{side} heel", "base", f"{side} rod", at=points["heel"])
+        scene.ball(f"{side} ankle", f"{side} rod", f"{side} shin", at=points["ankle"])
+    scene.body("tie", 0.5, (0.05, 0.01, 0.05), position=(0.25, 0.0, -0.55))
+    scene.ball("tie left", "left shin", "tie", at=(0.25, 0.3, -0.55))
+    scene.universal(
+        "tie right", "right shin", "tie", at=(0.25, -0.3, -0.55), axis=(1.0, 0.0, 0.0), second_axis=(0.0, 0.0, 1.0)
+    )
+    return scene
+
+
+SCENES = {
+    name: lambda name=name: gauss.load(name) for name in ("four_bar", "slider_crank", "rolling_disk", "stewart_platform")
+}
+SCENES |= {
+    "squeezer": lambda: gauss.load("andrews_squeezer"),
+    "ladder": lambda: gauss.load("n_four_bar", n=3),
+    "four-bars of a leg": lambda: gauss.load("four_bar_branch", n=2),
+    "belt": lambda: gauss.load("parallel_chains", belt=True),
+    "chains": lambda: gauss.load("parallel_chains"),
+    "platform on hinges": lambda: _platform("revolute"),
+    "platform on sliders": lambda: _platform("prismatic"),
+    "crossed loops": _crossed,
+}
+WITH_HUBS = {"stewart_platform", "platform on hinges", "platform on sliders"}
+
+
+def _states(system):
+    """Consistent states with generalised forces along all coordinates, of loop joints, too."""
+    return zip(*mechanisms.consistent_states(system), strict=True)
+
+
+def _agree(one, two):
+    one, two = (np.asarray(part, dtype=float) for part in (one, two))
+    assert one == pytest.approx(two, rel=ROUNDING, abs=ROUNDING * np.abs(two).max(initial=1e-3))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_both_eliminations_agree(name):
+    system = gauss.compile_scene(SCENES[name]())
+    for state, tau in _states(system):
+        given = system, state.q, state.v, state.t
+        embedded, general = EmbeddedMechanism(*given), Mechanism(*given)
+        assert any(body.embedded.hubs for body in embedded.bodies) == (name in WITH_HUBS)
+        (found, y), (expected, multipliers) = embedded.motion(tau), general.motion(tau)
+        _agree(found, expected)
+        _agree(general.reaction(y), general.reaction(multipliers))
+        target = np.random.default_rng(1).standard_normal(general.scale.size)
+        for mine, theirs in zip(embedded.response(tau, target), general.response(tau, target), strict=True):
+            _agree(mine, theirs)
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "platform on hinges", "crossed loops"])
+def test_the_function_is_that_of_the_certified_solution(name):
+    system = gauss.compile_scene(SCENES[name]())
+    assert FUNCTIONS.plan(Question(system, Laws(system))).dynamics == "embedded loops"
+    for state, tau in _states(system):
+        exact = gauss.solve(gauss.assemble(system, state, tau)).qdd
+        found = system.forward_dynamics(state.q, state.v, tau)
+        assert found == pytest.approx(exact, rel=CERTIFIED, abs=CERTIFIED * np.abs(exact).max())
+
+
+def test_a_stretched_leg_is_left_to_the_general_elimination():
+    """The platform moves on, but the leg alone cannot meet its rows: its front is singular."""
+    regular = gauss.compile_scene(_platform("revolute"))
+    stretched = gauss.compile_scene(_platform("revolute", reach=2.0))
+    for system, is_regular in ((regular, True), (stretched, False)):
+        state, tau = system.initial_state(), np.linspace(-1.0, 1.0, system.n_v)
+        with np.errstate(all="ignore"):
+            pivots = np.abs(np.array(EmbeddedMechanism(system, state.q, state.v).pivots, dtype=float))
+        assert (pivots.min() > 1e-3) == is_regular
+        exact = gauss.solve(gauss.assemble(system, state, tau)).qdd
+        found = system.forward_dynamics(state.q, state.v, tau)
+        assert found == pytest.approx(exact, rel=CERTIFIED, abs=CERTIFIED * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("name", ["bricard", "delta_robot", "planetary_gears"])
+def test_redundant_constraints_are_left_to_the_general_elimination(name):
+    system = gauss.compile_scene(gauss.load(name))
+    plan = FUNCTIONS.plan(Question(system, Laws(system)))
+    assert plan.dynamics == "compiled" and plan.rejected[0].dynamics == "embedded loops"
