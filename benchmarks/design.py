@@ -26,6 +26,7 @@ from gauss.bench.machine import header
 from gauss.bench.markdown import head
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
+from models import families
 
 DURATION, STEPS = 1.0, 100
 SAMPLES = 10_000
@@ -51,6 +52,14 @@ def least(rounds: int, *calls: Callable, repeats: int = 1) -> list[float]:
     return found.min(axis=0).tolist()
 
 
+MODELS = [
+    ("Panda", lambda: panda(inputs=True)),
+    ("four-bar", lambda: gauss.load("four_bar")),
+    ("slider-crank", lambda: gauss.load("slider_crank")),
+    ("flyball governor", families.flyball_governor),
+]
+
+
 def linear_models(rounds: int) -> list[dict]:
     """A and B of a tree are the derivatives of its accelerations."""
     system = gauss.compile_scene(panda())
@@ -65,9 +74,19 @@ def linear_models(rounds: int) -> list[dict]:
         call()
     slopes, whole = least(rounds, calls[0], repeats=200)[0], least(rounds, calls[1])[0]
     return [
-        _row("matrices A, B of a state (System.acceleration_derivatives)", slopes, "s", 20e-6),
+        *[_row(f"A, B, C, D of a state, prepared: {name}", prepared(rounds, scene), "s", 20e-6) for name, scene in MODELS],
+        _row("derivatives of the accelerations alone (System.acceleration_derivatives)", slopes, "s", None),
         _row("gauss.linearise with names and checks", whole, "s", None),
     ]
+
+
+def prepared(rounds: int, scene: Callable[[], gauss.Scene]) -> float:
+    """Least time [s] of a model that :func:`gauss.prepare_linear_model` has prepared."""
+    model = gauss.prepare_linear_model(scene())
+    start = model.system.initial_state()
+    call = lambda: model(start.q, start.v)  # noqa: E731
+    call()
+    return least(rounds, call, repeats=200)[0]
 
 
 def gradients(rounds: int) -> list[dict]:

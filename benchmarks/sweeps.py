@@ -42,7 +42,7 @@ ASKED = 20.0  # times as fast as single calls
 def measure(side: int, singles: int) -> list[dict]:
     """Rows of all measurements."""
     import gauss
-    from gauss.simulation.sweeps.parameters import changed
+    from gauss.scene.named_numbers import changed
 
     scene, times, rng = gauss.load("four_bar"), np.linspace(0.0, DURATION, SAMPLES), np.random.default_rng(0)
     vary = {

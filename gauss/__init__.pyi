@@ -75,6 +75,7 @@ from gauss.analysis.motion_fit import fit_motion
 from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
 from gauss.analysis.planned_path import plan_path
+from gauss.analysis.prepared_linear_model import prepare_linear_model
 from gauss.analysis.recommendation import advise
 from gauss.analysis.regressor import Regressor, regressor
 from gauss.analysis.root_locus import RootLocus, root_locus
@@ -198,6 +199,7 @@ __all__ = [
     "plan_motion",
     "plan_path",
     "prepare",
+    "prepare_linear_model",
     "reactions",
     "regressor",
     "resolve_overlaps",

@@ -236,7 +236,8 @@ def linearise(
     N, rate = tangents.position, tangents.rate
     if independent is not None:
         N, rate = (_described_by(system, basis, independent) for basis in (N, rate))
-        tangents.__dict__.update(position=N, rate=rate)
+        chosen = fixed_columns(system, (independent,) if isinstance(independent, str) else independent)
+        tangents.__dict__.update(position=N, rate=rate, independent_coordinates=chosen, independent_rates=chosen)
     k, D, free = N.shape[1], tangents.change, tangents.independent_rates
     places = tangents.independent_coordinates
     moving = D + tangents.turning @ N
@@ -298,14 +299,16 @@ def _input_columns(system: System, state: State, inputs) -> tuple[np.ndarray, tu
 
 
 def _input_slope(system: System, state: State, place: int) -> np.ndarray:
-    """∂Q/∂u of an input, at u = 0."""
+    """∂Q/∂u of an input at u = 0, or the limit next to it, from within."""
     inputs = InputForces(system)
     unit = np.eye(len(inputs.low))[place]
     if inputs.is_plain:
         return unit @ np.eye(system.n_v)[inputs.columns]
     slopes = lambda t, q, v, u: forward(inputs.forces(u, State(t[0], q, v)), u, unit)  # noqa: E731
     slope = write(slopes, 1, system.n_q, system.n_v, unit.size, name="input")
-    return Kernel(slope, batch=False)(np.concatenate([[state.t], state.q, state.v, np.zeros(unit.size)]))
+    return Kernel(slope, batch=False)(
+        np.concatenate([[state.t], state.q, state.v, inputs.inside(inputs.efforts(0.0 * unit))])
+    )
 
 
 def _output_rows(system: System, state: State, outputs, places, load):

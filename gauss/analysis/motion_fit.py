@@ -2,32 +2,19 @@
 
 Gauss–Newton steps in a trust region (scipy.optimize.least_squares) with exact derivatives of the computed steps; the
 covariance is (Jᵀ J)⁻¹ in units of the noise (Bard, Nonlinear Parameter Estimation, 1974; Schittkowski, Numerical Data
-Fitting in Dynamical Systems, 2002). How numbers of the compiled system and its consistent start follow from the
-parameters is differentiated by central differences: that is smooth, and costs no motion.
+Fitting in Dynamical Systems, 2002). Impacts, stops, stick and slip are events between smooth phases.
 """
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy import stats
-from scipy.optimize import least_squares
 
+from gauss.analysis.event_fit import EventFitProblem
+from gauss.analysis.fit_problem import FitProblem
 from gauss.analysis.fitted_motion import MotionFit
-from gauss.analysis.sensitivity.parametrised_step import ParametrisedStep
 from gauss.arguments import named_arguments
-from gauss.dynamics import compile_scene
-from gauss.dynamics.parameters import numbers
-from gauss.dynamics.parametrised_system import parametrised
-from gauss.errors import ArgumentError, GaussError, SceneError, StateError, did_you_mean, require
+from gauss.errors import ArgumentError, require
 from gauss.scene import Scene
-from gauss.simulation.sweeps.parameters import POSITIVE, scene_of, value_of
-from gauss.system.coordinate_names import coordinate_units, rate_units
-
-DIFFERENCE = 1e-5  # of parameters in their units: errors of central differences are 1e-10 of them
-UNIDENTIFIABLE = 1e-8  # singular values below this share of the largest: round-off of the derivatives
-NAMED = 0.1  # share of a parameter in a direction without effect from which it is named
-MOST_EVALUATIONS = 100  # motions of one fit; few of them converge in more than ten
-CONVERGED = 1e-12  # relative change of the sum of squares, of the parameters, and of the gradient
 
 
 @named_arguments
@@ -49,7 +36,9 @@ def fit_motion(
     Parameters
     ----------
     scene : Scene
-        The scene, without contacts and friction of Coulomb; it moves from its start.
+        The scene; it moves from its start. Through impacts, stops, stick and slip the parameters are masses, centres of
+        mass, gravity, constants of loads, restitution ("floor.restitution"), places of stops, limits of friction, and the
+        start.
     times : array_like, shape (k,)
         Increasing times of the samples [s]; the motion starts at the first.
     measured : mapping of str to array_like, shape (k,)
@@ -58,7 +47,7 @@ def fit_motion(
         Names as for :func:`gauss.sweep`, with first values, or those of the scene: "rod.mass", "rod.com.x", "B.at[0]",
         "spring.stiffness", "gravity.z"; "A.position" and "A.rate" of the start.
     step : float
-        Largest step of the integrator [s].
+        Largest step of the integrator [s]; with events the samples lie on whole multiples of it.
     inputs : array_like, shape (k − 1, n_u), optional
         Inputs held between samples, in the order of the scene; zero when not given.
     bounds : mapping of str to (float, float), optional
@@ -100,7 +89,8 @@ def fit_motion(
     require(scene, (Scene,), "fit_motion: scene")
     if not isinstance(confidence, float) or not 0.0 < confidence < 1.0:
         raise ArgumentError(f"fit_motion: confidence: expected a number between 0 and 1, got {confidence!r}.")
-    problem = _FitProblem(scene, times, measured, parameters, step, inputs, integrator)
+    kind = EventFitProblem if scene.nonsmooth else FitProblem
+    problem = kind(scene, times, measured, parameters, step, inputs, integrator)
     low, high = problem.limits(bounds)
     given = problem.noise(noise)
     sizes = np.maximum(problem.y.std(axis=0), np.abs(problem.y).max(axis=0) * 1e-3) + np.finfo(float).tiny
@@ -111,235 +101,3 @@ def fit_motion(
         found = problem.solve(found, sigma, low, high)
         sigma = problem.spread(found, sizes)
     return problem.report(found, sigma, confidence)
-
-
-class _FitProblem:
-    """Residuals of a fit and their derivatives."""
-
-    def __init__(self, scene: Scene, times, measured, parameters, step: float, inputs, integrator: str):
-        self.scene, self.t = scene, _times(times, step)
-        self.names = tuple(parameters)
-        if not self.names or isinstance(parameters, str):
-            raise ArgumentError(f"fit_motion: parameters: expected names, got {parameters!r}.")
-        known = parameters if isinstance(parameters, Mapping) else {name: value_of(scene, name) for name in self.names}
-        self.first = np.array([float(known[name]) for name in self.names])
-        self.units = np.where(self.first == 0.0, 1.0, np.abs(self.first))
-        self.system = compile_scene(scene_of(scene, dict(zip(self.names, self.first, strict=True))))
-        self.columns, self.y = tuple(measured), self._measured(measured)
-        self.places, self.inputs = self._places(), self._inputs(inputs)
-        self.kind = numbers(self.system)[1]
-        self.step = ParametrisedStep(parametrised(self.system, self._around()), integrator)
-        self.substeps = np.maximum(1, np.ceil(np.diff(self.t) / step - 1e-9)).astype(int)
-
-    def _measured(self, measured) -> np.ndarray:
-        """Columns (k, n) of numbers."""
-        if not isinstance(measured, Mapping) or not measured:
-            raise ArgumentError("fit_motion: measured: expected names with values, as {'A': angles}.")
-        for name, column in measured.items():
-            values = np.asarray(column, dtype=float)
-            if values.shape != self.t.shape or not np.isfinite(values).all():
-                raise ArgumentError(f"fit_motion: measured {name!r}: expected {self.t.size} finite numbers.")
-        return np.array([np.asarray(column, dtype=float) for column in measured.values()]).T
-
-    def _places(self) -> list[int]:
-        """Places of the measured columns in a state."""
-        known = [*coordinate_units(self.system), *(f"{name} rate" for name in rate_units(self.system))]
-        for name in self.columns:
-            if name not in known:
-                raise ArgumentError(f"fit_motion: nothing measured is called {name!r}. {did_you_mean(name, known)}")
-        return [known.index(name) for name in self.columns]
-
-    def _inputs(self, inputs) -> np.ndarray:
-        """Inputs (k − 1, n_u)."""
-        shape = self.t.size - 1, len(self.system.scene.inputs)
-        found = np.zeros(shape) if inputs is None else np.array(inputs, dtype=float)
-        if found.shape != shape:
-            raise ArgumentError(f"fit_motion: inputs: expected shape {shape}, got {found.shape}.")
-        return found
-
-    def limits(self, bounds) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest parameters."""
-        given = dict(bounds or {})
-        for name in given:
-            if name not in self.names:
-                raise ArgumentError(f"fit_motion: bounds of {name!r}, which is not fitted. {did_you_mean(name, self.names)}")
-        least = np.where(
-            [name.rpartition(".")[2] in POSITIVE for name in self.names], 2.0 * DIFFERENCE * self.units, -np.inf
-        )
-        pairs = [given.get(name, (low, np.inf)) for name, low in zip(self.names, least, strict=True)]
-        low, high = np.array(pairs, dtype=float).T
-        if not ((low < high) & (low <= self.first) & (self.first <= high)).all():
-            raise ArgumentError("fit_motion: bounds: expected a least and a larger value, with the first value between.")
-        return low, high
-
-    def noise(self, noise) -> np.ndarray | None:
-        """Given standard deviations (n,)."""
-        if noise is None:
-            return None
-        found = np.asarray(noise, dtype=float)
-        if found.shape not in ((), (len(self.columns),)) or not (found > 0.0).all():
-            raise ArgumentError(f"fit_motion: noise: expected {len(self.columns)} numbers > 0, got {noise!r}.")
-        return np.broadcast_to(found, (len(self.columns),)).copy()
-
-    def solve(self, start: np.ndarray, sigma: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Parameters of the least sum of squares."""
-        weights = np.tile(1.0 / sigma, self.t.size)
-        first = self.motion(start)[0]
-        if not np.isfinite(first).all():
-            raise StateError("fit_motion: the motion is not finite at the first values; choose others, or a shorter step.")
-        self._refuse_unidentifiable(self.slopes(start) * weights[:, None])
-        found = least_squares(
-            lambda x: (self.motion(x * self.units)[0] - self.y).ravel() * weights,
-            start / self.units,
-            lambda x: self.slopes(x * self.units) * weights[:, None] * self.units,
-            bounds=(low / self.units, high / self.units),
-            ftol=CONVERGED,
-            xtol=CONVERGED,
-            gtol=CONVERGED,
-            max_nfev=MOST_EVALUATIONS,
-        )
-        if not found.status:
-            raise StateError(
-                f"fit_motion: {', '.join(self.names)} do not converge in {MOST_EVALUATIONS} motions: the motion hardly "
-                "identifies them together, or the first values are far off."
-            )
-        return found.x * self.units
-
-    def spread(self, p: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Standard deviation (n,) of the columns about the motion, by the degrees of freedom that are left."""
-        left = self.motion(p)[0] - self.y
-        degrees = max(left.size - p.size, 1) / left.shape[1]
-        return np.maximum(np.sqrt((left**2).sum(axis=0) / degrees), 1e-12 * sizes)
-
-    def report(self, p: np.ndarray, sigma: np.ndarray, confidence: float) -> MotionFit:
-        """The fit with its confidence intervals."""
-        J = self.slopes(p) / np.tile(sigma, self.t.size)[:, None]
-        self._refuse_unidentifiable(J)
-        lengths = np.linalg.norm(J, axis=0)
-        _, R = np.linalg.qr(J / lengths)
-        inverse = np.linalg.inv(R) / lengths[:, None]
-        covariance = inverse @ inverse.T
-        half = stats.t.ppf(0.5 + 0.5 * confidence, max(self.y.size - p.size, 1)) * np.sqrt(np.diag(covariance))
-        values, widths = (dict(zip(self.names, row.tolist(), strict=True)) for row in (p, half))
-        fitted, scene = self.motion(p)[0], scene_of(self.scene, values)
-        return MotionFit(
-            values,
-            widths,
-            covariance,
-            confidence,
-            sigma,
-            float(np.linalg.cond(R)),
-            self.t,
-            self.columns,
-            self.y,
-            fitted,
-            scene,
-        )
-
-    def motion(self, p: np.ndarray, directions: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Fitted values (k, n) and, along changes of (start, numbers), their changes (k, n, p)."""
-        try:
-            given, x = self._of(p)
-        except GaussError:
-            return np.full(self.y.shape, np.nan), None
-        step, varied = self.step, given[self.step.family.varied]
-        n_x, n_u = step.n_x, len(step.inputs)
-        found, changes = [x[self.places]], []
-        if directions is not None:
-            held = np.concatenate([np.zeros((n_u, p.size)), directions[n_x:]])
-            X = directions[:n_x]
-            changes.append(X[self.places])
-        for k, u in enumerate(self.inputs):
-            h = (self.t[k + 1] - self.t[k]) / self.substeps[k]
-            for i in range(self.substeps[k]):
-                t = self.t[k] + i * h
-                if directions is not None:
-                    X = step.changes(t, h, x, u, varied, np.concatenate([X, held]))
-                x = step.moved_to(t, h, x, u, varied)
-            found.append(x[self.places])
-            if directions is not None:
-                changes.append(X[self.places])
-        return np.array(found), np.array(changes) if directions is not None else None
-
-    def slopes(self, p: np.ndarray) -> np.ndarray:
-        """Derivatives (k n, p) of the fitted values."""
-        centre = np.concatenate(self._moved(p))
-        directions = np.array([self._slope(centre, pair, h) for pair, h in zip(self._beside(p), self.steps, strict=True)]).T
-        _, changes = self.motion(p, directions)
-        assert changes is not None
-        return changes.reshape(-1, p.size)
-
-    @property
-    def steps(self) -> np.ndarray:
-        """Differences (p,) of the parameters."""
-        return DIFFERENCE * self.units
-
-    def _slope(self, centre: np.ndarray, pair: np.ndarray, h: float) -> np.ndarray:
-        """Derivative of the start and the numbers; one-sided beside parameters that no scene has, as of a thin rod."""
-        less, more = (self._if_valid(p) for p in pair)
-        if less is None and more is None:
-            raise StateError(f"fit_motion: no scene is near {', '.join(self.names)}.")
-        width = h * ((less is not None) + (more is not None))
-        return ((centre if more is None else more) - (centre if less is None else less)) / width
-
-    def _if_valid(self, p: np.ndarray) -> np.ndarray | None:
-        """Start and varied numbers; None where the scene refuses them."""
-        try:
-            return np.concatenate(self._moved(p))
-        except SceneError:
-            return None
-
-    def _beside(self, p: np.ndarray) -> np.ndarray:
-        """Parameters (p, 2, p) beside others, on both sides along each."""
-        steps = np.diag(self.steps)
-        return np.stack([p - steps, p + steps], axis=1)
-
-    def _around(self) -> np.ndarray:
-        """Numbers (m, n) of systems beside the first one: those that differ are varied."""
-        found = [self._of(self.first)[0]]
-        for p in self._beside(self.first).reshape(-1, self.first.size):
-            try:
-                found.append(self._of(p)[0])
-            except SceneError:
-                continue  # the other side shows what varies
-        return np.array(found)
-
-    def _moved(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Start, and varied numbers."""
-        given, x = self._of(p)
-        return x, given[self.step.family.varied]
-
-    def _of(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers of the system, and its start (n_x,)."""
-        system = compile_scene(scene_of(self.scene, dict(zip(self.names, map(float, p), strict=True))))
-        found, kind = numbers(system)
-        if kind != self.kind:
-            raise ArgumentError(
-                f"fit_motion: the kind of mechanism changes with {', '.join(self.names)}; fit fewer of them."
-            )
-        start = system.initial_state()
-        return found, np.concatenate([start.q, start.v])
-
-    def _refuse_unidentifiable(self, J: np.ndarray):
-        """Raise a StateError for parameters that the motion does not identify, alone or together."""
-        scaled = J * self.units
-        _, sizes, Vt = np.linalg.svd(scaled / max(np.abs(scaled).max(), np.finfo(float).tiny), full_matrices=True)
-        sizes = np.append(sizes, np.zeros(len(Vt) - len(sizes)))
-        hidden = Vt[sizes <= UNIDENTIFIABLE * sizes.max()]
-        if len(hidden):
-            part = np.abs(hidden).max(axis=0) > NAMED
-            names = ", ".join(name for name, takes in zip(self.names, part, strict=True) if takes)
-            raise StateError(
-                f"fit_motion: the motion does not identify {len(hidden)} combination(s) of {names}; fit fewer of them, or "
-                "measure more."
-            )
-
-
-def _times(times, step) -> np.ndarray:
-    """Times of the samples."""
-    found = np.asarray(times, dtype=float)
-    if found.ndim != 1 or found.size < 2 or not (np.diff(found) > 0.0).all():
-        raise ArgumentError(f"fit_motion: times: expected increasing numbers, got {times!r:.80}.")
-    if not isinstance(step, float | int) or not step > 0.0:
-        raise ArgumentError(f"fit_motion: step: expected a time > 0 [s], got {step!r}.")
-    return found

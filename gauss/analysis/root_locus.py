@@ -12,7 +12,7 @@ from gauss.arguments import named_arguments
 from gauss.dynamics import compile_scene
 from gauss.errors import ArgumentError, require
 from gauss.scene import Scene
-from gauss.simulation.sweeps.parameters import scene_of
+from gauss.scene.named_numbers import scene_of
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,8 @@ class MotionGradient:
     states : tuple of str
         Names of the entries of ``start``.
     inputs : ndarray, shape (steps, n_u)
-        Gradient by the inputs held in each step.
+        Gradient by the inputs held in each step; at a limit of an input the one-sided one, into the allowed values, and zero
+        beyond.
     parameters : dict of str to ndarray, shape (n,)
         Gradient by each parameter of n values.
     t, q, v : ndarray, shape (k,), (k, n_q), (k, n_v)

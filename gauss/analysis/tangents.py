@@ -81,12 +81,12 @@ class Tangents:
         ).T
         return np.linalg.lstsq(T, along - other, rcond=None)[0]
 
-    @property
+    @cached_property
     def independent_coordinates(self) -> list[int]:
         """Places of the independent displacements in v."""
         return _units_of(self.position)
 
-    @property
+    @cached_property
     def independent_rates(self) -> list[int]:
         """Places of the independent rates in v."""
         return _units_of(self.rate)

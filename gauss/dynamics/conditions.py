@@ -43,6 +43,9 @@ CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordi
     ("Box", "Box"): 42_787,
 }
 WIDEST_MECHANISM = 128  # rates up to which the mass matrix of a mechanism is dense straight-line code
+MOST_ROWS = (
+    10  # loop constraints of a linear model in straight-line code: 15, of a Stewart platform, take minutes to compile
+)
 
 
 def is_large(system) -> bool:
@@ -130,6 +133,12 @@ def few_bodies(ask: Question) -> list[str]:
 def few_loops(ask: Question) -> list[str]:
     """The loops are few enough for straight-line code."""
     return ["its loops are too many for straight-line code"] if has_large_loops(ask.system) else []
+
+
+def few_loop_rows(ask: Question) -> list[str]:
+    """The loop constraints are few enough to write the response to each of them out, several times."""
+    rows = sum(one.n_loop_constraints for one in ask.system.subsystems)
+    return [f"{rows} loop constraints are more than {MOST_ROWS}"] if rows > MOST_ROWS else []
 
 
 def written_out(ask: Question) -> list[str]:

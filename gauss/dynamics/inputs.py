@@ -48,6 +48,10 @@ class InputForces:
         """Efforts (n_u,) of input values (n_u,), cut off at the limits [N m, N]."""
         return np.clip(u, self.low, self.high)
 
+    def inside(self, u: np.ndarray) -> np.ndarray:
+        """Input values (n_u,) with those at a limit one unit in the last place within: derivatives there are one-sided."""
+        return np.where(u == self.low, np.nextafter(u, np.inf), np.where(u == self.high, np.nextafter(u, -np.inf), u))
+
     def forces(self, u: np.ndarray, state: State) -> np.ndarray:
         """Generalised forces (n_v,) of input values (n_u,) in a state [N m, N]."""
         if not self.is_plain:

@@ -2,7 +2,7 @@
 
 F is a step of an explicit Runge–Kutta method and a projection onto the constraints, traced as a whole; its derivatives are
 those of the traced graph, forward and reverse (Griewank and Walther, Evaluating Derivatives, 2nd ed., ch. 3): derivatives of
-the computed motion, exact to round-off.
+the computed motion, exact to round-off. At a limit of an input they are one-sided, into the allowed values; beyond it zero.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen import Kernel, forward, reverse, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
-from gauss.dynamics.inputs import input_loads
+from gauss.dynamics.inputs import InputForces, input_loads
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism, loop_residual
 from gauss.dynamics.parameter_terms import accelerations_by_parameter, size_of
@@ -40,6 +40,8 @@ class MotionStep:
         Explicit Runge–Kutta method: "rk4", "dopri5" or "dop853", with fixed steps.
     parameters : sequence of str
         Parameters of :meth:`gauss.System.parameter_derivatives`.
+    absent : sequence of str
+        Those of one value that do not act in this system, as the limit of friction in one that sticks.
 
     Raises
     ------
@@ -49,16 +51,17 @@ class MotionStep:
         If the system has no smooth dynamics in machine code, with the reasons.
     """
 
-    def __init__(self, system: System, integrator: str, parameters: Sequence[str] = ()):
+    def __init__(self, system: System, integrator: str, parameters: Sequence[str] = (), absent: Sequence[str] = ()):
         if integrator not in TABLEAUS:
             raise ArgumentError(f"sensitivities: no integrator {integrator!r}. {did_you_mean(integrator, TABLEAUS)}")
         self.system, self.parameters = system, tuple(parameters)
         self.tableau, self.laws = TABLEAUS[integrator], Laws(system)
         DERIVATIVES.plan(Question(system, self.laws))
-        self.sizes = {name: size_of(system, name) for name in self.parameters}
-        self.inputs = tuple(system.scene.inputs)
+        self.absent = tuple(absent)
+        self.sizes = {name: 1 if name in self.absent else size_of(system, name) for name in self.parameters}
+        self.inputs, self.given = tuple(system.scene.inputs), InputForces(system)
         self.n_x, self.n_p = system.n_q + system.n_v, sum(self.sizes.values())
-        self.key: tuple = (MotionStep, integrator, self.parameters, self.laws.key)
+        self.key: tuple = (MotionStep, integrator, self.parameters, self.absent, self.laws.key)
 
     @cached_property
     def loads(self) -> list:
@@ -76,8 +79,9 @@ class MotionStep:
         place = 0
         for name, size in self.sizes.items():
             still = np.zeros(self.system.n_v)
-            slopes = accelerations_by_parameter(self.system, self.loads, state.t, state.q, state.v, still, name)
-            found = found + slopes @ delta[place : place + size]
+            if name not in self.absent:
+                slopes = accelerations_by_parameter(self.system, self.loads, state.t, state.q, state.v, still, name)
+                found = found + slopes @ delta[place : place + size]
             place += size
         return Rates(found, np.zeros(3))
 
@@ -157,12 +161,12 @@ class MotionStep:
         """Changes (n_x, k) of (q, v) after a step along directions (n_given, k)."""
         start = np.concatenate([[t, h], x, np.zeros(self.n_p)])
         count = directions.shape[1]
-        given = [np.tile(part[:, None], count) for part in (start, u)]
+        given = [np.tile(part[:, None], count) for part in (start, self.given.inside(u))]
         return self.tangent(np.concatenate([given[0], directions, given[1]]))
 
     def gradient(self, t: float, h: float, x: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Gradient (n_given,) of weights · (q, v) after a step."""
-        return self.adjoint(np.concatenate([[t, h], x, np.zeros(self.n_p), weights, u]))
+        return self.adjoint(np.concatenate([[t, h], x, np.zeros(self.n_p), weights, self.given.inside(u)]))
 
 
 class _Equations:

@@ -23,7 +23,7 @@ from gauss.dynamics.parameters import changed
 from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import ArgumentError, StateError, did_you_mean, require
 from gauss.rotations import cross
-from gauss.scene import Force
+from gauss.scene import Force, Slipping
 from gauss.system import BoundLoad, State, System, whole
 
 OF_BODIES = {"mass": 1, "com": 3, "inertia": 6}
@@ -56,7 +56,9 @@ def size_of(system: System, parameter: str) -> int:
         return OF_JOINTS[kind]
     loads = {bound.load.name: bound.load for bound in system.loads}
     _known(parameter, name, loads)
-    fields = [field for field, value in vars(loads[name]).items() if isinstance(value, float)]
+    given = loads[name]
+    numbers = vars(given.element if isinstance(given, Slipping) else given)
+    fields = [field for field, value in numbers.items() if isinstance(value, float)]
     if kind not in fields:
         raise ArgumentError(f"parameter {parameter!r}: {name!r} has no number {kind!r}. {did_you_mean(kind, fields)}")
     return 1
@@ -133,6 +135,9 @@ def _by_gravity(system: System) -> list[dict]:
 def _by_constant(system: System, loads, t: Scalar, q, v, kind: str, name: str) -> list[np.ndarray]:
     """Change of inverse dynamics by the constant of a load."""
     bound = next(bound for bound in loads if bound.load.name == name)
+    if isinstance(bound.load, Slipping):  # its force is proportional to the limit
+        motion = kinematics(system, State(t, q, v))
+        return [-generalised_forces(motion, Applied(motion, [bound])) / getattr(bound.load.element, kind)]
 
     def change(t, q, v, constant):
         motion = kinematics(system, State(t[0], q, v))

@@ -41,6 +41,7 @@ from gauss.dynamics.conditions import (
     explicit,
     few_bodies,
     few_contact_operations,
+    few_loop_rows,
     few_loops,
     has_contacts,
     has_opaque_laws,
@@ -237,6 +238,11 @@ DEVICE_FUNCTIONS = RuleTable(
 DERIVATIVES = RuleTable(
     (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),
     lambda ask, why: f"scene {ask.system.scene.name!r} cannot be differentiated: {why}.",
+)
+# Linear models written out as a whole.
+LINEAR_MODELS = RuleTable(
+    (Rule("state", "compiled", conditions=(compilable, traced_laws, few_loops, few_loop_rows)),),
+    lambda ask, why: f"linear models of {ask.system.scene.name!r} cannot be prepared: {why}; call gauss.linearise instead.",
 )
 
 # Code of other languages.

@@ -83,7 +83,7 @@ class Request(NamedTuple):
 
 
 def _inverse_dynamics(terms: StateTerms, _, acceleration):
-    loads = _traced_loads(terms.system).traced
+    loads = traced_loads(terms.system).traced
     own, on_bodies, _ = applied_loads(terms.system, loads, State(terms.t, terms.q, terms.v))
     return inverse_dynamics(terms.system, terms.q, terms.v, acceleration, own, on_bodies, terms.t)
 
@@ -91,14 +91,14 @@ def _inverse_dynamics(terms: StateTerms, _, acceleration):
 def _slopes(function: Callable) -> Callable:
     """Derivatives of a function of the loaded system."""
     return lambda terms, _, given: function(
-        terms.system, _traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given
+        terms.system, traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given
     )
 
 
 def _by_parameter(function: Callable) -> Callable:
     """Derivatives of a function of the loaded system by a parameter."""
     return lambda terms, one, given: function(
-        terms.system, _traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given, one.frame
+        terms.system, traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given, one.frame
     )
 
 
@@ -153,10 +153,11 @@ def state_function(
         If the law of a load cannot be compiled.
     """
     requests, columns = _requested(system, names, reference, independent)
-    laws = _traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""
+    laws = traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""
     key = state_function, requests, columns, laws
+    make = lambda: compiled(system, _function(system, requests, columns), columns, key)  # noqa: E731
     if device is None:
-        return cached(system, key, lambda: _compiled(system, requests, columns, key))
+        return cached(system, key, make)
     from gauss.codegen.gpu.devices import device_name  # on demand: most systems stay on this CPU
 
     device = device_name(device)
@@ -254,7 +255,7 @@ def _columns(system: System, requests, independent) -> tuple[int, ...]:
     return tuple(columns)
 
 
-def _traced_loads(system: System) -> Laws:
+def traced_loads(system: System) -> Laws:
     """Laws of the loads as they are now.
 
     Raises
@@ -269,20 +270,29 @@ def _traced_loads(system: System) -> Laws:
     return laws
 
 
-class _Traced(NamedTuple):
-    """Trace of requests, arguments and results of the function, and its name."""
+class TracedFunction(NamedTuple):
+    """Function of a state before it is compiled.
+
+    Attributes
+    ----------
+    trace : callable
+        () → its trace, whose last outputs are the error measures of :func:`error_measures`.
+    interface : Interface
+        Its arguments and results.
+    name : str
+        Its name in messages.
+    """
 
     trace: Callable[[], Function]
     interface: Interface
     name: str
 
 
-def _function(system: System, requests, columns) -> _Traced:
+def _function(system: System, requests, columns) -> TracedFunction:
     """Traced function of requests, and its interface in Python."""
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
-    limits = (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))
-    interface = Interface(sizes, "t", limits, _shapes(system, requests, columns))
+    interface = Interface(sizes, "t", error_limits(columns), _shapes(system, requests, columns))
 
     def values(*given):
         arguments = dict(zip(names, given[:-1], strict=True))
@@ -290,10 +300,10 @@ def _function(system: System, requests, columns) -> _Traced:
         terms = StateTerms(system, q, v, t) if columns is None else ConstrainedTerms(system, q, v, t, columns)
         found = (_traced(TERMS[one.name], terms, one, arguments) for one in requests)
         results = [part for result in found for part in (result if isinstance(result, tuple) else (result,))]
-        return *results, _errors(terms, given)
+        return *results, error_measures(terms, given)
 
     name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
-    return _Traced(lambda: write(values, *interface.sizes, 1, name="state"), interface, name)
+    return TracedFunction(lambda: write(values, *interface.sizes, 1, name="state"), interface, name)
 
 
 def _on_device(system: System, requests, columns, key, device: str) -> Callable:
@@ -304,12 +314,25 @@ def _on_device(system: System, requests, columns, key, device: str) -> Callable:
     function = _function(system, requests, columns)
     make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
     rows = cached_on_disk(system, (RowsOnDevice, *key, device), make)
-    own = cached(system, key, lambda: _compiled(system, requests, columns, key))
+    own = cached(system, key, lambda: compiled(system, function, columns, key))
     return DeviceFunction(rows, own, function.name)
 
 
-def _compiled(system: System, requests, columns, key) -> Callable:
-    trace, interface, name = _function(system, requests, columns)
+def compiled(system: System, function: TracedFunction, columns, key: tuple) -> Callable:
+    """Machine code of a function of a state, with the checks of its arguments.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    function : TracedFunction
+        The function.
+    columns : sequence of int or None
+        Places of its independent coordinates in v, None where none are chosen.
+    key : tuple
+        What tells it from other functions of the system in the cache.
+    """
+    trace, interface, name = function
     sizes, limits = interface.vectors, interface.limits
     entry = cached_on_disk(system, (entry_code, *key), lambda: entry_code(trace(), interface))
     batch = lambda: cached_on_disk(system, (batch_code, *key), lambda: batch_code(trace(), interface)).entry()  # noqa: E731
@@ -347,7 +370,12 @@ def _shapes(system: System, requests, columns) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(length(one, letter) for letter in shape) for one, shape in shapes)
 
 
-def _errors(terms: StateTerms, given) -> list:
+def error_limits(columns) -> tuple[float, ...]:
+    """Limits of :func:`error_measures` for independent coordinates at these places, None where none are chosen."""
+    return (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))
+
+
+def error_measures(terms: StateTerms, given) -> list:
     """Residual of the state, a sum of all inputs that is finite only if each is, sizes of N and of K N.
 
     A sum is NaN if one of its terms is. Without independent coordinates the state need not meet the constraints: its

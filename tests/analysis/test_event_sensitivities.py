@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.errors import SimulationError, SwitchingWarning
+from gauss.errors import ArgumentError, SimulationError, StateError, SwitchingWarning
 
 ACCURACY = 1e-8  # of extrapolated differences of motions of tolerance 1e-13, relative to the largest derivative
 DIFFERENCE = 1e-4  # largest of the differences that are extrapolated, in the unit of what is changed
@@ -164,6 +164,69 @@ def test_derivatives_by_masses_through_events(name, body):
         return end(gauss.compile_scene(replace(scene, bodies=scene.bodies | {body: own})), span, start)
 
     close(found.parameters[f"mass:{body}"][-1][:, 0], extrapolated(heavier), found.start)
+
+
+OF_EVENTS = [
+    ("bouncing ball", "restitution:floor"),
+    ("bouncing ball", "lowest:floor"),
+    ("pendulum at a stop", "lowest:buffer"),
+    ("double pendulum", "restitution:buffer"),
+    ("four-bar", "restitution:buffer"),
+    ("four-bar", "highest:buffer"),
+    ("slider-crank", "highest:buffer"),
+    ("rope", "restitution:rope"),
+    ("bead", "restitution:bowl"),
+    ("friction", "limit:friction of x"),
+    ("stick and slip", "limit:friction of x"),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "parameter"), OF_EVENTS)
+def test_derivatives_by_restitution_stops_and_friction(name, parameter):
+    scene, rates, span = SCENES[name]()
+    system, start = started(scene, rates)
+    found = gauss.sensitivities(system, span, state=start, parameters=[parameter], **METHOD)
+    kind, _, element = parameter.partition(":")
+    group = "set_valued" if kind == "limit" else "contacts"
+
+    def changed(e):
+        elements = getattr(scene, group)
+        other = replace(elements[element], **{kind: getattr(elements[element], kind) + e})
+        return end(gauss.compile_scene(replace(scene, **{group: elements | {element: other}})), span, start)
+
+    close(found.parameters[parameter][-1][:, 0], extrapolated(changed), found.start)
+
+
+def test_a_bouncing_ball_has_the_derivatives_of_its_closed_form():
+    """z⁺ = h + e s τ − g τ²/2 at τ = T − T₁ after the first bounce, with s = g T₁ and T₁ = √(2 (z₀ − h) / g)."""
+    scene = gauss.Scene("ball", gravity=(0, 0, -10.0))
+    scene.prismatic("z", "ground", scene.body("ball", 2.0), axis=(0, 0, 1))
+    scene.stop("z", lowest=-0.2, name="floor", restitution=0.5)
+    names = ["restitution:floor", "lowest:floor"]
+    T, first, fall = 0.3, 0.2, 2.0
+    found = gauss.sensitivities(scene, T, step=0.01, integrator="dop853", parameters=names).parameters
+    after = T - first
+    by_first = -0.5 * fall + 0.5 * 10.0 * after + 10.0 * after  # ∂z/∂T₁
+    assert found[names[0]][-1][:, 0] == pytest.approx([fall * after, fall], rel=ACCURACY)
+    assert found[names[1]][-1][0, 0] == pytest.approx(1.0 - by_first / fall, rel=ACCURACY)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "error", "words"),
+    [
+        ("bouncing ball", "restitution:flour", StateError, "'floor'"),
+        ("bouncing ball", "highest:floor", ArgumentError, "no stop with a place 'highest'"),
+        ("pendulum that stays at a stop", "restitution:buffer", ArgumentError, "no derivative at 0"),
+        ("pendulum that stays at a stop", "lowest:buffer", SimulationError, "'buffer' bears"),
+        ("rope", "lowest:rope", ArgumentError, "'rope' is no stop"),
+    ],
+)
+def test_parameters_of_events_without_a_derivative_are_named(name, parameter, error, words):
+    scene, rates, span = SCENES[name]()
+    system, start = started(scene, rates)
+    with pytest.raises(error, match=words):
+        gauss.sensitivities(system, span, state=start, parameters=[parameter], **METHOD)
 
 
 @pytest.mark.slow

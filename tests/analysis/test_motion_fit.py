@@ -125,11 +125,86 @@ def test_bad_input_is_refused(change, error, words):
         gauss.fit_motion(gauss.load("pendulum"), **given)
 
 
-def test_events_are_refused_by_name():
-    scene = gauss.load("pendulum")
-    scene.stop("A", highest=1.0, name="buffer")
-    with pytest.raises(SimulationError, match="buffer"):
-        gauss.fit_motion(scene, [0.0, 0.1], {"A": [0.0, 0.0]}, ["gravity.y"], step=0.01)
+def bouncing():
+    scene = gauss.Scene("ball", gravity=(0, 0, -9.81))
+    scene.prismatic("z", "ground", scene.body("ball", 1.3), axis=(0, 0, 1))
+    scene.stop("z", lowest=-0.3, name="floor", restitution=0.6)
+    scene.start("z", rate=-0.1)
+    return scene
+
+
+def stopped_four_bar():
+    scene = gauss.load("four_bar")
+    scene.starts.clear()
+    scene.start("A", rate=2.5)
+    scene.stop("A", highest=0.1, name="buffer", restitution=0.6)
+    return scene
+
+
+def sliding():
+    scene = gauss.Scene("slider", gravity=(0, 0, 0))
+    scene.prismatic("x", "ground", scene.body("mass", 1.0))
+    scene.joint_spring("spring", "x", stiffness=100.0, rest=-0.3)
+    scene.joint_friction("x", 9.0)
+    scene.start("x", rate=0.5)
+    return scene
+
+
+# scene, duration, measured, first values, true values; each passes through an event
+WITH_EVENTS = {
+    "bouncing ball": (
+        bouncing,
+        0.6,
+        ("z",),
+        {"floor.restitution": 0.5, "floor.lowest": -0.31, "gravity.z": -9.6, "z.rate": 0.0},
+        {"floor.restitution": 0.6, "floor.lowest": -0.3, "gravity.z": -9.81, "z.rate": -0.1},
+    ),
+    "four-bar": (
+        stopped_four_bar,
+        0.2,
+        ("A",),
+        {"buffer.restitution": 0.5, "A.rate": 2.4},
+        {"buffer.restitution": 0.6, "A.rate": 2.5},
+    ),
+    "dry friction": (
+        sliding,
+        0.5,
+        ("x",),
+        {"friction of x.limit": 8.5, "spring.stiffness": 90.0},
+        {"friction of x.limit": 9.0, "spring.stiffness": 100.0},
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WITH_EVENTS)
+def test_motions_with_events_give_the_true_parameters(name):
+    make, duration, columns, first, true = WITH_EVENTS[name]
+    t, measured = motion(make(), duration, columns, round(duration / 0.02) + 1)
+    found = gauss.fit_motion(make(), t, measured, first, step=0.02, integrator="dop853", noise=[NOISE])
+    for parameter, value in true.items():
+        assert found.values[parameter] == pytest.approx(value, rel=EXACT, abs=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("times", "parameters", "words"),
+    [
+        ([0.0, 0.1], ["z.at[0]"], "no derivatives by 'z.at"),
+        ([0.0, 0.015], ["floor.restitution"], "whole multiples of step"),
+    ],
+)
+def test_what_cannot_be_fitted_through_events_is_named(times, parameters, words):
+    with pytest.raises(ArgumentError, match=words):
+        gauss.fit_motion(bouncing(), times, {"z": [0.0, 0.0]}, parameters, step=0.01)
+
+
+def test_events_without_derivatives_are_refused_by_name():
+    scene = gauss.Scene("rolling ball")
+    body = scene.body("body", 1.0, (0.1, 0.1, 0.1), position=(0, 0, 0.5))
+    scene.free("flight", "ground", body)
+    scene.contact("rough", scene.sphere("ball", body, 0.1), scene.half_space("floor", "ground"), friction=0.3)
+    with pytest.raises(SimulationError, match="rough"):
+        gauss.fit_motion(scene, [0.0, 0.1], {"flight.x": [0.0, 0.0]}, ["body.mass"], step=0.01)
 
 
 def test_the_figure_shows_each_column():

@@ -119,6 +119,20 @@ def test_gradients_by_inputs_are_those_of_held_tables():
         close(found.inputs[k, 0], derivative(changed), np.abs(found.inputs).max())
 
 
+def test_gradients_at_a_limit_of_an_input_are_one_sided():
+    """Those of a scene without limits up to the limit itself, and zero beyond."""
+    found = {}
+    for limits in ((-50.0, 3.0), (3.0, 50.0), None, (-50.0, 2.0)):
+        scene = gauss.load("cart_pole")
+        scene.input("push", "rail", limits=limits)
+        table = np.full((round(SPAN / STEP), 1), 3.0)
+        loss = lambda q, v: q[1] ** 2 + v[0] * v[1]  # noqa: E731
+        found[limits] = gauss.motion_gradient(scene, SPAN, loss, step=STEP, inputs=table).inputs
+    for limits in ((-50.0, 3.0), (3.0, 50.0)):
+        np.testing.assert_allclose(found[limits], found[None], rtol=1e-12)
+    assert found[None].all() and not found[-50.0, 2.0].any()
+
+
 @pytest.mark.parametrize("integrator", TABLEAUS)
 def test_methods_converge_to_the_exact_transition_matrix(integrator):
     scene = gauss.Scene("oscillator", gravity=(0, 0, 0))

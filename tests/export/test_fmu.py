@@ -7,8 +7,9 @@ import pytest
 
 import gauss
 from gauss import export
-from gauss.errors import ArgumentError, SimulationError
+from gauss.errors import ArgumentError, SceneError, SimulationError
 from gauss.scene import actuators
+from gauss.scene.named_numbers import scene_of, value_of
 
 COMPILER = shutil.which("cc")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
@@ -77,6 +78,67 @@ def test_outputs_of_a_unit_are_those_of_the_scene(tmp_path):
     wanted = gauss.simulate(system, SPAN, progress=False)
     expected = np.concatenate([wanted.output("tip")[-1], wanted.output("felt")[-1]])
     np.testing.assert_allclose(list(found[-1])[1:], expected, rtol=0.0, atol=ACCURACY * np.abs(expected).max())
+
+
+def sprung():
+    scene = gauss.load("four_bar")
+    scene.joint_spring("spring", "A", stiffness=5.0, damping=0.3, rest=0.2)
+    return scene
+
+
+TUNED = {
+    "double pendulum": (
+        lambda: gauss.load("double_pendulum"),
+        {"lower.mass": 2.5, "lower.com.x": 0.4, "B.at[0]": 0.8, "gravity.y": -5.0},
+    ),
+    "four-bar": (sprung, {"coupler.mass": 3.0, "spring.stiffness": 9.0, "spring.damping": 0.1}),
+    "cart-pole": (cart, {"pole.mass": 0.4, "cart.mass": 2.0}),
+}
+
+
+@pytest.mark.peer
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TUNED)
+def test_parameters_of_a_unit_are_numbers_of_the_scene(name, tmp_path):
+    fmpy = pytest.importorskip("fmpy")
+    from fmpy.validation import validate_fmu
+
+    make, values = TUNED[name]
+    scene = make()
+    path = str(export.to_fmu(scene, tmp_path, "tuned", parameters=list(values)))
+    assert validate_fmu(path) == []
+    described = {one.name: one for one in fmpy.read_model_description(path).modelVariables}
+    for parameter in values:
+        assert (described[parameter].causality, described[parameter].variability) == ("parameter", "tunable")
+        assert float(described[parameter].start) == value_of(scene, parameter)
+    states = [one.name for one in described.values() if one.initial == "exact" and one.causality in ("output", "local")]
+    for given in ({}, values):
+        found = fmpy.simulate_fmu(
+            path, stop_time=SPAN, output_interval=0.01, relative_tolerance=1e-8, output=states, start_values=given
+        )
+        wanted = gauss.simulate(scene_of(scene, given), SPAN, progress=False)
+        expected = np.concatenate([wanted.q[-1], wanted.v[-1]])
+        np.testing.assert_allclose(list(found[-1])[1:], expected, rtol=0.0, atol=ACCURACY * np.abs(expected).max())
+
+
+def welded():
+    """A pendulum of two bodies, whose common centre of mass is no polynomial of a mass."""
+    scene = gauss.load("pendulum")
+    scene.fixed("weld", "rod", scene.body("bob", 1.0, position=(1.0, 0.0, 0.0)))
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("make", "parameter", "error", "words"),
+    [
+        (lambda: gauss.load("pendulum"), "rod.maß", SceneError, "rod"),
+        (lambda: gauss.load("pendulum"), "A.position", ArgumentError, "start values"),
+        (welded, "bob.mass", ArgumentError, "no polynomials of bob.mass"),
+    ],
+)
+def test_what_is_no_parameter_is_named(make, parameter, error, words, tmp_path):
+    with pytest.raises(error, match=words):
+        export.to_fmu(make(), tmp_path, parameters=[parameter])
 
 
 @pytest.mark.slow

@@ -13,9 +13,10 @@ from typer.testing import CliRunner
 import gauss
 from gauss import cli
 from gauss.errors import ArgumentError, FileError, SceneError, SimulationError
+from gauss.scene.named_numbers import changed
 from gauss.simulation.sweeps import ranges
 from gauss.simulation.sweeps import storage as store
-from gauss.simulation.sweeps.parameters import Members, changed
+from gauss.simulation.sweeps.parameters import Members
 from tests.support import mechanisms
 
 ROUNDING = 1e-11  # of some steps, of two pieces of machine code

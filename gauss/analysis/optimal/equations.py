@@ -121,6 +121,33 @@ class OptimalEquations:
 
         return self._in_units(values, "cost")
 
+    def at_end(self, function: Callable, what: str, units=1.0, size: int | None = None) -> Casadi:
+        """(t, x, u) → values of a function of (q, v), in shares of the units.
+
+        Parameters
+        ----------
+        function : callable
+            (q, v) → numbers, or several vectors of them.
+        what : str
+            Name of the argument, for messages.
+        units : float or ndarray
+            Units of the values.
+        size : int, optional
+            Number of the values; any when not given.
+        """
+
+        def values(t, q, v, u):
+            try:
+                given = function(q, v)
+                found = np.hstack(list(given) if isinstance(given, tuple | list) else [given])
+            except (TypeError, ValueError) as error:
+                raise ArgumentError(f"optimal motion: {what} cannot be traced: {error}") from None
+            if size is not None and found.size != size:
+                raise ArgumentError(f"optimal motion: {what}: expected {size} numbers of (q, v), got {found.size}.")
+            return found
+
+        return self._in_units(values, what, units)
+
     def _in_units(self, values: Callable, name: str, units=1.0) -> Casadi:
         """Function of CasADi of (t, x, u) in shares, x and u, and the results, of their units."""
         with extra("export"):

@@ -23,7 +23,7 @@ def refuse(problem: MotionProblem, mesh: np.ndarray, rows: list[int], guess: Mot
         Always.
     """
     nearest = Transcription(problem, mesh, rows, relaxed=True).solve(guess)
-    units = problem.equations.units
+    units = problem.units
     missed = []
     for (kind, one), share in zip(problem.conditions, nearest.misses, strict=True):
         if abs(share) > MISSED:

@@ -39,6 +39,8 @@ def optimal_motion(
     start: State | Mapping | None = None,
     end: State | Mapping | None = None,
     periodic: bool | Mapping = False,
+    reset: Callable | None = None,
+    meets: Callable | None = None,
     cost: str | Callable = "effort",
     limits: Mapping | None = None,
     guess=None,
@@ -66,6 +68,11 @@ def optimal_motion(
         The same at the end; free when not given.
     periodic : bool or mapping of str to float
         Whether the motion ends as it starts; a mapping says by how much coordinates increase, as of a crank 2 π.
+    reset : callable, optional
+        Function (q, v) → (q⁺, v⁺) of the state at the end, of arithmetic and :mod:`gauss.math`: an impact, or legs that
+        change their parts. A periodic motion starts as it ends after it.
+    meets : callable, optional
+        Function (q, v) → number, or several, that is zero at the end: the height of a foot above the ground.
     cost : str or callable
         "effort", ∫ Σ u² dt; "time"; or a function (t, q, v, u) → cost per time, of arithmetic and :mod:`gauss.math`.
     limits : mapping of str to float or tuple of float, optional
@@ -119,17 +126,31 @@ def optimal_motion(
     first = end_of(system, near if start is None else start, "start", near)
     shift = increments(system, periodic, first.guess)
     last = _last(system, end, first, shift)
+    after, meeting, meets = _impact(equations, reset, meets, bool(shift))
     bounds = motion_limits(system, equations, {} if limits is None else limits)
     refuse_beyond({"start": first, "end": last}, *bounds[:2])
-    problem = MotionProblem(
-        equations, law, first.guess.t, span, first.conditions, last.conditions, shift, bounds, order // 2, iterations
-    )
+    ends = first.conditions, last.conditions, shift
+    impact = after, meets, meeting
+    problem = MotionProblem(equations, law, first.guess.t, span, *ends, bounds, order // 2, iterations, *impact)
     mesh = np.linspace(0.0, 1.0, intervals + 1)
     turning = {entry for place in system.quaternions.values() for entry in range(place.start, place.stop)}
     fixed = [one.place for one in (*last.conditions, *shift) if one.is_fixed]
     led = [place for place in fixed if place < system.n_q and place not in turning]
     begin = first_guess(equations, guess, (first.guess, last.guess), led, mesh, _middle(span, system), problem.stages)
     return _on_refined_meshes(system, problem, begin, tolerance, refinements)
+
+
+def _impact(equations: OptimalEquations, reset, meets, is_periodic: bool):
+    """Reset at the end as a function of CasADi, names of what is met there, and its function."""
+    if reset is not None and not is_periodic:
+        raise ArgumentError("optimal motion: reset: expected periodic= as well: the state after it is that of the start.")
+    for what, given in (("reset", reset), ("meets", meets)):
+        if given is not None and not callable(given):
+            raise ArgumentError(f"optimal motion: {what}: expected a function of (q, v), got {given!r:.60}.")
+    after = None if reset is None else equations.at_end(reset, "reset", equations.units, equations.n_x)
+    met = None if meets is None else equations.at_end(meets, "meets")
+    count = 0 if met is None else met.size1_out(0)
+    return after, tuple(EndCondition(f"meets[{k}]", equations.n_x + k, 0.0, 0.0) for k in range(count)), met
 
 
 def _on_refined_meshes(system: System, problem: MotionProblem, guess, tolerance: float, refinements: int) -> OptimalMotion:

@@ -48,6 +48,12 @@ class MotionProblem:
         Collocation points s of an interval.
     iterations : int
         Most iterations.
+    reset : casadi.Function or None
+        (t, x, u) → state after an impact at the end, to which the increments refer; None: there is none.
+    meets : casadi.Function or None
+        (t, x, u) → what is zero at the end, one number for each condition of ``meeting``.
+    meeting : tuple of EndCondition
+        Their names.
     """
 
     equations: OptimalEquations
@@ -60,11 +66,24 @@ class MotionProblem:
     bounds: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
     stages: int
     iterations: int
+    reset: Casadi = None
+    meets: Casadi = None
+    meeting: tuple[EndCondition, ...] = ()
+
+    @property
+    def units(self) -> np.ndarray:
+        """Units of the places of all conditions: those of (q, v), and 1 for what is met at the end."""
+        return np.concatenate([self.equations.units, np.ones(len(self.meeting))])
 
     @property
     def conditions(self) -> list[tuple[str, EndCondition]]:
         """All conditions on the ends, in the order of their rows."""
-        kinds = {"start": self.start, "end": self.end, "increase over the period": self.increments}
+        kinds = {
+            "start": self.start,
+            "end": self.end,
+            "increase over the period": self.increments,
+            "at the end": self.meeting,
+        }
         return [(kind, one) for kind, given in kinds.items() for one in given]
 
 
@@ -272,13 +291,16 @@ class Transcription:
         """Values of the conditions on the ends, in shares of the units."""
         first, last, given = self.symbols["x"][:, 0], self.symbols["x"][:, -1], self.problem
         rows = [first[one.place] for one in given.start] + [last[one.place] for one in given.end]
-        rows += [last[one.place] - first[one.place] for one in given.increments]
+        still = self.casadi.DM.zeros(given.equations.n_u)
+        after = last if given.reset is None else given.reset(self.times[1][0, -1], last, still)
+        rows += [after[one.place] - first[one.place] for one in given.increments]
+        rows += [] if given.meets is None else [given.meets(self.times[1][0, -1], last, still)]
         found = self.casadi.vertcat(*rows) if rows else self.casadi.MX(0, 1)
         return found + self.symbols["over"] - self.symbols["under"] if self.relaxed else found
 
     def _row_bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the rows: zero, and those of the conditions."""
-        units = self.problem.equations.units
+        units = self.problem.units
         conditions = [one for _, one in self.problem.conditions]
         zeros = np.zeros(self.constraints.size1() - len(conditions))
         low = np.array([one.low / units[one.place] for one in conditions])

@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from gauss.analysis.sensitivity.event_parameters import absent_from, is_of_event, refuse_bearing
 from gauss.analysis.sensitivity.law_jumps import warn_of_jumps
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
 from gauss.analysis.sensitivity.saltation import Transition
@@ -137,6 +138,8 @@ class Motion:
     def _through_events(self):
         """Steps that end at the nodes and at the events of the motion of :func:`gauss.simulate`."""
         self._refuse_events()
+        for name in self.parameters:
+            is_of_event(self.system.scene, name)  # raises
         record, self.x = recorded_motion(self.system, self.h * self.steps, self.start, self.t, self.inputs)
         self.start = record[0].start
         self.pieces = [[] for _ in range(self.steps)]
@@ -153,7 +156,11 @@ class Motion:
     def _step_of(self, one: RecordedPhase, made: dict[int, MotionStep]) -> MotionStep:
         """Smooth dynamics of a phase."""
         system = one.system(self.system)
-        return made.setdefault(id(system), MotionStep(system, self.integrator, self.parameters))
+        if id(system) not in made:
+            refuse_bearing(self.system, one.phase.case[0], self.parameters)
+            absent = absent_from(system, self.system, self.parameters)
+            made[id(system)] = MotionStep(system, self.integrator, self.parameters, absent)
+        return made[id(system)]
 
     def _append_steps(self, step: MotionStep, one: RecordedPhase, times: np.ndarray):
         """Smooth steps between the times of a phase."""

@@ -4,10 +4,11 @@ An event at the time t of g(t, x) = 0, with x⁺ = I(t, x⁻) there, comes later
 
     dx⁺ = I_x dx⁻ + I_p dp + (I_x f⁻ + I_t − f⁺) dt
 
-at the same time, with ẋ = f⁻ before and f⁺ after (Aizerman and Gantmakher 1958; Leine and Nijmeijer, Dynamics and
-Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7). Where rates and accelerations are continuous nothing changes: a
-gap that opens as its force ends, a sticking element that begins to slip as its force reaches its limit. Where no derivative
-exists, as two gaps close at once or one is grazed, the event is refused by name.
+at the same time, with ẋ = f⁻ before and f⁺ after, and −g_p dp / (g_x f⁻ + g_t) of dt for parameters of the gap (Aizerman and
+Gantmakher 1958; Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7). Where rates
+and accelerations are continuous nothing changes: a gap that opens as its force ends, a sticking element that begins to slip
+as its force reaches its limit. Where no derivative exists, as two gaps close at once or one is grazed, the event is refused
+by name.
 """
 
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.analysis.sensitivity.event_derivatives import EventDerivatives
+from gauss.analysis.sensitivity.event_parameters import gap_by_parameters, rates_by_restitution
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, smooth_system
 from gauss.dynamics.constraint_scales import gap_scales
 from gauss.dynamics.motion_step import MotionStep
@@ -101,13 +103,17 @@ class Transition(NamedTuple):
         self._refuse_places(gap)
         closed = smooth_system(whole, before.phase, tuple(sorted({gap, *before.bearing})))
         derivatives, n_q = EventDerivatives(closed, before.end), whole.n_q
-        by_x, by_t = derivatives.rates_after(self._restitution(gap, by_state))
+        restitution = self._restitution(gap, by_state)
+        by_x, by_t = derivatives.rates_after(restitution)
         I_x, I_t = np.eye(n), np.zeros(n)
         I_x[n_q:], I_t[n_q:] = by_x, by_t
-        found[:, :n] = I_x + np.outer(I_x @ first + I_t - last, self._later(by_state, by_time, first))
+        jump = I_x @ first + I_t - last
+        found[:, :n] = I_x + np.outer(jump, self._later(by_state, by_time, first))
         if one.n_p:
-            change = self.after.start.v - before.end.v
-            found[n_q:, n + len(one.inputs) :] = derivatives.rates_after_by(one.sizes, change)
+            change, own = self.after.start.v - before.end.v, found[:, n + len(one.inputs) :]
+            own[n_q:] = derivatives.rates_after_by(one.sizes, change)
+            own[n_q:] += rates_by_restitution(whole, gap, one.sizes, change, restitution)
+            own += np.outer(jump, self._later(gap_by_parameters(whole, gap, one.sizes), by_time, first, by_state))
 
     def _restitution(self, gap: int, by_state: np.ndarray) -> float:
         """Coefficient that held in the impact: 0 where a slow rebound was suppressed."""
@@ -140,9 +146,9 @@ class Transition(NamedTuple):
         along = by_state @ first + by_time
         return along @ by_state, along @ by_time
 
-    def _later(self, by_state: np.ndarray, by_time, first: np.ndarray) -> np.ndarray:
-        """Derivative (n_x,) of the time of the event by the state."""
-        return -by_state / (by_state @ first + by_time)
+    def _later(self, slopes: np.ndarray, by_time, first: np.ndarray, by_state=None) -> np.ndarray:
+        """Derivatives of the time of the event by what g has the slopes of: the state when ``by_state`` is not given."""
+        return -slopes / ((slopes if by_state is None else by_state) @ first + by_time)
 
     def _refuse_places(self, gap: int):
         """Raise a SimulationError for derivatives by places on which the gap function or loops depend."""

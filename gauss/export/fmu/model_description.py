@@ -1,6 +1,6 @@
 """``modelDescription.xml`` of a unit (FMI 3.0, section 2.4), and ``buildDescription.xml`` of its sources."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
@@ -39,10 +39,11 @@ def state_names(system: System) -> dict[str, str]:
     return named | {name if name in own else f"{name} rate": "1" if name in own else unit for name, unit in rates.items()}
 
 
-def variables(system: System, start: State) -> dict[str, list[Variable]]:
-    """Variables of a unit by kind, in the order of their value references."""
+def variables(system: System, start: State, parameters: Mapping[str, float]) -> dict[str, list[Variable]]:
+    """Variables of a unit by kind, in the order of their value references; parameters by name, with their values."""
     scene, states = system.scene, state_names(system)
-    kinds: dict[str, list[Variable]] = {kind: [] for kind in ("time", "states", "derivatives", "inputs", "outputs")}
+    order = "time", "states", "derivatives", "inputs", "parameters", "outputs"
+    kinds: dict[str, list[Variable]] = {kind: [] for kind in order}
     kinds["time"].append(Variable("time", 0, {"causality": "independent"}))
     reference, values = 1, [*start.q, *start.v]
     shown = "local" if scene.outputs else "output"
@@ -57,6 +58,10 @@ def variables(system: System, start: State) -> dict[str, list[Variable]]:
         reference += 1
     for name in scene.inputs:
         kinds["inputs"].append(Variable(name, reference, {"causality": "input", "start": "0.0"}))
+        reference += 1
+    for name, value in parameters.items():
+        given = {"causality": "parameter", "variability": "tunable", "initial": "exact", "start": repr(float(value))}
+        kinds["parameters"].append(Variable(name, reference, given))
         reference += 1
     for output in scene.outputs.values():
         size = output.size(scene)

@@ -1,6 +1,7 @@
 /* Functional mock-up unit (FMI 3.0, model exchange and co-simulation) of the equations of motion in model.h.
 
-   Variables by their value references: 0 time, 1 … N states, N + 1 … 2N their derivatives, then inputs, then outputs.
+   Variables by their value references: 0 time, 1 … N states, N + 1 … 2N their derivatives, then inputs and parameters, then
+   outputs.
    Co-simulation integrates by Dormand and Prince's pair 5(4) with step control, and projects each step onto the constraints;
    with model exchange, states are projected in event mode, for which the unit asks where they have left the constraints. */
 #include "model.h"
@@ -32,6 +33,7 @@ static void reset(Unit *unit)
     memset(unit, 0, sizeof *unit);
     unit->tolerance = DEFAULT_TOLERANCE;
     memcpy(unit->x, unit_start, sizeof unit_start);
+    memcpy(unit->u, unit_given, sizeof unit_given);
 }
 
 static void evaluate(Unit *unit)
@@ -45,7 +47,7 @@ static void evaluate(Unit *unit)
 static double project(Unit *unit)
 {
     double x[N], moved = 0.0;
-    unit_project(unit->t, unit->x, x);
+    unit_project(unit->t, unit->x, unit->u, x);
     for (int k = 0; k < N; ++k)
         moved = fmax(moved, fabs(x[k] - unit->x[k]));
     memcpy(unit->x, x, sizeof x);

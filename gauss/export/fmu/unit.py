@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from gauss.export.c_files import CCode, c_code
 from gauss.export.exported_function import ExportedFunction, identifier
 from gauss.export.fmu.model_description import build_description, model_description, variables
 from gauss.export.fmu.unit_functions import unit_functions
+from gauss.export.fmu.unit_parameters import UnitParameters
 from gauss.scene import Scene
 from gauss.system import State, System
 
@@ -26,7 +27,7 @@ SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
 FLAGS = ("-std=c99", "-O3", "-fPIC", "-shared", "-fvisibility=hidden")
 
 
-def to_fmu(system: System | Scene, folder=".", name: str | None = None) -> Path:
+def to_fmu(system: System | Scene, folder=".", name: str | None = None, parameters: Sequence[str] = ()) -> Path:
     """Write a functional mock-up unit of FMI 3, for model exchange and for co-simulation.
 
     Parameters
@@ -38,6 +39,9 @@ def to_fmu(system: System | Scene, folder=".", name: str | None = None) -> Path:
         Folder of the file.
     name : str, optional
         Name of the file; that of the scene when not given.
+    parameters : sequence of str
+        Numbers of the scene that are tunable parameters of the unit, as "rod.mass", "spring.stiffness", "B.at[0]" or
+        "gravity.y", a few of them: the numbers of the equations are found as polynomials of all.
 
     Returns
     -------
@@ -47,9 +51,11 @@ def to_fmu(system: System | Scene, folder=".", name: str | None = None) -> Path:
     Raises
     ------
     ArgumentError
-        If there are no units for this machine.
+        If there are no units for this machine, or the numbers of the equations are no polynomials of a parameter.
     MissingPackageError
         If there is no C compiler.
+    SceneError
+        If a parameter is no number of the scene.
     SimulationError
         If the scene has elements that no smooth function describes, by their names, or the compiler fails.
 
@@ -62,12 +68,13 @@ def to_fmu(system: System | Scene, folder=".", name: str | None = None) -> Path:
     """
     system = compile_scene(system) if isinstance(system, Scene) else system
     own = identifier(system.scene.name if name is None else name)
-    functions, start = unit_functions(system), system.initial_state()
+    tuned = UnitParameters(system, parameters)
+    functions, start = unit_functions(tuned), system.initial_state()
     code = c_code("model", system.scene, functions)
-    kinds = variables(system, start)
+    kinds = variables(system, start, tuned.values)
     sources = {"unit.c": Path(__file__).with_name("unit.c").read_text(encoding="utf-8"), "model.c": code.source}
     token = sha256("".join([*sources.values(), *map(str, sum(kinds.values(), []))]).encode()).hexdigest()
-    sources["model.h"] = _header(code, functions, start, token)
+    sources["model.h"] = _header(code, functions, start, tuned, token)
     texts = {f"sources/{key}": text for key, text in sources.items()}
     texts["sources/buildDescription.xml"] = build_description(own, ["unit.c", "model.c"])
     texts["modelDescription.xml"] = model_description(system, own, token, kinds)
@@ -104,20 +111,22 @@ def _compiled(sources: dict[str, str], folder: Path, name: str) -> Path:
     return folder / name
 
 
-def _header(code: CCode, functions: list[ExportedFunction], start: State, token: str) -> str:
+def _header(code: CCode, functions: list[ExportedFunction], start: State, tuned: UnitParameters, token: str) -> str:
     """Header of the model, with what the unit calls."""
-    return code.header + "\n" + "\n".join(_interface(functions, start, token)) + "\n"
+    return code.header + "\n" + "\n".join(_interface(functions, start, tuned, token)) + "\n"
 
 
-def _interface(functions: list[ExportedFunction], start: State, token: str) -> Iterator[str]:
+def _interface(functions: list[ExportedFunction], start: State, tuned: UnitParameters, token: str) -> Iterator[str]:
     rates, _ = functions
     n_q, n_x, n_u, n_y = start.q.size, start.q.size + start.v.size, rates.inputs["u"][0], rates.outputs["output"][0]
     yield "#ifndef UNIT_INTERFACE\n#define UNIT_INTERFACE"
     yield f"#define UNIT_STATES {n_x}\n#define UNIT_INPUTS {n_u}\n#define UNIT_OUTPUTS {n_y}"
     yield f'static const char unit_token[] = "{token}";'
     yield f"static const double unit_start[] = {{{', '.join(repr(float(x)) for x in [*start.q, *start.v])}}};"
+    given = [*[0.0] * (n_u - len(tuned.values)), *tuned.values.values()]
+    yield f"static const double unit_given[] = {{{', '.join(map(repr, given)) or '0.0'}}};"
     yield "static inline void unit_rates(double t, const double *x, const double *u, double *rate, double *y)"
     yield f"{{\n    model_rates(x, x + {n_q}, u, t, rate, y);\n}}"
-    yield "static inline void unit_project(double t, const double *x, double *result)"
-    yield f"{{\n    model_project(x, x + {n_q}, t, result);\n}}"
+    yield "static inline void unit_project(double t, const double *x, const double *u, double *result)"
+    yield f"{{\n    model_project(x, x + {n_q}, u, t, result);\n}}"
     yield "#endif"

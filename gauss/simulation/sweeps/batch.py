@@ -11,10 +11,11 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
 from gauss.errors import GaussError, SimulationError
 from gauss.scene import Scene
+from gauss.scene.named_numbers import is_start, scene_of
 from gauss.simulation import Stats, Trajectory, simulate
 from gauss.simulation.batch.ensemble import Ensemble
 from gauss.simulation.energy_balance import imbalances
-from gauss.simulation.sweeps.parameters import Members, is_start, scene_of
+from gauss.simulation.sweeps.parameters import Members
 from gauss.system import State, System
 
 MISSING, DONE, FAILED = 0, 1, 2  # status of a member

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from gauss.errors import FileError, SimulationError, extra
+from gauss.scene.named_numbers import unit_of
 from gauss.simulation.sweeps.batch import DONE, FAILED, LONGEST_REASON, MISSING, MemberResults, SweepTask
-from gauss.simulation.sweeps.parameters import Members, unit_of
+from gauss.simulation.sweeps.parameters import Members
 from gauss.system import System, coordinate_units, rate_units
 from gauss.system.coordinate_names import axis_labels
 

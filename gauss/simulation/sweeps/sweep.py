@@ -15,6 +15,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
 from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
 from gauss.scene import Scene
+from gauss.scene.named_numbers import scene_of
 from gauss.simulation import INTEGRATORS, Trajectory
 from gauss.simulation.arguments import check_arguments
 from gauss.simulation.batch.fixed_step_batch import cores
@@ -22,7 +23,7 @@ from gauss.simulation.energy_balance import warn_of_many
 from gauss.simulation.progress import Progress
 from gauss.simulation.provenance import made_by, plain, scene_text
 from gauss.simulation.sweeps.batch import FAILED, MISSING, SweepTask, run
-from gauss.simulation.sweeps.parameters import Members, members, scene_of
+from gauss.simulation.sweeps.parameters import Members, members
 from gauss.simulation.sweeps.storage import InMemory, OnDisk, block, empty, library, pieces
 from gauss.simulation.sweeps.workers import results_of
 from gauss.simulation.tolerances import shares_of_scale
