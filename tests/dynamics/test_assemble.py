@@ -188,6 +188,8 @@ def test_sparse_matrices_of_blocks_add_what_lies_in_one_place():
         dense = np.zeros((6, 7))
         for block, r, c in entries:
             dense[r : r + block.shape[0], c : c + block.shape[1]] += block
-        found = from_blocks(entries, dense.shape)
-        assert np.array_equal(found.toarray(), dense) and found.nnz == 13 and found.has_canonical_format
-    assert from_blocks([], (3, 4)).shape == (3, 4)
+        columns = from_blocks(entries, dense.shape)
+        found = columns.csc()
+        assert np.array_equal(columns.toarray(), dense) and np.array_equal(found.toarray(), dense)
+        assert found.nnz == 13 and found.has_canonical_format
+    assert from_blocks([], (3, 4)).csc().shape == (3, 4)
