@@ -1,10 +1,15 @@
-"""Arguments of functions and of classes: calls that do not fit are refused, unknown keywords with the nearest one."""
+"""Arguments of functions and of classes: calls that do not fit are refused, unknown keywords with the nearest one.
 
-from collections.abc import Callable
+Numbers, tables and names of the user are read by one function for each, which refuses everything else by what was expected.
+"""
+
+from collections.abc import Callable, Mapping
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from types import FunctionType
 from typing import Any, TypeVar
+
+import numpy as np
 
 from gauss.errors import ArgumentError, did_you_mean
 
@@ -59,3 +64,72 @@ def _misfit(expected: Signature, arguments: tuple, named: dict) -> str:
     except TypeError as error:
         return str(error)
     return ""
+
+
+def real_array(value, what: str, expected: str = "numbers") -> np.ndarray:
+    """Array of real numbers.
+
+    Parameters
+    ----------
+    value : array_like
+        What the user gave.
+    what : str
+        Function and argument, for the message.
+    expected : str
+        What is expected, in words.
+
+    Raises
+    ------
+    ArgumentError
+        If it is none: text, objects, complex numbers, rows of several lengths.
+    """
+    try:
+        found = np.asarray(value)
+    except ValueError:  # rows of several lengths
+        found = np.asarray(None)
+    if found.dtype.kind not in "biuf" and found.size:
+        raise ArgumentError(f"{what}: expected {expected}, got {value!r:.80}.")
+    return found.astype(float)
+
+
+def table(value, what: str, expected: str) -> dict:
+    """Mapping of names; empty for None.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no mapping of texts.
+    """
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise ArgumentError(f"{what}: expected {expected}, got {value!r:.80}.")
+    return dict(value)
+
+
+def name_list(value, what: str, expected: str = "names") -> tuple[str, ...]:
+    """Names, of one text or of several; none for None.
+
+    Raises
+    ------
+    ArgumentError
+        If one is no text.
+    """
+    if isinstance(value, str) or value is None:
+        return () if value is None else (value,)
+    if not np.iterable(value) or isinstance(value, bytes) or not all(isinstance(name, str) for name in value):
+        raise ArgumentError(f"{what}: expected {expected}, got {value!r:.80}.")
+    return tuple(value)
+
+
+def generator(seed, what: str) -> np.random.Generator:
+    """Generator of random numbers of a seed.
+
+    Raises
+    ------
+    ArgumentError
+        If the seed is no whole number ≥ 0, nor None for one that differs from call to call.
+    """
+    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
+        raise ArgumentError(f"{what}: seed: expected a whole number of at least 0, or None, got {seed!r:.80}.")
+    return np.random.default_rng(seed)

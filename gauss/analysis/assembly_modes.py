@@ -5,6 +5,7 @@ from typing import cast
 
 import numpy as np
 
+from gauss.arguments import generator
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.assembly_search import NEWTON_STEPS, RESIDUAL_TOLERANCE
@@ -56,7 +57,7 @@ def assembly_modes(system: System, keep, state: State | None = None, seed: int =
     held = fixed_columns(system, keep)
     free = np.ones(system.n_v)
     free[held] = 0.0
-    rng, idle = np.random.default_rng(seed), 0
+    rng, idle = generator(seed, "assembly_modes"), 0
     found: list[State] = []
     while idle < IDLE_STARTS:
         away = np.pi * free * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)

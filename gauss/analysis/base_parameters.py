@@ -166,7 +166,7 @@ def base_of(model: RegressorModel, matrix: np.ndarray) -> BaseParameters:
     return BaseParameters(model.names, tuple(base.tolist()), K, model.units)
 
 
-def random_matrix(model: RegressorModel, seed: int) -> np.ndarray:
+def random_matrix(model: RegressorModel, seed: int | np.random.Generator) -> np.ndarray:
     """Regressors (n, k, p) in random states; with loops, along a random walk that is projected onto the constraints."""
     system, rng, found = model.system, np.random.default_rng(seed), []
     count = max(LEAST_SAMPLES, -(-ROWS_PER_COLUMN * len(model.names) // len(model.rows)))

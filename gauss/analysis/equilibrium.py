@@ -15,7 +15,7 @@ from gauss.analysis.derivatives import derivatives
 from gauss.analysis.frozen_time import state_at
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.tangents import Tangents
-from gauss.arguments import named_arguments
+from gauss.arguments import generator, named_arguments
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.consistent_states import violations
@@ -141,7 +141,7 @@ def equilibria(
     """
     if not isinstance(starts, (int, np.integer)) or starts < 0:
         raise ArgumentError(f"equilibria: starts: expected a whole number, 0 or more, got {starts!r}.")
-    system, rng = _compiled(system, "equilibria"), np.random.default_rng(seed)
+    system, rng = _compiled(system, "equilibria"), generator(seed, "equilibria")
     held, load, found = fixed_columns(system, keep), _load(system, loads), list[StaticEquilibrium]()
     base, why = state_at(system, None, t, "equilibria"), None
     for k in range(starts + 1):

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 from gauss.analysis.base_parameters import base_of, random_matrix
 from gauss.analysis.regressor import RegressorModel
-from gauss.arguments import named_arguments
+from gauss.arguments import generator, named_arguments, table
 from gauss.errors import ArgumentError, SimulationError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation.tolerances import check_tolerances
@@ -123,7 +123,7 @@ def excitation(
             raise ArgumentError(f"excitation: {name}: expected a number ≥ 1, got {value!r}.")
     model = RegressorModel(system, None, friction)
     problem = _SeriesProblem(model, period, harmonics, limits)
-    rng = np.random.default_rng(seed)
+    rng = generator(seed, "excitation")
     starts = rng.normal(size=(trials, 2 * harmonics * problem.n))
     found = [problem.value(start) for start in starts]
     first = starts[int(np.argmin(found))]
@@ -146,7 +146,9 @@ class _SeriesProblem:
         self.base = list(base_of(model, random_matrix(model, 0)).base)
         self.frequency = 2.0 * np.pi / period
         self.t = np.linspace(0.0, period, SAMPLES * harmonics, endpoint=False)
-        self.centre, self.largest = self._limits(dict(limits or {}))
+        self.centre, self.largest = self._limits(
+            table(limits, "excitation: limits", "((least, largest), speed, acceleration) by name")
+        )
 
     def _limits(self, given: dict) -> tuple[np.ndarray, np.ndarray]:
         """Centres (n,), and largest displacements, rates and accelerations (3, n)."""

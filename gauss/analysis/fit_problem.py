@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 
 from gauss.analysis.fitted_motion import MotionFit
 from gauss.analysis.sensitivity.parametrised_step import ParametrisedStep
+from gauss.arguments import name_list, real_array, table
 from gauss.dynamics import compile_scene
 from gauss.dynamics.parameters import numbers
 from gauss.dynamics.parametrised_system import parametrised
@@ -32,11 +33,13 @@ class FitProblem:
 
     def __init__(self, scene: Scene, times, measured, parameters, step: float, inputs, integrator: str):
         self.scene, self.t = scene, _times(times, step)
-        self.names = tuple(parameters)
+        self.names = name_list(parameters, "fit_motion: parameters")
         if not self.names or isinstance(parameters, str):
             raise ArgumentError(f"fit_motion: parameters: expected names, got {parameters!r}.")
         known = parameters if isinstance(parameters, Mapping) else {name: value_of(scene, name) for name in self.names}
-        self.first = np.array([float(known[name]) for name in self.names])
+        self.first = real_array([known[name] for name in self.names], "fit_motion: parameters", "a number for each")
+        if self.first.shape != (len(self.names),) or not np.isfinite(self.first).all():
+            raise ArgumentError(f"fit_motion: parameters: expected a finite number for each, got {parameters!r:.80}.")
         self.units = np.where(self.first == 0.0, 1.0, np.abs(self.first))
         self.system = compile_scene(scene_of(scene, dict(zip(self.names, self.first, strict=True))))
         self.columns, self.y = tuple(measured), self._measured(measured)
@@ -54,7 +57,7 @@ class FitProblem:
         if not isinstance(measured, Mapping) or not measured:
             raise ArgumentError("fit_motion: measured: expected names with values, as {'A': angles}.")
         for name, column in measured.items():
-            values = np.asarray(column, dtype=float)
+            values = real_array(column, f"fit_motion: measured {name!r}", f"{self.t.size} finite numbers")
             if values.shape != self.t.shape or not np.isfinite(values).all():
                 raise ArgumentError(f"fit_motion: measured {name!r}: expected {self.t.size} finite numbers.")
         return np.array([np.asarray(column, dtype=float) for column in measured.values()]).T
@@ -70,14 +73,14 @@ class FitProblem:
     def _inputs(self, inputs) -> np.ndarray:
         """Inputs (k − 1, n_u)."""
         shape = self.t.size - 1, len(self.system.scene.inputs)
-        found = np.zeros(shape) if inputs is None else np.array(inputs, dtype=float)
+        found = np.zeros(shape) if inputs is None else real_array(inputs, "fit_motion: inputs").copy()
         if found.shape != shape:
             raise ArgumentError(f"fit_motion: inputs: expected shape {shape}, got {found.shape}.")
         return found
 
     def limits(self, bounds) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest parameters."""
-        given = dict(bounds or {})
+        given = table(bounds, "fit_motion: bounds", "a least and a larger value by name")
         for name in given:
             if name not in self.names:
                 raise ArgumentError(f"fit_motion: bounds of {name!r}, which is not fitted. {did_you_mean(name, self.names)}")
@@ -85,7 +88,10 @@ class FitProblem:
             [name.rpartition(".")[2] in POSITIVE for name in self.names], 2.0 * DIFFERENCE * self.units, -np.inf
         )
         pairs = [given.get(name, (low, np.inf)) for name, low in zip(self.names, least, strict=True)]
-        low, high = np.array(pairs, dtype=float).T
+        found = real_array(pairs, "fit_motion: bounds", "a least and a larger value by name")
+        if found.shape != (len(pairs), 2):
+            raise ArgumentError(f"fit_motion: bounds: expected a least and a larger value by name, got {bounds!r:.80}.")
+        low, high = found.T
         if not ((low < high) & (low <= self.first) & (self.first <= high)).all():
             raise ArgumentError("fit_motion: bounds: expected a least and a larger value, with the first value between.")
         return low, high
@@ -94,7 +100,7 @@ class FitProblem:
         """Given standard deviations (n,)."""
         if noise is None:
             return None
-        found = np.asarray(noise, dtype=float)
+        found = real_array(noise, "fit_motion: noise", f"{len(self.columns)} numbers > 0")
         if found.shape not in ((), (len(self.columns),)) or not (found > 0.0).all():
             raise ArgumentError(f"fit_motion: noise: expected {len(self.columns)} numbers > 0, got {noise!r}.")
         return np.broadcast_to(found, (len(self.columns),)).copy()
@@ -255,9 +261,9 @@ class FitProblem:
 
 def _times(times, step) -> np.ndarray:
     """Times of the samples."""
-    found = np.asarray(times, dtype=float)
+    found = real_array(times, "fit_motion: times", "increasing numbers")
     if found.ndim != 1 or found.size < 2 or not (np.diff(found) > 0.0).all():
         raise ArgumentError(f"fit_motion: times: expected increasing numbers, got {times!r:.80}.")
-    if not isinstance(step, float | int) or not step > 0.0:
+    if isinstance(step, bool) or not isinstance(step, float | int) or not 0.0 < step < np.inf:
         raise ArgumentError(f"fit_motion: step: expected a time > 0 [s], got {step!r}.")
     return found

@@ -20,7 +20,7 @@ from gauss.analysis.consistent_inertias import is_consistent, nearest_consistent
 from gauss.analysis.identified_scene import identified_scene
 from gauss.analysis.measured_motion import MeasuredMotion, measured_motion
 from gauss.analysis.regressor import RegressorModel
-from gauss.arguments import named_arguments
+from gauss.arguments import generator, named_arguments, real_array
 from gauss.errors import ArgumentError, StateError, extra
 from gauss.scene import Scene
 from gauss.system import System
@@ -214,7 +214,7 @@ def identify(
         raise ArgumentError(f"identify: confidence: expected a number between 0 and 1, got {confidence!r}.")
     model = RegressorModel(system, independent, friction)
     samples = measured_motion(model, q, v, acceleration, forces)
-    base = base_of(model, random_matrix(model, seed))
+    base = base_of(model, random_matrix(model, generator(seed, "identify")))
     fit = _fitted(model, base, samples, noise)
     prior = model.parameters
     values = _standard(model, base, fit, prior, consistent)
@@ -288,7 +288,7 @@ def _solved(base: BaseParameters, triangles: list[np.ndarray], sigma: np.ndarray
 
 
 def _noise(noise, count: int) -> np.ndarray:
-    given = np.asarray(noise, dtype=float)
+    given = real_array(noise, "identify: noise", f"{count} numbers > 0")
     if given.shape not in ((), (count,)) or not np.isfinite(given).all() or (given <= 0.0).any():
         raise StateError(f"identify: noise: expected {count} numbers > 0, one for each row, got {noise!r}.")
     return np.broadcast_to(given, (count,))

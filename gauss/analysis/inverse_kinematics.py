@@ -16,7 +16,7 @@ from gauss.analysis.obstacles import obstacles
 from gauss.analysis.target import Target
 from gauss.analysis.target_levels import LevelRows, lexicographic, solver_of
 from gauss.analysis.target_problem import TargetProblem, bounds, positive_values
-from gauss.arguments import named_arguments
+from gauss.arguments import generator, named_arguments
 from gauss.dynamics import compile_scene
 from gauss.dynamics.projection import clipped, project_rates
 from gauss.errors import ArgumentError, GaussError, require
@@ -136,9 +136,9 @@ def inverse_kinematics(
     for name, value, least in (("starts", starts, 0), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
             raise ArgumentError(f"inverse_kinematics: {name}: expected a whole number, {least} or more, got {value!r}.")
-    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not tolerance > 0.0:
+    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 0.0 < tolerance < np.inf:
         raise ArgumentError(f"inverse_kinematics: tolerance: expected a positive number, got {tolerance!r}.")
-    rng, base = np.random.default_rng(seed), _within(problem, start)
+    rng, base = generator(seed, "inverse_kinematics"), _within(problem, start)
     best = _descended(problem, base, solver)
     if not _is_met(best[0], tolerance):
         best = _better(best, _tried(problem, best[0].state, KICK * rng.standard_normal(system.n_v), solver))

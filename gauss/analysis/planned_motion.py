@@ -271,6 +271,7 @@ def plan_motion(
     system = compile_scene(system) if isinstance(system, Scene) else system
     if shape not in SHAPES:
         raise ArgumentError(f"plan_motion: no shape {shape!r}. {did_you_mean(str(shape), SHAPES)}")
+    _refuse_begin(begin)
     names, values = _points(system, points, coordinates)
     columns = [system.column(name) for name in names]
     given = {"speeds": speeds, "accelerations": accelerations, "jerks": jerks}
@@ -349,3 +350,9 @@ def _refuse_beyond(system: System, names: Sequence[str], law: PPoly):
                 f"plan_motion: {name!r} goes from {low:.6g} to {high:.6g}, beyond the limits of its joint, "
                 f"{lowest[column]:.6g} to {highest[column]:.6g}. Shape 'trapezoid' does not overshoot its points."
             )
+
+
+def _refuse_begin(begin):
+    """Raise an ArgumentError if the begin of a motion is no finite time."""
+    if isinstance(begin, bool) or not isinstance(begin, float | int) or not np.isfinite(begin):
+        raise ArgumentError(f"plan_motion: begin: expected a finite time [s], got {begin!r:.80}.")

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.analysis.tangents import Tangents
-from gauss.arguments import named_arguments
+from gauss.arguments import name_list, named_arguments, real_array
 from gauss.dynamics import compile_scene
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.projection import fixed_columns
-from gauss.errors import ArgumentError, StateError, require
+from gauss.errors import StateError, require
 from gauss.scene import Body, Scene
 from gauss.scene.motions import Prescribed
 from gauss.scene.set_valued import JointFriction
@@ -115,9 +115,12 @@ class RegressorModel:
         require(system, (System, Scene), "regressor")
         self.system = system = compile_scene(system) if isinstance(system, Scene) else system
         _refuse_prescribed(system.scene)
-        self.independent = _independent(system, independent) if system.has_closures else None
+        given = None if independent is None else name_list(independent, "independent", "names of joints")
+        if given is not None:
+            fixed_columns(system, given)  # names that are none are refused without loops, too
+        self.independent = _independent(system, given) if system.has_closures else None
         self.places = list(range(system.n_v)) if self.independent is None else fixed_columns(system, self.independent)
-        self.friction = tuple(fixed_columns(system, _names(friction, "friction")))
+        self.friction = tuple(fixed_columns(system, name_list(friction, "friction", "names of joints")))
         if len(set(self.friction)) != len(self.friction):
             raise StateError(f"friction: expected different joints, got {', '.join(friction)}.")
         self.rows = tuple(system.coordinates[k] for k in self.places)
@@ -151,7 +154,7 @@ class RegressorModel:
 
     def matrix(self, q, v, acceleration) -> np.ndarray:
         """Y (…, k, p)."""
-        q, v, acceleration = (np.asarray(part, dtype=float) for part in (q, v, acceleration))
+        q, v, acceleration = (real_array(part, "regressor: q, v, acceleration") for part in (q, v, acceleration))
         if self.independent is None:
             Y, N = self.system.function("inertial_regressor")(q, v, acceleration), None
         else:
@@ -200,18 +203,11 @@ def _refuse_prescribed(scene: Scene):
 def _independent(system: System, given) -> tuple[str, ...]:
     """Independent coordinates of a system with loops: the given ones, or those of its start."""
     if given is not None:
-        return _names(given, "independent")
+        return tuple(given)
     chosen = Tangents(system, system.initial_state()).independent_rates
     if not chosen:
         raise StateError(f"regressor: the loops of scene {system.scene.name!r} leave no degree of freedom.")
     return tuple(system.coordinates[k] for k in chosen)
-
-
-def _names(given, what: str) -> tuple[str, ...]:
-    names = (given,) if isinstance(given, str) else tuple(given or ())
-    if not all(isinstance(name, str) for name in names):
-        raise ArgumentError(f"{what}: expected names of joints, got {given!r}.")
-    return names
 
 
 def _number(limit) -> float:

@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 
 from gauss.analysis.equilibrium import equilibrium
 from gauss.analysis.linear_model import linearise
-from gauss.arguments import named_arguments
+from gauss.arguments import named_arguments, real_array
 from gauss.dynamics import compile_scene
 from gauss.errors import ArgumentError, require
 from gauss.scene import Scene
@@ -74,7 +74,11 @@ def root_locus(scene: Scene, parameter: str, values: Sequence[float], *, at_rest
     ('marginal', 'marginal')
     """
     require(scene, (Scene,), "root_locus")
-    given = np.asarray(values, dtype=float)
+    given = real_array(values, "root_locus: values", "finite numbers")
+    if not isinstance(at_rest, bool):
+        raise ArgumentError(f"root_locus: at_rest: expected True or False, got {at_rest!r:.80}.")
+    if not isinstance(parameter, str):
+        raise ArgumentError(f"root_locus: parameter: expected a name, got {parameter!r:.80}.")
     if given.ndim != 1 or not given.size or not np.isfinite(given).all():
         raise ArgumentError(f"root_locus: values: expected finite numbers, got {values!r:.80}.")
     models = [_model(scene_of(scene, {parameter: float(value)}), at_rest) for value in given]

@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from gauss.arguments import name_list
 from gauss.codegen import Kernel, forward, reverse, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.inputs import InputForces, input_loads
@@ -52,9 +53,9 @@ class MotionStep:
     """
 
     def __init__(self, system: System, integrator: str, parameters: Sequence[str] = (), absent: Sequence[str] = ()):
-        if integrator not in TABLEAUS:
-            raise ArgumentError(f"sensitivities: no integrator {integrator!r}. {did_you_mean(integrator, TABLEAUS)}")
-        self.system, self.parameters = system, tuple(parameters)
+        if not isinstance(integrator, str) or integrator not in TABLEAUS:
+            raise ArgumentError(f"sensitivities: no integrator {integrator!r}. {did_you_mean(str(integrator), TABLEAUS)}")
+        self.system, self.parameters = system, name_list(parameters, "sensitivities: parameters")
         self.tableau, self.laws = TABLEAUS[integrator], Laws(system)
         DERIVATIVES.plan(Question(system, self.laws))
         self.absent = tuple(absent)

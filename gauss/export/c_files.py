@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
+from gauss.errors import require
 from gauss.export.c_code import PRELUDE, CBody
 from gauss.export.exported_function import ExportedFunction, exported_functions, identifier
 from gauss.scene import Scene
@@ -79,6 +80,7 @@ def to_c(system: System | Scene, names: Sequence[str] | str | None = None, name:
     >>> "void pendulum_mass_matrix(const double q[1], double t, double result[1]);" in code.header
     True
     """
+    require(system, (System, Scene), "export")
     scene = system if isinstance(system, Scene) else system.scene
     return c_code(identifier(scene.name if name is None else name), scene, exported_functions(system, names))
 

@@ -8,9 +8,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import prod
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 
+from gauss.arguments import name_list
 from gauss.codegen import Expression, Function, Graph, write
 from gauss.dynamics import compile_scene
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism, acceleration_derivatives
@@ -112,7 +115,7 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
     system = compile_scene(system) if isinstance(system, Scene) else system
     if names is None:
         names = (*DEFAULTS, "loop_constraints") if system.has_closures else DEFAULTS
-    names = (names,) if isinstance(names, str) else tuple(names)
+    names = name_list(names, "export", "names of functions")
     if not system.n_v:
         raise SimulationError(f"scene {system.scene.name!r} cannot be exported: nothing in it can move.")
     refuse_changed(system)
@@ -123,8 +126,31 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
     return found
 
 
+def folder_of(folder) -> Path:
+    """Folder of a path, made if it is not there.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no path.
+    """
+    if not isinstance(folder, str | PathLike):
+        raise ArgumentError(f"export: folder: expected a path, got {folder!r:.80}.")
+    found = Path(folder)
+    found.mkdir(parents=True, exist_ok=True)
+    return found
+
+
 def identifier(name: str) -> str:
-    """Name with underscores for all that is neither letter nor digit."""
+    """Name with underscores for all that is neither letter nor digit.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no text.
+    """
+    if not isinstance(name, str):
+        raise ArgumentError(f"export: name: expected a text, got {name!r:.80}.")
     found = re.sub(r"\W", "_", name, flags=re.ASCII)
     return f"_{found}" if not found or found[0].isdigit() else found
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from gauss.arguments import name_list
 from gauss.codegen import Expression
 from gauss.dynamics import compile_scene
 from gauss.errors import SimulationError, extra, require
@@ -96,6 +97,7 @@ def to_sympy(system: System | Scene, name: str = "inverse_dynamics", simplify: b
     """
     with extra("symbolic"):
         import sympy
+    require(name, (str,), "to_sympy: name")
     require(system, (System, Scene), "export")
     system = compile_scene(system) if isinstance(system, Scene) else system
     if has_symbols(system, name):
@@ -257,7 +259,7 @@ SIGNS = {
 def _wanted(system: System, names) -> tuple[str, ...]:
     """Names of the functions; those of the equations of motion when none are given."""
     if names:
-        return (names,) if isinstance(names, str) else tuple(names)
+        return name_list(names, "export", "names of functions")
     return ("mass_matrix", "inverse_dynamics", *(("loop_constraints",) if system.has_closures else ()))
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gauss.errors import ArgumentError, did_you_mean
-from gauss.export.exported_function import exported_functions, identifier
+from gauss.errors import ArgumentError, did_you_mean, require
+from gauss.export.exported_function import exported_functions, folder_of, identifier
 from gauss.scene import Scene
 from gauss.system import System
 
@@ -50,12 +50,11 @@ def save_as(
     >>> [path.name for path in save_as(gauss.load("pendulum"), "c", tempfile.mkdtemp(), ["mass_matrix"])]
     ['pendulum.h', 'pendulum.c']
     """
-    if language not in WRITERS:
+    require(system, (System, Scene), "export")
+    if not isinstance(language, str) or language not in WRITERS:
         raise ArgumentError(f"export: no language {language!r}. {did_you_mean(str(language), WRITERS)}")
     scene = system if isinstance(system, Scene) else system.scene
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    return WRITERS[language](system, folder, names, identifier(scene.name if name is None else name))
+    return WRITERS[language](system, folder_of(folder), names, identifier(scene.name if name is None else name))
 
 
 def _save_c(system, folder: Path, names, name: str) -> list[Path]:

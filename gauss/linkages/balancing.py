@@ -1,6 +1,7 @@
 """Shaking force and moment of a linkage, and their balance by counterweights (Berkof and Lowen 1969) and counter-rotors."""
 
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -87,8 +88,7 @@ def counterweights(chain: Chain, links: tuple[str, ...]) -> Counterweights:
     LinkageError
         If a link has no pivot on the ground.
     """
-    for name in links:
-        _ground_pivot(chain, name)
+    _refuse_none(chain, links)
     found = cycle(chain, full_turn(chain, ANGLES))
     force, _ = _shaking(found)
     columns = []
@@ -127,8 +127,7 @@ def counter_rotors(chain: Chain, links: tuple[str, ...]) -> CounterRotors:
     """
     from scipy.optimize import nnls  # takes long to import, and few need it
 
-    for name in links:
-        _ground_pivot(chain, name)
+    _refuse_none(chain, links)
     found = cycle(chain, full_turn(chain, ANGLES))
     _, moment = _shaking(found)
     A = np.stack([found.motion.links[name].alpha + np.zeros(len(found)) for name in links], axis=1)
@@ -156,7 +155,7 @@ def weighted(chain: Chain, name: str, moment, radius: float) -> PlanarLink:
     LinkageError
         If the radius is not positive.
     """
-    if not np.isfinite(radius) or radius <= 0:
+    if not isinstance(radius, Real) or not np.isfinite(radius) or radius <= 0:
         raise LinkageError(f"radius of the counterweight on {name!r}: expected a positive length [m], got {radius!r}.")
     pivot = _ground_pivot(chain, name).point(name)
     link = next(link for link in chain.links if link.name == name)
@@ -169,3 +168,11 @@ def weighted(chain: Chain, name: str, moment, radius: float) -> PlanarLink:
     new = (link.mass * com + added * at) / mass
     inertia = link.inertia + link.mass * abs(com - new) ** 2 + added * abs(at - new) ** 2
     return replace(link, mass=mass, inertia=inertia, com=(new.real, new.imag))
+
+
+def _refuse_none(chain: Chain, links: tuple[str, ...]):
+    """Raise a LinkageError if no links are named, or one has no pivot on the ground."""
+    if not links:
+        raise LinkageError(f"{chain.name}: name at least one link that turns about the ground.")
+    for name in links:
+        _ground_pivot(chain, name)

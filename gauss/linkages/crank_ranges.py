@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.arguments import real_array
 from gauss.errors import LinkageError
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, end_of_turn
@@ -45,7 +46,7 @@ class AssemblyBranch(NamedTuple):
 
 def closes(chain: Chain, angles) -> np.ndarray:
     """Whether all groups close at crank angles (k,) [rad]."""
-    angles = np.atleast_1d(np.asarray(angles, dtype=float))
+    angles = np.atleast_1d(real_array(angles, "crank angles", "numbers [rad]"))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         slack = closure_slack(chain, angles, near(chain, angles))
         good = [np.broadcast_to(value >= 0, angles.shape) for group in slack for value in group.values()]
@@ -104,7 +105,7 @@ def near(chain: Chain, angles) -> dict[str, np.ndarray]:
     """Poses (3, k) of the ternary links near crank angles (k,), on the branch chosen by the user; nan where it ends."""
     if not chain.triads:
         return {}
-    angles = np.asarray(angles, dtype=float)
+    angles = real_array(angles, "crank angles", "numbers [rad]")
     if np.all(angles == chain.driver.start):
         return {name: pose + np.zeros(angles.shape) for name, pose in _first(chain).items()}
     return follow(chain).at(angles)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.arguments import real_array
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.errors import LinkageError, SimulationError, SwitchingWarning, user_level
 from gauss.linkages.assembly_checks import degrees
@@ -23,7 +24,7 @@ DEFAULT_ATOL = 1e-12  # rad, and relative to the speed of the drive
 
 def reduced_inertia(chain: Chain, angles) -> np.ndarray:
     """Reduced (equivalent) inertia J_e (k,) of the linkage on its crank [kg m²]."""
-    angles = np.atleast_1d(np.asarray(angles, dtype=float))
+    angles = np.atleast_1d(real_array(angles, "crank angles", "numbers [rad]"))
     return inertia_terms(move(chain, angles, 1.0 + 0.0 * angles, 0.0 * angles, near(chain, angles)))[0]
 
 
@@ -172,7 +173,7 @@ def run(
     """
     _check_settings(duration, rtol, atol, step, added_inertia)
     equation = ReducedLinkage(chain, added_inertia)
-    samples = np.linspace(0.0, duration, 501) if times is None else np.asarray(times, dtype=float)
+    samples = np.linspace(0.0, duration, 501) if times is None else real_array(times, "times", "numbers [s]")
     start = [chain.driver.start if angle is None else float(angle), float(speed)]
 
     fastest = max(abs(float(speed)), abs(chain.driver.speed)) or 1.0 / duration

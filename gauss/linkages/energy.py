@@ -1,9 +1,11 @@
 """Energy, power and work of a linkage; flywheel for a given fluctuation of speed."""
 
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 
+from gauss.arguments import real_array
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, end_of_turn
 from gauss.linkages.cycle_result import Cycle
@@ -149,7 +151,7 @@ def work(chain: Chain, angles) -> np.ndarray:
     >>> bool(abs(work(bar.chain, np.linspace(0, 2 * np.pi, 181))[-1]) < 1e-9)  # a turn under a conservative load
     True
     """
-    angles = np.asarray(angles, dtype=float)
+    angles = real_array(angles, "crank angles", "numbers [rad]")
     return cumulative(lambda x: cycle(chain, x).torque, angles, _jumps(chain, angles[0], angles[-1]))
 
 
@@ -207,7 +209,7 @@ def flywheel(chain: Chain, fluctuation: float) -> Flywheel:
     LinkageError
         If δ is not positive, or the crank rests.
     """
-    if not fluctuation > 0 or not chain.driver.speed:
+    if not isinstance(fluctuation, Real) or not fluctuation > 0 or not chain.driver.speed:
         raise LinkageError(
             f"{chain.name}: a flywheel needs a fluctuation δ > 0 and a crank that turns; "
             f"got δ = {fluctuation!r}, speed {chain.driver.speed} rad/s."

@@ -101,7 +101,10 @@ class Linkage:
 
     def mode(self, joint, mode: int):
         """Choose the assembly, +1 or −1, of the dyad with this inner joint; see :class:`gauss.linkages.Dyad`."""
-        self.modes[name_of(joint)] = mode
+        name = name_of(joint)
+        if not isinstance(name, str):
+            raise SceneError(f"mode: expected the name of a joint, got {joint!r:.80}.")
+        self.modes[name] = mode
 
     def pose(self, link, pose):
         """Give the pose x, y [m], angle [rad] of the ternary link of a class III group near the start of the cycle."""
@@ -141,8 +144,8 @@ class Linkage:
 
     @staticmethod
     def _require_link(name: str, what: str, existing):
-        if name not in existing:
-            raise SceneError(f"{what}: no link {name!r}. {did_you_mean(name, existing)}")
+        if not isinstance(name, str) or name not in existing:
+            raise SceneError(f"{what}: no link {name!r}. {did_you_mean(str(name), existing)}")
 
     # Analyses of the chain of groups.
 

@@ -100,7 +100,7 @@ def dead_centres(chain: Chain, output: str) -> np.ndarray:
     """
     joints = {joint.name: joint for joint in chain.joints if joint.kind == "prismatic"}
     links = [link.name for link in chain.links]
-    if output not in joints and output not in links:
+    if not isinstance(output, str) or (output not in joints and output not in links):
         raise LinkageError(f"no link or slide {output!r}; links: {', '.join(links)}; slides: {', '.join(joints) or 'none'}.")
 
     def speed(angles):

@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from numbers import Real
 
 import numpy as np
 
@@ -116,7 +117,12 @@ def _checked(duration: float, times, rtol: float, atol: float | None, method: st
     """
     given = {} if atol is None else {"atol": atol}
     for name, value in {"duration": duration, "rtol": rtol, "max_step": max_step, **given}.items():
-        if not value > 0 or (name != "max_step" and not np.isfinite(value)):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, Real)
+            or not value > 0
+            or (name != "max_step" and not np.isfinite(value))
+        ):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if method not in CHOICES:
         raise SimulationError(f"no method {method!r}. {did_you_mean(method, CHOICES)}")

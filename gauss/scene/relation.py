@@ -30,6 +30,7 @@ class Relation:
     frames: ClassVar[tuple[str, ...]] = ()
     joints: ClassVar[tuple[str, ...]] = ()
     shapes: ClassVar[tuple[str, ...]] = ()
+    may_be_idle: ClassVar[bool] = False  # whether a row may depend on nothing, as one that a condition switches off
 
     def positions(self, at) -> list:
         """Residuals of positions and time [m, rad]."""
@@ -65,7 +66,9 @@ class Constraint(Relation):
 
     Notes
     -----
-    Both are differentiated exactly, so they are written with arithmetic, numpy, or :mod:`gauss.math`.
+    Both are differentiated exactly, so they are written with arithmetic, numpy, or :mod:`gauss.math`. Where a motion crosses
+    a condition on the state at which a position residual jumps, :func:`gauss.simulate` refuses it with the place, the time
+    and the size of the jump; a kink, at which velocities jump, is located and is an impact, an event of the trajectory.
     """
 
     position: Callable | None = None

@@ -44,8 +44,8 @@ class ServoRelation:
         what = f"relation {text(self.name, 'name of a relation')!r}"
         if not callable(self.residual):
             raise SceneError(f"{what}: residual must be a function of (t, motion), got {self.residual!r}.")
-        if self.level not in LEVELS:
-            raise SceneError(f"{what}: no level {self.level!r}. {did_you_mean(self.level, LEVELS)}")
+        if not isinstance(self.level, str) or self.level not in LEVELS:
+            raise SceneError(f"{what}: no level {self.level!r}. {did_you_mean(str(self.level), LEVELS)}")
 
 
 def as_relations(thing, motion, ideal: bool = False) -> list[ServoRelation]:

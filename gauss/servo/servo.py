@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss.dynamics import compile_scene
 from gauss.dynamics.store import Store
-from gauss.errors import SceneError, did_you_mean
+from gauss.errors import ArgumentError, SceneError, did_you_mean, require
 from gauss.scene import Scene, values
 from gauss.servo.actuators import Cable, efforts
 from gauss.servo.observed import MotionSymbols, tree_symbols
@@ -72,6 +72,10 @@ class Servo:
         """Compile a scene, check every name, and trace the relations."""
         if isinstance(self.system, Scene):
             object.__setattr__(self, "system", compile_scene(self.system))
+        require(self.system, (System, Scene), "Servo")
+        for key in ("relations", "actuators"):
+            if not np.iterable(getattr(self, key)):
+                raise ArgumentError(f"Servo: {key}: expected a sequence, got {getattr(self, key)!r:.80}.")
         object.__setattr__(self, "actuators", tuple(self.actuators))
         found = tuple(relation for given in self.relations for relation in as_relations(given, self.symbols.motion))
         object.__setattr__(self, "relations", found)

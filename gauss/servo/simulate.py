@@ -7,8 +7,9 @@ import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
+from gauss.dynamics.laws.constraint_modes import refuse_surfaces
 from gauss.dynamics.laws.switching import Switching
-from gauss.errors import SimulationError
+from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
 from gauss.servo.dynamics import AVOID, ServoEngine
 from gauss.servo.instant import number
@@ -81,7 +82,11 @@ def simulate(
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` is the Tracking so far, None before the first step.
     """
+    require(servo, (Servo,), "servo.simulate")
+    if state is not None:
+        require(state, (State,), "servo.simulate: state")
     check_arguments(duration, integrator, step, rtol, atol)
+    refuse_surfaces(servo.system, "a motion under servos")
     method = chosen(integrator)
     if isinstance(method, Library | Taylor) or (isinstance(method, FixedStep) and method.mechanical):
         raise SimulationError(f"integrator {method.name!r} does not support servos; use 'dop853', 'radau5' or 'rk4'.")

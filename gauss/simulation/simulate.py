@@ -20,6 +20,7 @@ from gauss.errors import SimulationError, judged_later, require
 from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, described, held_inputs
+from gauss.simulation.constraint_surfaces import across_surfaces
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.energy_balance import watch_balance
 from gauss.simulation.history import History
@@ -135,9 +136,9 @@ def simulate(
     Raises
     ------
     SimulationError
-        Before the first step, if a prescribed position jumps, or a law is random and steps are adaptive; later, if the
-        motion cannot continue, or the control law returns a value that is no finite number: its ``trajectory`` holds the
-        motion so far.
+        Before the first step, if a prescribed position jumps, or a law is random and steps are adaptive; later, if a
+        constraint jumps at a condition on the state that the motion crosses, if the motion cannot continue, or the control
+        law returns a value that is no finite number: its ``trajectory`` holds the motion so far.
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """
@@ -177,14 +178,19 @@ def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: 
 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
+    """Trajectory of a problem by the driver of a plan, in pieces where constraints jump between modes."""
+    with judged_later():
+        return across_surfaces(problem, partial(_beside_jumps, plan))
+
+
+def _beside_jumps(plan: Plan, problem: Problem) -> Trajectory:
     """Trajectory of a problem by the driver of a plan, with the jumps of prescribed velocities at its samples."""
 
     def driven(start: State, end: float, samples) -> Trajectory:
         same = start is problem.start and end == problem.end and samples is problem.samples
         return DRIVERS[plan.driver](problem if same else problem._replace(start=start, end=end, samples=samples), plan)
 
-    with judged_later():
-        return beside_jumps(problem.switching, problem.start, problem.end, problem.samples, driven)
+    return beside_jumps(problem.switching, problem.start, problem.end, problem.samples, driven)
 
 
 def _again(problem: Problem, plan: Plan, step, tolerance, samples, mesh=()) -> Trajectory:

@@ -70,7 +70,7 @@ def check_tolerances(**numbers):
             continue
         if name == "atol":
             _pair(value, name)
-        elif not _is_positive(value):
+        elif not _is_positive(value) or np.ndim(value):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
         elif name == "rtol" and value >= 1.0:
             raise SimulationError(f"rtol: expected a number below 1, a share of each coordinate and rate, got {value!r}.")
@@ -89,7 +89,10 @@ def _pair(value, what: str) -> tuple[float, float]:
 def _is_positive(value) -> bool:
     if type(value) is float:
         return 0.0 < value < np.inf
-    given = np.asarray(value)
+    try:
+        given = np.asarray(value)
+    except ValueError:  # rows of several lengths
+        return False
     return given.dtype.kind in "iuf" and bool(np.isfinite(given).all() and (given > 0).all())
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.dynamics.laws.constraint_modes import refuse_surfaces
 from gauss.dynamics.laws.prescribed_jumps import prescribed_jumps
 from gauss.dynamics.laws.switching import prescribed_times
 from gauss.dynamics.laws.switching_times import Timetable, timetable
@@ -166,8 +167,9 @@ def refuse_jumps(system: System, start: State, step: float):
     Raises
     ------
     SimulationError
-        If a prescribed position or velocity jumps.
+        If a prescribed position or velocity jumps, or a constraint does at a condition on the state.
     """
+    refuse_surfaces(system, "a motion in fixed steps of one call each")
     end = HORIZON * step
     prescribed = prescribed_times(system.relations, start.t, end)
     last = prescribed.last_end(start.t, end)

@@ -153,7 +153,7 @@ def place_relations(system, relations) -> Relations:
         joints |= view.joints
         placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), *about))
         outputs += [entry for block in blocks for entry in np.ravel(block)]
-    return _bound(graph, placed, bodies, joints, outputs)
+    return bound_relations(graph, placed, bodies, joints, outputs)
 
 
 def place_residuals(system, relations) -> Relations:
@@ -162,10 +162,11 @@ def place_residuals(system, relations) -> Relations:
     c = np.array([*(entry for relation in relations for entry in relation.positions(view)), None], dtype=object)[:-1]
     velocities = [entry for relation in relations for entry in relation.velocities(view)]
     moving, rates = view.motion()
-    return _bound(view.graph, [], view.bodies, view.joints, [*c, *forward(c, moving, rates), *velocities])
+    return bound_relations(view.graph, [], view.bodies, view.joints, [*c, *forward(c, moving, rates), *velocities])
 
 
-def _bound(graph: Graph, placed, bodies: dict, joints: dict, outputs) -> Relations:
+def bound_relations(graph: Graph, placed, bodies: dict, joints: dict, outputs) -> Relations:
+    """Relations of placed rows over the symbols of bodies and joints of one graph."""
     inputs = [symbol for parts in bodies.values() for part in parts for symbol in np.ravel(part)]
     inputs += [symbol for parts in joints.values() for part in parts for symbol in part]
     inputs.append(graph.symbol("t"))
@@ -183,7 +184,7 @@ def _traced_rows(relation, view: Symbols):
         )
     rate = np.concatenate([forward(c, moving, rates), g])
     idle = [k for k in range(len(rate)) if not _asks(rate[k : k + 1], velocities)]
-    if idle or not len(rate):
+    if (idle and not relation.may_be_idle) or not len(rate):
         which = f"row {idle[0] + 1} of {len(rate)}" if idle else "it has no rows and"
         raise SceneError(f"constraint {relation.name!r}: {which} depends on no body and no joint, so nothing can meet it.")
     blocks, C = [], -rate

@@ -8,6 +8,7 @@ import pytest
 
 import gauss
 from gauss import Plan
+from gauss.bench.fuzz.scenes import moved_scene
 from gauss.dynamics.contact.contact_stepper import contact_stepper
 from gauss.errors import ContactLawWarning, PainleveWarning, StateError
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
@@ -219,3 +220,11 @@ def test_samples_beside_the_steps_are_those_of_the_written_out_step():
     np.testing.assert_allclose(one.q, other.q, atol=SAME_STEPS)
     again = moved(system, 0.1, plan=KERNELS, times=times)
     np.testing.assert_array_equal(again.q, other.q)
+
+
+def test_a_loop_in_which_nothing_moves_rests():
+    """A body that is fixed and hinged to the ground stays, whatever touches it; its loop has no compliance."""
+    given = moved_scene(0, 8753)
+    motion = gauss.simulate(given.scene, 0.02, integrator="time_stepping", step=given.step)
+    assert not motion.q.any()
+    assert not motion.v.any()

@@ -10,6 +10,7 @@ from gauss.analysis.sensitivity.law_jumps import warn_of_jumps
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
 from gauss.analysis.sensitivity.saltation import Transition
 from gauss.analysis.tangents import Tangents
+from gauss.arguments import name_list, real_array
 from gauss.dynamics import compile_scene
 from gauss.dynamics.motion_step import MotionStep
 from gauss.errors import ArgumentError, SimulationError, require
@@ -94,10 +95,10 @@ class Motion:
             raise ArgumentError(f"sensitivities: duration {duration} s is no whole number of steps of {step} s.")
         self.h, self.start = step, system.initial_state() if state is None else state
         require(self.start, (State,), "sensitivities: state")
-        self.parameters = (parameters,) if isinstance(parameters, str) else tuple(parameters)
+        self.parameters = name_list(parameters, "sensitivities: parameters")
         self.integrator, self.system = integrator, system
         shape = self.steps, len(system.scene.inputs)
-        self.inputs = np.zeros(shape) if inputs is None else np.array(inputs, dtype=float)
+        self.inputs = np.zeros(shape) if inputs is None else real_array(inputs, "sensitivities: inputs").copy()
         if self.inputs.shape != shape:
             raise ArgumentError(f"sensitivities: inputs: expected shape {shape}, got {self.inputs.shape}.")
         self.t = self.start.t + step * np.arange(self.steps + 1)

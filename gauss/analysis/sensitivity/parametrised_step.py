@@ -42,8 +42,8 @@ class ParametrisedStep(MotionStep):
     """
 
     def __init__(self, family: ParametrisedSystem, integrator: str):
-        if integrator not in TABLEAUS:
-            raise ArgumentError(f"fit_motion: no integrator {integrator!r}. {did_you_mean(integrator, TABLEAUS)}")
+        if not isinstance(integrator, str) or integrator not in TABLEAUS:
+            raise ArgumentError(f"fit_motion: no integrator {integrator!r}. {did_you_mean(str(integrator), TABLEAUS)}")
         self.family, self.system, self.laws = family, family.system, Laws(family.pattern)
         DERIVATIVES.plan(Question(family.pattern, self.laws))
         self.tableau, self.inputs = TABLEAUS[integrator], tuple(self.system.scene.inputs)

@@ -44,6 +44,8 @@ class Compliance:
             return N @ np.linalg.inv(N.T @ M @ N) @ N.T, np.zeros(len(M))
         tree = M.diagonal() > 0.0
         H = np.zeros_like(M)
+        if not tree.any():  # nothing in the tree moves, and so no joint that closes a loop
+            return terms.B @ H @ terms.B.T, terms.beta
         H[np.ix_(tree, tree)] = np.linalg.inv(M[np.ix_(tree, tree)])
         Y = H @ terms.G.T
         S = terms.G @ Y

@@ -36,6 +36,14 @@ def watched_functions(system: System, laws: Laws) -> Laws | WatchedFunctions:
     return WatchedFunctions(motion, [*functions, *traced])
 
 
+def residual_functions(system: System) -> WatchedFunctions:
+    """Residuals of all constraints beyond the joints."""
+    motion = symbols(system)
+    pairs = zip(system.relations.placed, system.relations.rows(motion), strict=True)
+    traced = [(placed.name, Function("constraint", [], _residuals(rows, placed.velocities))) for placed, rows in pairs]
+    return WatchedFunctions(motion, traced)
+
+
 def _residuals(rows: Rows, velocities: int) -> list[Expression]:
     """Position residuals, and slopes and right-hand sides of the last rows, which bind velocities."""
     first = len(rows.C) - velocities

@@ -78,25 +78,47 @@ class Jumps:
         names, system = self.names(state, after), self.system
         if system is None or not names:
             return None
-        later, parts = State(after, state.q, state.v), sides(system.scene)
-        touching = np.flatnonzero(gaps(kinematics(system, later)).width <= TOUCHING * gap_scales(system))
-        restitution = np.array([side.whole.restitution for side in parts])
-        found = impact(system, later, touching, restitution, since=state.t, driven=names)
-        _refuse_contradiction(system, found.state, names)
-        rough = {slip.name for slip in system.slips.placed}
-        words = ", ".join(map(repr, names))
-        frictional = [parts[gap].whole.name for gap in found.active if parts[gap].name in rough]
-        if frictional:
-            raise SimulationError(
-                f"t = {after:.6g} s: the prescribed speed of {words} jumps, and contact {frictional[0]!r}, "
-                "which has friction, would bear an impulse. Prescribe a continuous speed, or give the drive a limit=."
-            )
-        return found, names
+        return driven_impact(system, State(after, state.q, state.v), names, state.t), names
 
     def at_start(self, begin: float, end: float) -> float | None:
         """Time just after the start of a motion [s], if velocities may jump there."""
         after = begin + APART * max(abs(begin), abs(end))
         return after if self.within(begin, after) else None
+
+
+def driven_impact(system: System, state: State, names: tuple[str, ...], since: float | None = None) -> Impact:
+    """Impact of relations whose prescribed velocities jump.
+
+    Parameters
+    ----------
+    system : System
+        The system after the jump.
+    state : State
+        State before it.
+    names : tuple of str
+        The relations.
+    since : float, optional
+        Time just before the impact [s], where prescribed speeds differ from those at the time of the state.
+
+    Raises
+    ------
+    SimulationError
+        If the velocity constraints are inconsistent, or a contact with friction bears an impulse.
+    """
+    parts = sides(system.scene)
+    touching = np.flatnonzero(gaps(kinematics(system, state)).width <= TOUCHING * gap_scales(system))
+    restitution = np.array([side.whole.restitution for side in parts])
+    found = impact(system, state, touching, restitution, since=since, driven=names)
+    _refuse_contradiction(system, found.state, names)
+    rough = {slip.name for slip in system.slips.placed}
+    words = ", ".join(map(repr, names))
+    frictional = [parts[gap].whole.name for gap in found.active if parts[gap].name in rough]
+    if frictional:
+        raise SimulationError(
+            f"t = {state.t:.6g} s: the prescribed speed of {words} jumps, and contact {frictional[0]!r}, "
+            "which has friction, would bear an impulse. Prescribe a continuous speed, or give the drive a limit=."
+        )
+    return found
 
 
 def _refuse_contradiction(system: System, state: State, names: tuple[str, ...]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
 from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.laws.constraint_functions import watched_functions
+from gauss.dynamics.laws.constraint_functions import residual_functions, watched_functions
 from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
@@ -385,3 +385,10 @@ def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:
         return None
     make = lambda: SwitchingFunctions(system, functions)  # noqa: E731
     return cached(system, (SwitchingFunctions, laws.key), make) or None
+
+
+def constraint_watch(system: System) -> Kernel | None:
+    """:attr:`SwitchingFunctions.machine_code` of the residuals of constraints alone; None where they have none."""
+    make = lambda: SwitchingFunctions(system, residual_functions(system))  # noqa: E731
+    found = cached(system, (constraint_watch,), make)
+    return found.machine_code if found else None

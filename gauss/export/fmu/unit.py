@@ -13,9 +13,9 @@ from hashlib import sha256
 from pathlib import Path
 
 from gauss.dynamics import compile_scene
-from gauss.errors import ArgumentError, MissingPackageError, SimulationError
+from gauss.errors import ArgumentError, MissingPackageError, SimulationError, require
 from gauss.export.c_files import CCode, c_code
-from gauss.export.exported_function import ExportedFunction, identifier
+from gauss.export.exported_function import ExportedFunction, folder_of, identifier
 from gauss.export.fmu.model_description import build_description, model_description, variables
 from gauss.export.fmu.unit_functions import unit_functions
 from gauss.export.fmu.unit_parameters import UnitParameters
@@ -66,6 +66,7 @@ def to_fmu(system: System | Scene, folder=".", name: str | None = None, paramete
     >>> export.to_fmu(gauss.load("pendulum"), "/tmp").name  # doctest: +SKIP
     'pendulum.fmu'
     """
+    require(system, (System, Scene), "export")
     system = compile_scene(system) if isinstance(system, Scene) else system
     own = identifier(system.scene.name if name is None else name)
     tuned = UnitParameters(system, parameters)
@@ -78,9 +79,7 @@ def to_fmu(system: System | Scene, folder=".", name: str | None = None, paramete
     texts = {f"sources/{key}": text for key, text in sources.items()}
     texts["sources/buildDescription.xml"] = build_description(own, ["unit.c", "model.c"])
     texts["modelDescription.xml"] = model_description(system, own, token, kinds)
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{own}.fmu"
+    path = folder_of(folder) / f"{own}.fmu"
     with tempfile.TemporaryDirectory() as place, zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         for key, text in texts.items():
             archive.writestr(key, text)

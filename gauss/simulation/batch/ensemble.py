@@ -7,6 +7,7 @@ from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
+from gauss.dynamics.laws.constraint_modes import constraint_modes
 from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parametrised_system import parametrised
@@ -105,7 +106,7 @@ class Ensemble:
             States.
         doubtful : ndarray of bool, shape (batch,)
             Motions that fail a check: of accelerations by inverse dynamics, of loops by constraint residuals; all of them
-            where fixed steps cross switching times, or prescribed velocities jump.
+            where fixed steps cross switching times, or prescribed velocities or constraints jump.
         share : ndarray, shape (batch,)
             Residual of their energy balance, relative to their largest energy.
 
@@ -118,7 +119,8 @@ class Ensemble:
         start = State(0.0, *np.split(starts[:, 0], [system.n_q]))
         switched = switching(system, self.laws, start, duration)
         warn_of_times(system, switched.times)
-        if switched.jumps or (switched.times.switches.size and not isinstance(self.code, AdaptiveBatchCode)):
+        divided = bool(switched.jumps) or constraint_modes(system) is not None
+        if divided or (switched.times.switches.size and not isinstance(self.code, AdaptiveBatchCode)):
             singly = np.ones(starts.shape[1], dtype=bool)
             return np.full((singly.size, len(times), len(starts)), np.nan), singly, np.zeros(singly.size)
         parameters = members[:, self.family.varied].T

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, TypeVar
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.moreau_step import moreau_stepper
+from gauss.dynamics.laws.constraint_modes import constraint_modes, refuse_surfaces
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import BATCHES, is_time_stepping, method_key, plan_of
 from gauss.dynamics.rules import Question
@@ -36,6 +37,8 @@ ONE_BY_ONE = "pair kernels", "callbacks"  # dynamics of motions that are made on
 
 def one_by_one(system: System, method: Integrator, held: bool) -> str:
     """Dynamics of motions that are made one after the other; empty where they share vector registers."""
+    if constraint_modes(system) is not None:
+        return "pieces between surfaces of constraints"
     laws = Laws(system)
     if not (laws.called or is_time_stepping(Question(system, laws, method=method))):
         return ""
@@ -55,6 +58,8 @@ def fixed_step_code(
     """
     if method.nonsmooth:
         refuse_links(system)
+    if device is not None:
+        refuse_surfaces(system, "a batch on a device")
 
     def make(laws: Laws) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
         if not method.nonsmooth:

@@ -1,0 +1,343 @@
+"""Modes of constraints whose residuals have conditions on the state, as of a cam or a guide in pieces.
+
+In one mode every condition has a fixed value, and the residuals are smooth. Between two modes lies a surface on which a
+condition changes: there the position residual may jump, which no motion follows, or the velocity residual, which is an
+impact. A residual in pieces that fit in value and slope needs neither; surfaces are therefore looked for along random lines
+through the configuration space, and compared from both sides.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import islice, pairwise
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from gauss.codegen import Expression, Function, Graph, reachable, substitute
+from gauss.dynamics.gap_functions import stacked_rows
+from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.laws.switching_times import CONDITIONS, of_time
+from gauss.dynamics.projection import scalar_coordinates
+from gauss.dynamics.store import cached
+from gauss.dynamics.system_dynamics import SystemDynamics
+from gauss.errors import GaussError, SimulationError
+from gauss.scene.relation import Relation
+from gauss.system import State, System, build, retract
+from gauss.system.relations import Relations, bound_relations
+from gauss.system.symbolic_mechanism import Symbols
+
+CONTINUOUS = 1e-9  # change of a residual across a surface, relative to its terms, that is rounding of the surface's place
+LINES, LOOKS = 24, 33  # random lines through the configuration space, and states on each, between which surfaces are found
+REACHES = (0.3, 3.0, 30.0)  # half lengths of the lines, in units of the coordinates of the scene
+BISECTIONS = 60  # of the place of a surface on a line: to rounding
+
+Mode = tuple[float, ...]  # value of every condition: 0 or 1 of a comparison, the first or the second of min and max; a floor
+
+
+@dataclass(frozen=True)
+class OneMode(Relation):
+    """Relation whose conditions have the values of one mode.
+
+    Parameters
+    ----------
+    name : str
+        Name of the relation.
+    whole : Relation
+        The relation.
+    mode : tuple of float
+        Values of its conditions, in the order of :func:`conditions`.
+    """
+
+    whole: Relation
+    mode: Mode
+
+    may_be_idle: ClassVar[bool] = True
+
+    def positions(self, at) -> list:
+        """Residuals of positions in the mode."""
+        return self._smooth(at, 0)
+
+    def velocities(self, at) -> list:
+        """Residuals of velocities in the mode."""
+        return self._smooth(at, 1)
+
+    def _smooth(self, at, part: int) -> list:
+        view = Symbols(at.system, Graph())  # of its own: the order of the conditions depends on nothing else
+        traced = _residuals(self.whole, view)
+        nodes = _conditions(traced, view)
+        smooth = substitute(traced[part], nodes, _values(nodes, self.mode))
+        bodies = [entry for b in view.bodies for entry in (*np.ravel(at.R[b]), *at.x[b], *at.W[b], *at.u[b])]
+        placed = [at.system.joints[j] for j in view.joints]
+        joints = [entry for joint in placed for entry in (*at.coordinates_of(joint), *at.rates_of(joint))]
+        return list(Function("mode", _symbols(view), list(smooth)).inlined(np.array([*bodies, *joints, at.t], dtype=object)))
+
+
+class Step(NamedTuple):
+    """What residuals do across a surface between two modes.
+
+    Attributes
+    ----------
+    name : str
+        Constraint that changes most, relative to its terms.
+    position, velocity : float
+        Largest change of its position residual, and of its velocity residual [m, rad], [m/s, rad/s]; 0 where continuous.
+    """
+
+    name: str
+    position: float
+    velocity: float
+
+
+class ConstraintModes:
+    """Modes of the constraints of a system.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Relations that have conditions on the state.
+    """
+
+    def __init__(self, system: System):
+        self.system, self.counts, self.ops, self.about = system, dict[str, int](), list[str](), list[str]()
+        for name, relation in system.scene.relations.items():
+            own = Symbols(system, Graph())
+            nodes = _conditions(_residuals(relation, own), own)
+            if not nodes or relation.loses:
+                continue
+            self.counts[name] = len(nodes)
+            self.ops += [node.op for node in nodes]
+            self.about += [_about(system, own, node) for node in nodes]
+        self.names = tuple(self.counts)
+
+    def __bool__(self):
+        return bool(self.names)
+
+    def sides(self, state: State, mode: Mode | None = None) -> np.ndarray:
+        """Difference of the two sides of every comparison, argument of every floor, (k,); in one mode if it is given."""
+        found = cached(self.system, (ConstraintModes.sides, mode), lambda: self._sides(mode))
+        return np.asarray(found.values(Kinematics(self.system, state)), dtype=float)
+
+    def _sides(self, mode: Mode | None) -> Relations:
+        """Sides as functions of the motion."""
+        view, sides = Symbols(self.system, Graph()), list[Expression | float]()
+        for name, values in self._parts(mode).items():
+            own = Symbols(self.system, Graph())
+            nodes = _conditions(_residuals(self.system.scene.relations[name], own), own)
+            found = [node.operands[0] if node.op == "floor" else node.operands[0] - node.operands[1] for node in nodes]
+            if mode is not None:
+                found = list(substitute(found, nodes, _values(nodes, values)))
+            sides += list(Function("sides", _symbols(own), found).inlined(np.array(_same(own, view), dtype=object)))
+        return bound_relations(view.graph, [], view.bodies, view.joints, sides)
+
+    def _parts(self, mode: Mode | None) -> dict[str, Mode]:
+        """Modes of each relation."""
+        values, ends = np.zeros(len(self.ops)) if mode is None else np.array(mode), np.cumsum(list(self.counts.values()))
+        return {name: tuple(part.tolist()) for name, part in zip(self.names, np.split(values, ends[:-1]), strict=True)}
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """Sizes of the sides of the conditions at states of the size of the scene, (k,)."""
+        return np.max([np.abs(self.sides(at(1.0))) for at in islice(self._lines(), LINES)], axis=0)
+
+    def mode(self, state: State) -> Mode:
+        """Mode of a state."""
+        return tuple(_holds(op, side) for op, side in zip(self.ops, self.sides(state), strict=True))
+
+    def margins(self, state: State, mode: Mode) -> np.ndarray:
+        """Distance of every condition from its change, on the motion of a mode, negative beyond it, (k,)."""
+        pairs = zip(self.ops, self.sides(state, mode), mode, strict=True)
+        return np.array([_margin(op, side, value) for op, side, value in pairs])
+
+    def beyond(self, state: State, mode: Mode, which: tuple[int, ...]) -> Mode:
+        """Mode on the other side of the surfaces of some conditions, near a state."""
+        other, sides = list(mode), self.sides(state, mode)
+        for k in which:
+            floor = mode[k] + (1.0 if sides[k] > mode[k] + 0.5 else -1.0)
+            other[k] = floor if self.ops[k] == "floor" else 1.0 - mode[k]
+        for k in range(len(other)):  # conditions on what has jumped follow, as that of |x − floor(x)|
+            after = self.sides(state, tuple(other))
+            if k not in which and abs(after[k] - sides[k]) > CONTINUOUS * self.sizes[k]:
+                other[k] = _holds(self.ops[k], after[k])
+        return tuple(other)
+
+    def system_of(self, mode: Mode) -> System:
+        """The system with the constraints of a mode."""
+
+        def make() -> System:
+            whole = self.system.scene
+            own = {name: OneMode(name, whole.relations[name], part) for name, part in self._parts(mode).items()}
+            return build(replace(whole, relations=whole.relations | own), SystemDynamics())
+
+        return cached(self.system, (ConstraintModes.system_of, mode), make)
+
+    def step(self, state: State, one: Mode, other: Mode) -> Step:
+        """What the residuals do between two modes at a state on their surface."""
+        (gap, rate, *here), (gap_other, rate_other, *there) = (
+            _terms(kinematics(self.system_of(mode), state)) for mode in (one, other)
+        )
+        jumps, sizes = np.abs([gap_other - gap, rate_other - rate]), np.maximum(here, there)
+        shares = np.divide(jumps, sizes, out=np.zeros_like(jumps), where=sizes > 0.0)
+        placed = self.system.relations.placed
+        owners = np.repeat([relation.name for relation in placed], [relation.size for relation in placed])
+        worst = owners[np.argmax(shares.max(axis=0))]
+        position, velocity = np.where(shares > CONTINUOUS, jumps, 0.0)[:, owners == worst].max(axis=1)
+        return Step(str(worst), float(position), float(velocity))
+
+    @property
+    def steps(self) -> dict[int, Step]:
+        """A surface of each condition on which residuals jump, as far as surfaces are found; see :attr:`unknown`."""
+        return self._surfaces[0]
+
+    @property
+    def unknown(self) -> bool:
+        """Whether a condition has no surface that was found."""
+        return self._surfaces[1]
+
+    @cached_property
+    def _surfaces(self) -> tuple[dict[int, Step], bool]:
+        steps, seen = dict[int, Step](), set[int]()
+        for state, k, mode, other in self._crossed():
+            if k in steps:
+                continue
+            try:
+                step = self.step(state, mode, other)
+            except GaussError:  # no finite value there: nothing is known
+                continue
+            seen.add(k)
+            if step.position or step.velocity:
+                steps[k] = step
+        return steps, len(seen) < len(self.ops)
+
+    def _lines(self) -> Iterator[Callable[[float], State]]:
+        """Random lines through the configuration space: functions of a number in [−1, 1]."""
+        system, rng = self.system, np.random.default_rng(0)
+        rest = system.reference
+        for line in range(LINES):
+            far = REACHES[line % len(REACHES)] * rng.uniform(-1.0, 1.0, system.n_v) * system.scale.coordinates
+            off = 0.3 * rng.uniform(-1.0, 1.0, system.n_v) * system.scale.coordinates
+            rates = rng.uniform(-1.0, 1.0, system.n_v) * system.scale.rates
+            middle, half = retract(system, rest.q, off), far
+
+            def at(s: float, middle: np.ndarray = middle, half: np.ndarray = half, rates: np.ndarray = rates) -> State:
+                return State(rest.t, retract(system, middle, s * half), rates)
+
+            yield at
+
+    def _crossed(self) -> Iterator[tuple[State, int, Mode, Mode]]:
+        """States on surfaces, each with its condition and the modes on both sides."""
+        for at in self._lines():
+            modes = [(s, self.mode(at(s))) for s in np.linspace(-1.0, 1.0, LOOKS)]
+            for (begin, before), (end, after) in pairwise(modes):
+                for k in np.flatnonzero(np.array(before) != np.array(after)):
+                    near, far = self._surface(at, begin, end, int(k), before)
+                    yield at(far), int(k), self.mode(at(near)), self.mode(at(far))
+
+    def _surface(self, at, begin: float, end: float, k: int, mode: Mode) -> tuple[float, float]:
+        """Neighbouring places on a line between which a condition changes."""
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (begin + end)
+            begin, end = (middle, end) if self.mode(at(middle))[k] == mode[k] else (begin, middle)
+        return begin, end
+
+
+def constraint_modes(system: System) -> ConstraintModes | None:
+    """Modes of the constraints of a system that jump between them, or may; None where there are none."""
+    if not _has_conditions(system.relations):
+        return None
+    modes = cached(system, (ConstraintModes,), lambda: ConstraintModes(system))
+    return modes if modes and (modes.unknown or modes.steps) else None
+
+
+def refuse_surfaces(system: System, what: str):
+    """Raise a SimulationError if a constraint of a system jumps, or has a kink, at a condition on the state."""
+    modes = constraint_modes(system)
+    if modes is None:
+        return
+    for k, step in modes.steps.items():
+        size = f"jumps by {step.position:.6g} [m, rad]" if step.position else "has a kink"
+        raise SimulationError(
+            f"constraint {step.name!r} {size} at a condition on {modes.about[k]}, which {what} does not locate; "
+            "use gauss.simulate, or let the residual be continuous with its slope."
+        )
+
+
+def _has_conditions(relations: Relations) -> bool:
+    return any(node.op in CONDITIONS for node in reachable(relations.function.outputs))
+
+
+def _residuals(relation: Relation, view: Symbols) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity residuals in symbols."""
+    parts = relation.positions(view), relation.velocities(view)
+    return tuple(np.array([*part, None], dtype=object)[:-1] for part in parts)  # type: ignore[return-value]
+
+
+def _conditions(traced: tuple[np.ndarray, np.ndarray], view: Symbols) -> list[Expression]:
+    """Conditions on the state, operands first; a number of a time alone is none."""
+    outputs = [entry for part in traced for entry in part]
+    timed = {node.index for node in of_time(outputs, view.t)}
+    return [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
+
+
+def _symbols(view: Symbols) -> list[Expression]:
+    bodies = [symbol for parts in view.bodies.values() for part in parts for symbol in np.ravel(part)]
+    return [*bodies, *(symbol for parts in view.joints.values() for part in parts for symbol in part), view.t]
+
+
+def _same(own: Symbols, view: Symbols) -> list:
+    """Symbols of another view for the bodies and joints of one."""
+    bodies = [symbol for b in own.bodies for part in view.body(b) for symbol in np.ravel(part)]
+    joints = [symbol for j in own.joints for part in view.joint(own.system.joints[j]) for symbol in part]
+    return [*bodies, *joints, view.t]
+
+
+def _values(nodes: list[Expression], mode: Mode) -> list[Expression | float]:
+    """Values of conditions in a mode; operands come first, for those of min and max hold conditions, too."""
+    values = list[Expression | float]()
+    for node, value in zip(nodes, mode, strict=True):
+        values.append(_chosen(node, value, nodes[: len(values)], values))
+    return values
+
+
+def _chosen(node: Expression, value: float, nodes: list[Expression], values: list) -> Expression | float:
+    """Value of a condition in a mode, given those before it; of min and max one operand."""
+    if node.op not in ("min", "max"):
+        return value
+    return substitute([node.operands[0 if value else 1]], nodes, values)[0]
+
+
+def _holds(op: str, side: float) -> float:
+    """Value of a condition: for min and max, whether it is the first operand."""
+    if op == "floor":
+        return float(np.floor(side))
+    return float({"less": side < 0.0, "min": side < 0.0, "less_equal": side <= 0.0, "max": side > 0.0}[op])
+
+
+def _margin(op: str, side: float, value: float) -> float:
+    if op == "floor":
+        return float(min(side - value, value + 1.0 - side))
+    return float(side if (op == "max") == bool(value) else -side)
+
+
+def _terms(motion: Kinematics) -> np.ndarray:
+    """Position and velocity residuals of all relations, and the magnitudes of their terms, (4, r)."""
+    system = motion.system
+    J, C, _, gap = stacked_rows(motion, system.relations)
+    velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
+    places = np.concatenate([np.ones(system.Phi.size), np.abs(scalar_coordinates(system, motion.state))])
+    rate = J @ velocities - C
+    sizes = np.abs(J) @ places + np.abs(gap), np.abs(J) @ np.abs(velocities) + np.abs(C) + np.abs(rate)
+    return np.array([gap, rate, *sizes])
+
+
+def _about(system: System, view: Symbols, node: Expression) -> str:
+    """Joints and bodies that a condition depends on, in words."""
+    needed = {symbol.index for symbol in reachable([node]) if symbol.op == "symbol"}
+    of = lambda parts: any(symbol.index in needed for part in parts for symbol in np.ravel(part))  # noqa: E731
+    joints = [system.joints[j].name for j, parts in view.joints.items() if of(parts)]
+    return ", ".join([*joints, *(system.structure.bodies[b] for b, parts in view.bodies.items() if of(parts))])
