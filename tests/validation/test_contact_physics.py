@@ -11,6 +11,8 @@ G = 9.81
 FIRST_ORDER = 3.0  # of errors over steps, relative: time stepping is of first order at impacts
 DRIFT = 1e-9  # [m] of a stack in ten seconds
 ON_TABLE = 2e-3  # [m]: two steps at the speed of the table
+PRECESSION = 1e-6  # of an axis, by tolerances of 1e-9
+ORDER = 0.1  # of an order of convergence, found from two steps
 ROUNDING = 1e-9  # relative, of motions whose contacts do not change
 
 
@@ -86,30 +88,58 @@ def test_a_rimless_wheel_reaches_its_steady_gait():
     assert rates.min() < rates.max() * np.cos(2 * alpha) * (1 + 10 * step) + 0.5 * expected
 
 
-@pytest.mark.parametrize(
-    ("settings", "error"),
-    [({"rtol": 1e-9, "atol": 1e-9}, 1e-6), ({"integrator": "time_stepping", "step": 1e-4}, 5e-3)],
-)
-def test_a_top_on_a_smooth_plane_precesses_steadily(settings, error):
-    """C n Ω − A Ω² cos θ = m g l, about the centre of mass, which stays (Routh, Advanced Rigid Dynamics, 1905)."""
+def tops(count: int, with_lever: bool) -> tuple[gauss.Scene, float, float]:
+    """Tops that precess steadily on a smooth table, beside a pendulum or alone; tilt and rate of the precession.
+
+    C n Ω − A Ω² cos θ = m g l, about the centre of mass, which stays (Routh, Advanced Rigid Dynamics, 1905).
+    """
     A, C, arm, tip, tilt, precession = 2e-3, 1e-3, 0.06, 0.01, 0.4, 3.0
     spin = (G * arm + A * precession**2 * np.cos(tilt)) / (C * precession)  # along the axis, in total
-    scene = gauss.Scene("top")
+    scene = gauss.Scene("tops")
     scene.half_space("table")
-    scene.body("top", mass=1.0, inertia=(A, A, C))
-    scene.free("floats", "ground", "top")
     turn = (np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0)  # about x: the axis leans towards −y
     rate = (0.0, precession * np.sin(tilt), spin)  # Ω ẑ in the axes of the body: (0, sin θ, cos θ)
-    scene.start("floats", position=(0, 0, tip + arm * np.cos(tilt), *turn), rate=(0, 0, 0, *rate))
-    scene.sphere("tip", "top", tip, at=(0, 0, -arm))
-    scene.contact("stand", "tip", "table")
+    for k in range(count):
+        scene.body(f"top {k}", mass=1.0, inertia=(A, A, C))
+        scene.free(f"floats {k}", "ground", f"top {k}")
+        scene.start(f"floats {k}", position=(k, 0, tip + arm * np.cos(tilt), *turn), rate=(0, 0, 0, *rate))
+        scene.sphere(f"tip {k}", f"top {k}", tip, at=(0, 0, -arm))
+    if with_lever:
+        scene.body("lever", mass=1.0, inertia=(1, 1, 1))
+        scene.revolute("hinge", "ground", "lever", axis=(0, 1, 0))
+    scene.contacts_all()
+    return scene, tilt, precession
+
+
+def error_of_top(scene: gauss.Scene, tilt: float, precession: float, **settings) -> tuple[float, gauss.Trajectory]:
+    """Error of the axis of the first top after half a second."""
     duration = 0.5
     motion = gauss.simulate(scene, duration, progress=False, **settings)
-    axis = gauss.rotations.from_quaternion(motion.q[-1][3:])[:, 2]
-    angle = precession * duration
-    expected = np.sin(tilt) * np.array([np.sin(angle), -np.cos(angle)])
-    assert axis == pytest.approx((*expected, np.cos(tilt)), abs=error)
-    assert np.abs(motion.q[-1][:2]).max() < 1e-9
+    q, angle = motion.q[-1], precession * duration
+    axis = gauss.rotations.from_quaternion(q[3:7])[:, 2]
+    expected = np.array([np.sin(tilt) * np.sin(angle), -np.sin(tilt) * np.cos(angle), np.cos(tilt)])
+    assert np.abs(q[:2]).max() < 1e-9
+    return float(np.abs(axis - expected).max()), motion
+
+
+def test_a_top_on_a_smooth_plane_precesses_steadily():
+    error, _ = error_of_top(*tops(1, False), rtol=1e-9, atol=1e-9)
+    assert error < PRECESSION
+
+
+@pytest.mark.parametrize(
+    ("count", "with_lever", "dynamics", "error"),
+    [(1, False, "compiled", 1.5e-3), (3, False, "pair kernels", 1.5e-3), (3, True, "pair kernels", 1.5e-3)],
+)
+def test_time_stepping_of_a_top_is_of_second_order(count, with_lever, dynamics, error):
+    """Rate-dependent forces, here gyroscopic torques, know the contact forces to second order."""
+    errors = []
+    for step in (1e-3, 5e-4):
+        found, motion = error_of_top(*tops(count, with_lever), integrator="time_stepping", step=step)
+        assert motion.stats.plan.dynamics == dynamics
+        errors.append(found)
+    assert errors[0] < error
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=ORDER)
 
 
 @pytest.mark.parametrize(("share", "stays"), [(0.98, True), (1.02, False)])

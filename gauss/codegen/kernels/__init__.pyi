@@ -22,12 +22,15 @@ from gauss.codegen.kernels.first_accepted import FirstAccepted
 from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
+from gauss.codegen.kernels.free_body_step import CompiledFreeBodyStep, FreeBodyFunctions
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
+from gauss.codegen.kernels.mechanism_loop import CompiledSteps
 from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
 from gauss.codegen.kernels.row_code import RowCode, RowFunction, SingleRowFunction
 from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
+from gauss.codegen.kernels.step_memory import MemoryLayout
 from gauss.codegen.kernels.taylor import TaylorStep
 from gauss.codegen.kernels.tree_recursion import LinkStep, TreeRecursion
 
@@ -61,6 +64,10 @@ __all__ = [
     "SectionCode",
     "NearPairs",
     "CompiledMechanismStep",
+    "CompiledFreeBodyStep",
+    "CompiledSteps",
+    "FreeBodyFunctions",
+    "MemoryLayout",
     "StepFunctions",
     "Newton",
     "FirstAccepted",

@@ -66,7 +66,7 @@ class _BlockContactWriter:
         self.x = room.after(m * (9 + ELIMINATED))
         self.tolerance, self.eps = self.result[0], r.variable(0.0)
 
-    def write(self):
+    def write(self) -> ir.Function:
         r, laws, f = self.r, self.laws, self.f
         self._measure()
         with r.each(self.m * 3) as i:
@@ -104,7 +104,7 @@ class _BlockContactWriter:
         self._accumulate()
         self.result[0], self.result[1] = least[0], total[0]
         self.result[2] = r.as_double(round_[0])
-        r.done()
+        return r.done()
 
     def _sides(self, c: Value):
         """Body and rows of both sides of a contact."""
@@ -283,6 +283,11 @@ def _dot(one, other) -> Value:
     return total
 
 
+def write_block_contacts(laws: BlockContactLaws, module: ir.Module) -> ir.Function:
+    """Emit ``contacts``: the arguments are those of :meth:`ContactGraph.solve`, in its order."""
+    return _BlockContactWriter(laws, module).write()
+
+
 class BlockContactSolver:
     """Python interface of the solver.
 
@@ -295,7 +300,7 @@ class BlockContactSolver:
     def __init__(self, laws: BlockContactLaws):
         module = ir.Module(name="gauss")
         write_order(module)
-        _BlockContactWriter(laws, module).write()
+        write_block_contacts(laws, module)
         self.code = machine.load(str(module))
         self._bind()
 

@@ -22,7 +22,7 @@ class FreeMotion:
         self.at, self.r = memory, memory.r
 
     def begin(self):
-        """Terms after the share of the step, compliance, accelerations without contact forces, rates that they lead to."""
+        """Terms after the share of the step, compliance, accelerations without contact forces, rates at the end by these."""
         r, n, s, given = self.r, self.at.n, self.at.settings, self.at["given"]
         n_q, n_v = n["n_q"], n["n_v"]
         self.at.copy(given, self.at["q"], n_q)
@@ -40,14 +40,25 @@ class FreeMotion:
         self._factor()
         self._accelerate(self.at["flat:tau"])
         self.at.copy(self.at["results"], self.at["flat:power"], 3)
+        with r.each(n_v) as i:
+            self.at["total"][i] = self.at["v"][i] + s["h"] * self.at["a"][i]
+
+    def at_later_rates(self, rows: Value):
+        """Accelerations and powers at the rates after the share, where the forces of the last step are expected."""
+        r, n, s, given, added = self.r, self.at.n, self.at.settings, self.at["given"], self.at["added"]
+        n_q, n_v = n["n_q"], n["n_v"]
         with r.when(s["share"] > 0.0):
+            self.at.copy(added, self.at["flat:tau"], n_v)
+            with r.when(self.at["before"][0] > 0.0), r.each(rows) as row:
+                force = self.at["force"][row]
+                with r.when(r.absolute(force) > 0.0), r.each(n_v) as i:
+                    added[i] = added[i] + force * self.at["K"][row * n_v + i]
+            self._accelerate(added)
             with r.each(n_v) as i:
                 given[n_q + 1 + i] = self.at["v"][i] + s["share"] * s["h"] * self.at["a"][i]
             self.at.call("forces", given, self.at["out"])
             self._accelerate(self.at["out"])
             self.at.copy(self.at["results"], self.at["out"].after(n_v), 3)
-        with r.each(n_v) as i:
-            self.at["total"][i] = self.at["v"][i] + s["h"] * self.at["a"][i]
 
     def _factor(self):
         """Cholesky factor C of Nᵀ M N, and Z = N C⁻ᵀ; each row of N has one entry."""

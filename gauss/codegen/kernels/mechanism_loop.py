@@ -1,4 +1,4 @@
-"""Steps of a mechanism with contacts in machine code, one after the other: (t, q, v, work) at the ends of all of them.
+"""Steps with contacts in machine code, one after the other: (t, q, v, work) at the ends of all of them.
 
     w₁ = w₀ + h P,   with the mean power P of a step
 
@@ -10,7 +10,7 @@ import ctypes
 
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER
+from gauss.codegen import INTEGER, POINTER, machine
 from gauss.codegen.kernels.arrays import Routine, Value
 from gauss.codegen.kernels.near_pairs import INTEGERS
 from gauss.codegen.kernels.step_memory import (
@@ -18,8 +18,10 @@ from gauss.codegen.kernels.step_memory import (
     FINISHED,
     IMPACT,
     LOOP_SETTINGS,
+    MECHANISM,
     RESULTS,
     STEP_SETTINGS,
+    MemoryLayout,
     StepMemory,
 )
 
@@ -27,12 +29,12 @@ ADVANCE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3, ctypes.c_int64, *[ctype
 
 
 class _LoopWriter:
-    def __init__(self, step: ir.Function, module: ir.Module):
+    def __init__(self, step: ir.Function, module: ir.Module, layout: MemoryLayout):
         kinds = [INTEGERS, INTEGERS, POINTER, INTEGER, POINTER, POINTER]
         r = self.r = Routine(ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), "advance"))
         self.step, self.given = step, r.arrays[:3]
         (self.count,), (self.ends, self.out) = r.integers, r.arrays[3:]
-        self.at = StepMemory(r, self.given)
+        self.at = StepMemory(r, self.given, layout)
         self.status, self.counts = self.at.table("status"), self.at.table("counts")
         self.now, self.loop = self.at["settings"], self.at["loop"]
 
@@ -87,6 +89,32 @@ class _LoopWriter:
         self.at.copy(row.after(n_q + n_v + 1), work, 3)
 
 
-def write_mechanism_loop(step: ir.Function, module: ir.Module) -> ir.Function:
-    """Emit ``advance(ints, addresses, work, count, ends, rows)``: the step ``count`` times."""
-    return _LoopWriter(step, module).write()
+class CompiledSteps:
+    """Python interface of the steps of a module.
+
+    Parameters
+    ----------
+    step : llvmlite.ir.Function
+        One step.
+    layout : MemoryLayout
+        What it works on.
+    """
+
+    def __init__(self, step: ir.Function, layout: MemoryLayout = MECHANISM):
+        _LoopWriter(step, step.module, layout).write()
+        self.code = machine.load(str(step.module))
+        self._bind()
+
+    def _bind(self):
+        self._advance = self.code.entry("advance", ADVANCE)
+
+    def __getstate__(self) -> dict:
+        return {"code": self.code}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
+
+    def advance(self, ints: int, addresses: int, work: int, count: int, ends: int, rows: int):
+        """Take steps to some times; the arrays of times and of rows are given by their addresses, too."""
+        self._advance.call(ints, addresses, work, count, ends, rows)

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 from llvmlite import ir
 
-from gauss.codegen import POINTER, Function, machine
+from gauss.codegen import POINTER, Function
 from gauss.codegen.kernels.active_contacts import ActiveContacts
 from gauss.codegen.kernels.arrays import Routine, Value
 from gauss.codegen.kernels.contact_modes import ContactModes
 from gauss.codegen.kernels.contact_rows import ContactRows
 from gauss.codegen.kernels.contact_solver import ContactSolver
 from gauss.codegen.kernels.free_motion import FreeMotion
-from gauss.codegen.kernels.mechanism_loop import ADVANCE, write_mechanism_loop
+from gauss.codegen.kernels.mechanism_loop import CompiledSteps
 from gauss.codegen.kernels.near_pairs import INTEGERS, write_near
 from gauss.codegen.kernels.sliding_contacts import SlidingContacts
 from gauss.codegen.kernels.step_memory import FINISHED, IMPACT, LOOP_SETTINGS, REPEATED, StepMemory
@@ -71,6 +71,7 @@ class _StepWriter:
         unknown = (count[1] > 0) | (count[2] > 0) | (m > self.at.n["capacity"])
         with r.when(~unknown):
             self.rows.write(m)
+            self.free.at_later_rates(m * 3 + self.at.n["g"] + self.at.n["s"])
             with r.when(~(self._impact(m) > 0.0)), r.when(self.contacts.solve(m)):
                 self._finish(m, m * 3 + self.at.n["g"] + self.at.n["s"], speed)
         return r.done()
@@ -122,12 +123,13 @@ class _StepWriter:
                 given[n["n_q"] + i] = self.at.remaining * s["h"] * self.at["end_v"][i]
             self.at.call("move", given, self.at["end_q"])
             self.rows.keep(m)
+            self.at["before"][0] = s["share"]
             self.status[0] = FINISHED
             with r.when(self.at["loop"][LOOP_SETTINGS.index("recorded")] > 0.0):
                 self.modes.write(m)
 
 
-class CompiledMechanismStep:
+class CompiledMechanismStep(CompiledSteps):
     """Python interface.
 
     Parameters
@@ -137,21 +139,4 @@ class CompiledMechanismStep:
     """
 
     def __init__(self, functions: StepFunctions):
-        module = ir.Module(name="gauss")
-        write_mechanism_loop(_StepWriter(functions, module).write(), module)
-        self.code = machine.load(str(module))
-        self._bind()
-
-    def _bind(self):
-        self._advance = self.code.entry("advance", ADVANCE)
-
-    def __getstate__(self) -> dict:
-        return {"code": self.code}
-
-    def __setstate__(self, state: dict):
-        vars(self).update(state)
-        self._bind()
-
-    def advance(self, ints: int, addresses: int, work: int, count: int, ends: int, rows: int):
-        """Take steps to some times; the arrays of times and of rows are given by their addresses, too."""
-        self._advance.call(ints, addresses, work, count, ends, rows)
+        super().__init__(_StepWriter(functions, ir.Module(name="gauss")).write())

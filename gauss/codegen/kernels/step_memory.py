@@ -4,6 +4,9 @@ All arrays of doubles lie in one block, at places that depend on the sizes of a 
 scene and those of the search for near contacts are reached by a table of addresses.
 """
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
@@ -51,6 +54,7 @@ def slots(n: dict[str, int]) -> dict[str, int]:
         "Z": v * r,
         "a": v,
         "added": v,
+        "before": 1,
         "total": v,
         "z": r,
         "friction": n["laws"] + 1,
@@ -90,6 +94,25 @@ def slots(n: dict[str, int]) -> dict[str, int]:
     } | {f"flat:{name}": 0 for name in TERMS}
 
 
+class MemoryLayout(NamedTuple):
+    """Names of what a step works on.
+
+    Attributes
+    ----------
+    sizes, addresses : tuple of str
+        Sizes of a scene, and arrays and kernels that are reached by their address.
+    slots : callable
+        Lengths of the arrays of working memory by name, for the sizes of a scene.
+    """
+
+    sizes: tuple[str, ...]
+    addresses: tuple[str, ...]
+    slots: Callable[[dict[str, int]], dict[str, int]]
+
+
+MECHANISM = MemoryLayout(SIZES, ADDRESSES, slots)
+
+
 class StepMemory:
     """Arrays of one step in the emitted code, by name.
 
@@ -99,16 +122,18 @@ class StepMemory:
         Routine of the code.
     given : list of Array
         Sizes and places, addresses, and working memory.
+    layout : MemoryLayout
+        Their names.
     """
 
-    def __init__(self, r: Routine, given: list[Array]):
-        self.r = r
+    def __init__(self, r: Routine, given: list[Array], layout: MemoryLayout = MECHANISM):
+        self.r, self.layout = r, layout
         ints, self.addresses, self.work = given
-        self.n = {name: ints[k] for k, name in enumerate(SIZES)}
-        self.places = ints.after(len(SIZES))
+        self.n = {name: ints[k] for k, name in enumerate(layout.sizes)}
+        self.places = ints.after(len(layout.sizes))
         kinds = [INTEGER, POINTER, INTEGER, POINTER, INTEGER]
         self.kernel = ir.FunctionType(ir.VoidType(), kinds).as_pointer()
-        self.names = list(slots(dict.fromkeys(SIZES, 0)))
+        self.names = list(layout.slots(dict.fromkeys(layout.sizes, 0)))
         self.arrays = {name: self.work.after(self.places[k]) for k, name in enumerate(self.names)}
         self.settings = {name: self.arrays["settings"][k] for k, name in enumerate(STEP_SETTINGS)}
         self.remaining = self.settings["share"] * -1.0 + 1.0
@@ -118,13 +143,13 @@ class StepMemory:
 
     def table(self, name: str, kind=INTEGERS) -> Array:
         """Array by its address."""
-        b, address = self.r.b, self.addresses[ADDRESSES.index(name)]
+        b, address = self.r.b, self.addresses[self.layout.addresses.index(name)]
         return Array(b, b.inttoptr(address.value, kind))
 
     def call(self, name: str, given: Array, found: Array):
         """Call a kernel of the scene by its address."""
         b, one = self.r.b, INTEGER(1)
-        pointer = b.inttoptr(self.addresses[ADDRESSES.index(name)].value, self.kernel)
+        pointer = b.inttoptr(self.addresses[self.layout.addresses.index(name)].value, self.kernel)
         b.call(pointer, [one, given.pointer, one, found.pointer, one])
 
     def copy(self, target: Array, source: Array, count):

@@ -68,6 +68,23 @@ class ContactLaws(NamedTuple):
     limit: np.ndarray
 
 
+def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
+    """Laws of some rows, in ascending order."""
+    kept = np.isin(laws.under, rows)
+
+    def place(which: np.ndarray) -> np.ndarray:
+        return np.searchsorted(rows, which)
+
+    return ContactLaws(
+        normal=place(laws.normal[np.isin(laws.normal, rows)]),
+        across=place(laws.across[kept]),
+        under=place(laws.under[kept]),
+        friction=laws.friction[kept],
+        set_valued=place(laws.set_valued),
+        limit=laws.limit,
+    )
+
+
 @dataclass(frozen=True)
 class ContactProblem:
     """Problem of one step.

@@ -64,11 +64,12 @@ def _moved(q, theta):
     return np.concatenate([q[:3] + theta[:3], turned(q[3:], theta[3:])])
 
 
-def _begin(q, v, given, gravity, step):
+def _begin(q, v, given, gravity, expected, step):
     h, share = step
     at = _moved(q, (share * h) * v)
     body = _FreeBody(at, given)
-    ahead = v + (share * h) * body.rates(*body.free_acceleration(v, gravity))
+    spin, pull = body.free_acceleration(v, gravity)
+    ahead = v + (share * h) * body.rates(spin + expected[:3], pull + expected[3:])
     W, u = body.velocities(v)
     inertia = [body.R @ (entries[:, None] * body.R.T) for entries in (body.J, 1.0 / body.J)]
     return at, body.R, body.x, W, u, np.zeros(3), body.bias(W), *body.free_acceleration(ahead, gravity), *inertia
@@ -93,13 +94,23 @@ def place_function() -> Function:
     return write(_place, 9, 3, 3, 3, 3, 3, 9, 3, name="place")
 
 
+def begin_function() -> Function:
+    """Traced function of :attr:`FreeBodyKernels.begin`."""
+    return write(_begin, 7, 6, CONSTANTS, 3, 6, 2, name="begin")
+
+
+def end_function() -> Function:
+    """Traced function of :attr:`FreeBodyKernels.end`."""
+    return write(_end, 7, 6, CONSTANTS, 6, 2, name="end")
+
+
 class FreeBodyKernels:
     """Machine code over columns, one for each body or shape.
 
     Attributes
     ----------
     begin : Kernel
-        (q, v, constants, gravity, h, share) → begin of a step (55,).
+        (q, v, constants, gravity, accelerations expected from contacts, h, share) → begin of a step (55,).
     end : Kernel
         (q after the share, v, constants, change of the velocities, h, share) → (q, v) at its end.
     place : Kernel
@@ -107,8 +118,8 @@ class FreeBodyKernels:
     """
 
     def __init__(self):
-        self.begin = Kernel(write(_begin, 7, 6, CONSTANTS, 3, 2, name="begin"))
-        self.end = Kernel(write(_end, 7, 6, CONSTANTS, 6, 2, name="end"))
+        self.begin = Kernel(begin_function())
+        self.end = Kernel(end_function())
         self.place = Kernel(place_function())
         assert (self.begin.n_out, self.place.n_out) == (BEGUN, POSE)
 

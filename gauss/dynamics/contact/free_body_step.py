@@ -1,8 +1,9 @@
 """Step of Moreau–Jean time stepping for free bodies: cost proportional to the number of near contacts.
 
 The equations of the step are those of :mod:`gauss.dynamics.contact.moreau_step`, the laws those of
-:mod:`gauss.dynamics.contact.contact_step`. The scene has no machine code of its own: bodies, pairs of shapes and the contact
-problem are kernels that all scenes share. Contacts enter the problem if they may close within the step: twice the largest
+:mod:`gauss.dynamics.contact.contact_step`. The scene has no machine code of its own: bodies, pairs of shapes, the contact
+problem and the step as a whole (:mod:`gauss.codegen.kernels.free_body_step`) are kernels that all scenes share; Python
+repeats the steps that machine code leaves. Contacts enter the problem if they may close within the step: twice the largest
 speed before and after the step bounds how fast a gap closes; a step that exceeds the bound is repeated with a larger one.
 """
 
@@ -13,7 +14,8 @@ import numpy as np
 
 from gauss.codegen import from_disk
 from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, Round
-from gauss.dynamics.contact.compiled_mechanism_step import LoopOfSteps
+from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_memory
+from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
 from gauss.dynamics.contact.contact_step import (
     LAW_TOLERANCE,
@@ -127,7 +129,9 @@ class FreeBodyStepper:
         self.elements = [contact.name for contact in self.table.contacts]
         self.first_set_valued, self.record = len(self.elements), ModeRecord(len(self.elements))
         self.graph: ContactGraph | None = None
-        self.known: tuple[np.ndarray, np.ndarray]
+        unit = system.scale.length / system.scale.time
+        settings = {"margin": REACH_MARGIN, "unit": unit, "tolerance": LAW_TOLERANCE, "unsolved": UNSOLVED}
+        self.memory = first_memory(self, block_contact_laws(), settings)
         self.forget()
 
     def _index_bodies(self):
@@ -143,6 +147,8 @@ class FreeBodyStepper:
         places = {joint.child: self.n + k for k, joint in enumerate(fixed)}
         body = [places.get(b, column[b]) if b >= 0 else self.n + len(fixed) for b in self.table.body]
         self.table.body = np.array(body, dtype=np.int64)
+        still = np.flatnonzero(self.table.body >= self.n)
+        self.table.law[np.ix_(still, still)] = 0  # bodies that stand still need no forces between them
 
     def _reaches(self) -> np.ndarray:
         """Farthest point (n,) of the shapes of each moving body from its centre of mass [m]."""
@@ -163,12 +169,24 @@ class FreeBodyStepper:
     def forget(self):
         """Forget the forces of the last step: a new motion begins."""
         self.detection.connect()
-        self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        self.known = KnownContacts(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((6, self.n)))
         self.record.forget()
+        self.memory.connect()
+
+    @property
+    def known(self) -> KnownContacts:
+        """Forces of the last step."""
+        return self.memory.known
+
+    @known.setter
+    def known(self, found: KnownContacts):
+        self.memory = self.memory.fitting()
+        self.memory.known = found
 
     def run(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
-        """No steps: machine code has single ones."""
-        return LoopOfSteps(0, 0.0, [], False)
+        """Steps by machine code, as of :meth:`gauss.dynamics.contact.compiled_step_memory.CompiledStepMemory.advance`."""
+        self.memory = self.memory.fitting()
+        return self.memory.advance(state, work, ends, rows)
 
     def examined(self, state: State, h: float) -> list[Paradox]:
         """None: contacts of many free bodies are not examined for Painlevé's paradox."""
@@ -201,7 +219,7 @@ class FreeBodyStepper:
             known = rates(near, begun.both)
         else:
             raise SimulationError(f"t = {state.t:.6g} s: contacts make bodies faster and faster; shorten the step.")
-        self._keep(near, force)
+        self._keep(near, force, added.T / h if share else np.zeros((6, self.n)))
         found = np.empty(state.q.size), np.empty(state.v.size)
         change = (after - begun.both[..., 0])[: self.n, :6].T
         step = np.repeat([[h], [share]], self.n, axis=1)
@@ -224,7 +242,7 @@ class FreeBodyStepper:
     def _begin(self, state: State, h: float, share: float) -> _Begun:
         q, v = state.q[self.q_places], state.v[self.v_places]
         step = np.repeat([[h], [share]], self.n, axis=1)
-        found = self.kernels.begin(np.concatenate([q, v, self.given, self.gravity, step]))
+        found = self.kernels.begin(np.concatenate([q, v, self.given, self.gravity, self.known.expected, step]))
         at, bodies, free, inertia = found[:7], found[7:31], found[31:37], found[37:]
         both = np.zeros((self.n + self.fixed.shape[1], TWIST, 2))
         both[: self.n, :6, 0] = bodies[12:18].T
@@ -310,8 +328,10 @@ class FreeBodyStepper:
         return np.column_stack([found[:m], found[m:].reshape(m, 2)]), (found @ response).reshape(self.n, 6)
 
     def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Forces over a step from a state, as of :meth:`forces_of`."""
-        return self.forces_of(self.python_step(state, h))
+        """Forces over a step from a state, as of :meth:`forces_of`; it expects its own forces."""
+        self.known = self.known._replace(expected=np.zeros((6, self.n)))
+        found = self.python_step(state, h)
+        return self.forces_of(self.python_step(state, h) if self.known.expected.any() else found)
 
     def forces_of(self, step: FreeBodyStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""
@@ -324,7 +344,7 @@ class FreeBodyStepper:
 
     def _start(self, near: NearContacts) -> np.ndarray:
         """Forces (m, 3) of the last step; zero of new contacts."""
-        keys, forces = self.known
+        keys, forces, _ = self.known
         found = np.zeros((near.gap.size, 3))
         if keys.size:
             places = np.minimum(np.searchsorted(keys, near.key), keys.size - 1)
@@ -332,9 +352,9 @@ class FreeBodyStepper:
             found[same] = forces[places[same]]
         return found
 
-    def _keep(self, near: NearContacts, force: np.ndarray):
+    def _keep(self, near: NearContacts, force: np.ndarray, expected: np.ndarray):
         order = np.argsort(near.key)
-        self.known = near.key[order], force[order]
+        self.known = KnownContacts(near.key[order], force[order], expected)
 
     @property
     def gap_count(self) -> int:
@@ -343,7 +363,7 @@ class FreeBodyStepper:
 
     def gap_forces(self) -> np.ndarray:
         """Normal forces (g,) of all gaps in the last step [N]."""
-        normal, (key, force) = np.zeros(self.gap_count), self.known
+        normal, (key, force, _) = np.zeros(self.gap_count), self.known
         normal[self.table.gap_places(key)] = force[:, 0]
         return normal
 
@@ -368,10 +388,11 @@ def rates(near: NearContacts, twists: np.ndarray) -> np.ndarray:
 @cache
 def block_contact_solver() -> BlockContactSolver:
     """Machine code of the contact problem, made once on a machine."""
+    return from_disk((BlockContactSolver, ROUNDS), lambda: BlockContactSolver(block_contact_laws()))
 
-    def make() -> BlockContactSolver:
-        laws = contact_solver()
-        functions = laws.normal, laws.friction, laws.project_normal, laws.project_friction
-        return BlockContactSolver(BlockContactLaws(*functions, ROUNDS))
 
-    return from_disk((BlockContactSolver, ROUNDS), make)
+@cache
+def block_contact_laws() -> BlockContactLaws:
+    """Laws of contact and friction of the block-sparse problem."""
+    laws = contact_solver()
+    return BlockContactLaws(laws.normal, laws.friction, laws.project_normal, laws.project_friction, ROUNDS)

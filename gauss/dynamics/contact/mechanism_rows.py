@@ -132,7 +132,7 @@ class MechanismRows:
 
     def start(self, near: NearContacts, rows: StepRows, known) -> np.ndarray:
         """Forces (n,) of the last step in units of the rows; zero of new contacts."""
-        keys, forces, others = known
+        keys, forces, others, _ = known
         found, g = np.zeros((near.gap.size, 3)), len(self.others)
         if keys.size:
             places = np.minimum(np.searchsorted(keys, near.key), keys.size - 1)

@@ -13,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.dynamics.conditions import smooth_system
-from gauss.dynamics.contact.compiled_mechanism_step import CompiledStepMemory, LoopOfSteps
+from gauss.dynamics.contact.compiled_mechanism_step import KnownForces, MechanismMemory
+from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep
 from gauss.dynamics.contact.contact_step import ContactProblem
 from gauss.dynamics.contact.force_responses import ForceResponses
@@ -80,11 +81,12 @@ class MechanismStep(NamedTuple):
 
 
 class _FreeStep(NamedTuple):
-    """Terms after the share of a step, compliance H, accelerations and power without contact forces."""
+    """Terms after the share of a step, compliance H, accelerations without forces, with loads, and power of these."""
 
     q: np.ndarray
     terms: MechanismTerms
     H: np.ndarray
+    offset: np.ndarray
     acceleration: np.ndarray
     power: np.ndarray
 
@@ -126,7 +128,7 @@ class MechanismStepper:
             "contact_unit": self.rows.contact_unit,
         }
         self.record = ModeRecord(len(self.rows.elements))
-        self.memory = CompiledStepMemory(self) if self.compliance.is_single else None
+        self.memory = MechanismMemory(self) if self.compliance.is_single else None
         self.forget()
 
     @property
@@ -176,18 +178,19 @@ class MechanismStepper:
         self.detection.connect()
         self.inputs[:] = 0.0
         count = len(self.rows.others) + self.rows.limit.size
-        self.known = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(count)
+        nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        self.known = KnownForces(*nothing, np.zeros(count), 0.0)
         self.record.forget()
         if self.memory is not None:
             self.memory.connect()
 
     @property
-    def known(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Forces of the last step: keys of its contacts in order, forces (m, 3) of these, and of other constraints."""
+    def known(self) -> KnownForces:
+        """Forces of the last step."""
         return self._known if self.memory is None else self.memory.known
 
     @known.setter
-    def known(self, found: tuple[np.ndarray, np.ndarray, np.ndarray]):
+    def known(self, found: KnownForces):
         if self.memory is None:
             self._known = found
         else:
@@ -238,6 +241,7 @@ class MechanismStepper:
             speed = max(self._speed(begun, state.v), self._speed(begun, state.v + h * begun.acceleration))
             near = self._near(state, begun, speed, h, share)
             rows = self.rows.of(begun.terms, near)
+            begun = self._at_later_rates(begun, state, rows, near, h, share)
             if share == self.shares[-1] or not self._impacts(rows, begun, h, rest, share).any():
                 break
         for _ in range(ATTEMPTS):
@@ -260,7 +264,8 @@ class MechanismStepper:
         driven = work[~lossy].sum() + self._prescribed_power(rows, begun, acceleration, middle, force)
         power = begun.power + np.array([driven, 0.0, -work[lossy].sum()])
         contacts, others = self.rows.split(rows, near, force * rows.unit)
-        self._keep(near, contacts, others)
+        order = np.argsort(near.key)
+        self.known = KnownForces(near.key[order], contacts[order], others, share)
         name = partial(self.rows.name, near)
         paradoxes = paradoxes_of_step(rows, begun.H, begun.acceleration, force, self.slow(state.v), name)
         hits = self._impacts(rows, begun, h, rest, share)
@@ -279,10 +284,19 @@ class MechanismStepper:
         terms = kernels.terms(t, q, state.v, self.inputs)
         H, offset = self.compliance.of(terms)
         acceleration, power = H @ terms.tau + offset, terms.power
-        if share:
-            ahead = kernels.forces(np.concatenate([[t], q, state.v + (share * h) * acceleration, self.inputs]))
-            acceleration, power = H @ ahead[:-3] + offset, ahead[-3:]
-        return _FreeStep(q, terms, H, acceleration, power)
+        return _FreeStep(q, terms, H, offset, acceleration, power)
+
+    def _at_later_rates(
+        self, begun: _FreeStep, state: State, rows: StepRows, near: NearContacts, h: float, share: float
+    ) -> _FreeStep:
+        """Accelerations and power at the rates after the share, where the forces of the last step are expected."""
+        if not share:
+            return begun
+        acceleration, t = begun.acceleration, state.t + share * h
+        if self.known.share:
+            acceleration = acceleration + begun.H @ (rows.K.T @ self.rows.start(near, rows, self.known))
+        ahead = self.kernels.forces(np.concatenate([[t], begun.q, state.v + (share * h) * acceleration, self.inputs]))
+        return begun._replace(acceleration=begun.H @ ahead[:-3] + begun.offset, power=ahead[-3:])
 
     def _speed(self, begun: _FreeStep, v: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
@@ -334,13 +348,11 @@ class MechanismStepper:
             refuse_jam(state.t, rows, begun.H, begun.terms.M.diagonal(), force, after, name)
         return force, added, error
 
-    def _keep(self, near: NearContacts, force: np.ndarray, others: np.ndarray):
-        order = np.argsort(near.key)
-        self.known = near.key[order], force[order], others
-
     def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Forces over a step from a state, as of :meth:`forces_of`."""
-        return self.forces_of(self.python_step(state, h))
+        """Forces over a step from a state, as of :meth:`forces_of`; it expects its own forces."""
+        self.known = self.known._replace(share=0.0)
+        found = self.python_step(state, h)
+        return self.forces_of(self.python_step(state, h) if self.known.share else found)
 
     def forces_of(self, step: MechanismStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""
@@ -355,7 +367,7 @@ class MechanismStepper:
 
     def gap_forces(self) -> np.ndarray:
         """Normal forces (g,) of all gaps in the last step [N]."""
-        return self.rows.normal_forces(*self.known)
+        return self.rows.normal_forces(*self.known[:3])
 
     def gaps_at(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
         """Gaps that are closed or negative (m,), in their units; their Jacobian, the compliance, and their names."""

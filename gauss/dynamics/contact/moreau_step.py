@@ -1,8 +1,9 @@
 """Step of Moreau–Jean time stepping: ḋ⁺ = ḋ + h (J q̈ + (1 − s) J̇ q̇) with q̈ = q̈_free + M⁻¹ Jᵀ f, mean values over h.
 
 Coordinates move with the rates before the step over a share s of it; forces are evaluated there, rate-dependent ones at
-rates that the free accelerations have changed by then; the rest of the way takes the rates after the step (midpoint rule:
-Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). With an impact s = 0. A gap that would close within the step
+rates that the free accelerations and the contact forces of the last step have changed by then; the rest of the way takes the
+rates after the step (midpoint rule: Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). With an impact s = 0.
+Impulses of an impact are no forces of the step after it, which expects none. A gap that would close within the step
 closes at its end, ḋ⁺ ≥ −d/((1 − s) h); one with an impact opens with e times its speed (Moreau 1988; Stewart, Trinkle 1996).
 Friction and set-valued elements act on the rates after the step. The forces f solve the problem of
 :mod:`gauss.dynamics.contact.contact_step`.
@@ -19,7 +20,7 @@ from gauss.codegen import Expression, Scalar, write
 from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import contact_scales, gap_scales
-from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver
+from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, laws_of
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.impact import jammed_error, resting
 from gauss.dynamics.contact.paradox import (
@@ -116,18 +117,30 @@ class MoreauStepper:
         """Responses of the system without unilateral and set-valued elements."""
         return ForceResponses(self.smooth, self.backend)
 
-    def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> MoreauStep:
-        """Step of length h; ``start`` (n,) are initial guesses of the forces.
+    def step(
+        self, state: State, h: float, start: np.ndarray | None = None, last: bool = False, before: float = 0.0
+    ) -> MoreauStep:
+        """Step of length h; ``start`` (n,) are the forces of the last step, ``before`` its share s.
+
+        Without them it is made twice, so that it expects its own forces.
 
         Raises
         ------
         SimulationError
             If shapes overlap unseen by their gap functions, or no forces are found.
         """
-        rest = self.rest(state.v)
+        if start is not None:
+            return self._step(state, h, start, last, before)
+        found = self._step(state, h, np.zeros(self.unit.size), last, 0.0)
+        return self._step(state, h, found.force, last, found.share) if found.share else found
+
+    def _step(self, state: State, h: float, start: np.ndarray, last: bool, before: float) -> MoreauStep:
+        rest, force = self.rest(state.v), start / self.unit
         for share in self.shares:
             at = advance_positions(self.system, state, h, share)
-            touch, free = self.relative(self.kernel(at)), self._free(at, h, share, last)
+            touch = self.relative(self.kernel(at))
+            pushed = force != 0.0 if before and share else np.zeros(force.size, dtype=bool)
+            free = self._free(at, h, share, touch.J[pushed].T @ force[pushed], last)
             if not any(self.hits(touch, free.acceleration, h, rest, share)):
                 break
         self._refuse_overlap(touch, state)
@@ -135,7 +148,7 @@ class MoreauStepper:
             row = int(np.flatnonzero(~np.isfinite(touch.J).all(axis=1))[0])
             name = [*self.names, *self.sliding, *self.system.scene.set_valued][row]
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
-        force, m = np.zeros(touch.rate.size) if start is None else start / self.unit, touch.width.size
+        m = touch.width.size
         after = self.without_forces(touch, free.acceleration, h, rest, share)
         scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
@@ -177,10 +190,13 @@ class MoreauStepper:
         """Tangential speed below which a contact may stick, for rates v, numbers or expressions; in units of the scene."""
         return sliding_above(self.system, v) * self.system.scale.time / self.system.scale.length
 
-    def _free(self, at: State, h: float, share: float, last: bool) -> Rates:
-        """Accelerations without contact forces, at the rates that they lead to after the share."""
+    def _free(self, at: State, h: float, share: float, expected: np.ndarray, last: bool) -> Rates:
+        """Accelerations without contact forces, at the rates after the share, with the generalised forces expected."""
         if share:
-            at = advance_rates(at, self.responses.free(at).acceleration, h, share)
+            acceleration = self.responses.free(at).acceleration
+            if expected.any():
+                acceleration = acceleration + self.responses.of(at, expected[None])[0]
+            at = advance_rates(at, acceleration, h, share)
         return self.responses.free(at, last)
 
     @property
@@ -380,23 +396,6 @@ def shortest_edge(scene: Scene, contact: Contact) -> float:
     """Shortest edge [m] of the boxes of a contact."""
     shapes = (scene.shapes[name] for name in (contact.shape, contact.other))
     return min(min(shape.size) for shape in shapes if isinstance(shape, Box))
-
-
-def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
-    """Laws of some rows, in ascending order."""
-    kept = np.isin(laws.under, rows)
-
-    def place(which: np.ndarray) -> np.ndarray:
-        return np.searchsorted(rows, which)
-
-    return ContactLaws(
-        normal=place(laws.normal[np.isin(laws.normal, rows)]),
-        across=place(laws.across[kept]),
-        under=place(laws.under[kept]),
-        friction=laws.friction[kept],
-        set_valued=place(laws.set_valued),
-        limit=laws.limit,
-    )
 
 
 def moreau_stepper(system: System, backend: str | Backend | type = "auto") -> MoreauStepper:

@@ -115,11 +115,12 @@ class CompiledMoreauRun(CompiledFixedRun):
         """
         run, begin = self.python_steps, self.layout.point(packed)
         method_state = method_state_of(begin)
-        run.force, h = method_state[:-1], t - begin.state.t
+        run.force, run.share, h = method_state[:-2], float(method_state[-2]), t - begin.state.t
         rates, share = run.rates_over(begin.state, h)
         found, _ = time_step(KnownRates(run.system, rates, share), begin, h)
         state = run.project(replace(found.state, t=t))
-        return self._pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
+        method_state = np.array([*run.force, share, max(method_state[-1], run.error)])
+        return self._pack(Point(state, found.work, rates, method_state))
 
     def _is_confirmed(self) -> bool:
         point = self.layout.point(self.point)

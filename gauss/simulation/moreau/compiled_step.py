@@ -1,7 +1,7 @@
 """Compiled step of Moreau–Jean time stepping, traced from the equations of one step, for compiled loops of fixed steps.
 
-The method state is the contact forces of the last step, from which the solver of the next one starts, and the largest
-residual of the contact and friction laws so far.
+The method state is the contact forces of the last step, from which the solver of the next one starts, the share of that step
+in which coordinates moved with the rates before it, and the largest residual of the contact and friction laws so far.
 """
 
 from typing import TYPE_CHECKING
@@ -11,7 +11,13 @@ import numpy as np
 from gauss import math
 from gauss.codegen import write
 from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop
-from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
+from gauss.dynamics.contact.moreau_step import (
+    MIDPOINT,
+    MISSED_CLOSING_RATE,
+    MoreauStepper,
+    advance_positions,
+    advance_rates,
+)
 from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_steps.loop_functions import batch_loop
@@ -41,15 +47,16 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         v, before = point.state.v, method_state[:n] * (1.0 / stepper.unit)
         state, rest = advance_positions(system, point.state, h, share), stepper.rest(v)
         touch, (mechanism, first) = stepper.relative(stepper.kernel.written(state)), program.instant(state)
-        _, free = program.instant(advance_rates(state, first.acceleration, h, share))
         H = stepper.compliance(mechanism)
+        expected = H @ (touch.J.T @ before) * (method_state[n] * (1.0 / MIDPOINT))  # zero after an impact
+        _, free = program.instant(advance_rates(state, first.acceleration + expected, h, share))
         after = stepper.without_forces(touch, free.acceleration, h, rest, share)
         limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
         jam, rates = stepper.forbids(state, added), stepper.over(state, touch, free, v, h, force, added)
         found, _ = time_step(KnownRates(system, rates, share), point, h)
-        forces = [*(force * stepper.unit), math.maximum(method_state[n], error)]
+        forces = [*(force * stepper.unit), share, math.maximum(method_state[n + 1], error)]
         end = Point(program.on_trains(found.state), found.work, rates, np.array(forces, dtype=object))
         packed, violation = layout.pack(end), [0.0]
         packed, violation = program.projected(packed) if program.projects else (packed, violation)
@@ -81,4 +88,4 @@ def compiled_batch(
 
 def method_state_size(stepper: MoreauStepper) -> int:
     """Numbers of the method state."""
-    return stepper.lossy.size + 1
+    return stepper.lossy.size + 2

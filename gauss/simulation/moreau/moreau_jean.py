@@ -52,6 +52,7 @@ class MoreauRun(PythonRun):
         self.h, self.relaxed, self.error = step, 0, 0.0
         self.paradoxes = ParadoxWarnings()
         self.force: np.ndarray | None = None
+        self.share = 0.0  # of the last step
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
@@ -71,8 +72,8 @@ class MoreauRun(PythonRun):
 
     def rates_over(self, state: State, h: float) -> tuple[Rates, float]:
         """Mean accelerations and powers over a step of length h from a state, and the share s of the old rates."""
-        step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end)
-        self.force, self.relaxed = step.force, self.relaxed + (step.error is None)
+        step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end, before=self.share)
+        self.force, self.share, self.relaxed = step.force, step.share, self.relaxed + (step.error is None)
         self.error = max(self.error, step.error or 0.0)
         self.paradoxes.warn(step.paradoxes, state.t, self.stepper.owner)
         return Rates(step.acceleration, step.power), step.share

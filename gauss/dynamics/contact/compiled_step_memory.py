@@ -1,0 +1,116 @@
+"""Working memory of compiled steps with contacts, and the loop of steps that works on it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.codegen.kernels import CompiledSteps, MemoryLayout, address
+from gauss.codegen.kernels.step_memory import CHANGE, FINISHED, LOOP_SETTINGS, RESULTS, STEP_SETTINGS
+from gauss.dynamics.contact.contact_changes import ModeChange, ModeRecord
+from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.system import State, System
+
+DETECTED = ("body", "pair", "kind", "feature", "found", "count", "own", "signs", "deepest", "moved", "rows", "depth")
+RECORDED = ("modes", "next_modes", "closed", "fresh", "counts")
+
+
+class LoopOfSteps(NamedTuple):
+    """Steps that machine code took one after the other.
+
+    Attributes
+    ----------
+    steps : int
+        Finished steps.
+    largest : float
+        Largest error of the laws of contact, in units of the scene.
+    changes : list of ModeChange
+        Changes of the contact mode.
+    doubtful : bool
+        Whether the last of them has sliding contacts that are to be examined for Painlevé's paradox.
+    """
+
+    steps: int
+    largest: float
+    changes: list[ModeChange]
+    doubtful: bool
+
+
+class CompiledStepMemory:
+    """Arrays of the compiled steps of one system.
+
+    Parameters
+    ----------
+    code : CompiledSteps
+        Machine code of the steps.
+    layout : MemoryLayout
+        Names of the arrays.
+    sizes : dict
+        Sizes of the scene.
+    extra : dict
+        Names of views of working memory, and their places after other arrays: (array, place).
+    """
+
+    record: ModeRecord
+    detection: NearDetection
+    integers: dict[str, np.ndarray]
+    first_settings: np.ndarray
+    loop_settings: np.ndarray
+    version = -1
+
+    def __init__(self, code: CompiledSteps, layout: MemoryLayout, sizes: dict[str, int], extra: dict[str, tuple[str, int]]):
+        self.code, self.layout, self.sizes = code, layout, sizes
+        lengths = layout.slots(sizes)
+        ends = np.cumsum([0, *lengths.values()])
+        self.work = np.zeros(ends[-1] + 1)
+        offsets = dict(zip(lengths, ends.tolist(), strict=False))
+        for name, (array, place) in extra.items():
+            offsets[name] = offsets[array] + place
+        self.ints = np.array([*(sizes[name] for name in layout.sizes), *offsets.values()], dtype=np.int64)
+        self.at = {name: self.work[offsets[name] : offsets[name] + length] for name, length in lengths.items()}
+
+    def set_first(self, system: System, resting: float, sliding: float, share: float, names: tuple, constants: dict):
+        """Settings of a step by their names, and of the loop, before its first step."""
+        loop = {"pace": 1.0 / system.scale.time, "resting": resting, "sliding": sliding, "shares": share, "recorded": 1.0}
+        self.first_settings = np.array([constants.get(name, 0.0) for name in names])
+        self.loop_settings = np.array([loop.get(name, 0.0) for name in LOOP_SETTINGS])
+        self.at["own"][:] = 1.0 / system.scale.coordinates
+
+    def kernels(self) -> dict[str, int]:
+        """Addresses of kernels of the scene."""
+        return {}
+
+    def connect(self):
+        """Take all addresses anew: a new motion may run in another tier."""
+        self.version = self.detection.version
+        arrays = {**self.integers, **{name: getattr(self.detection, name) for name in DETECTED}}
+        arrays["near_settings"] = self.detection.settings
+        arrays |= {name: getattr(self.record, name) for name in RECORDED}
+        found = {name: array.ctypes.data for name, array in arrays.items()} | self.kernels()
+        self.addresses = np.array([found[name] for name in self.layout.addresses], dtype=np.int64)
+        self.given = self.ints.ctypes.data, self.addresses.ctypes.data, self.work.ctypes.data
+
+    def advance(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
+        """Steps from a state and its work to some times, as far as machine code finishes them.
+
+        Parameters
+        ----------
+        state, work : State, ndarray
+            Where they begin.
+        ends : ndarray, shape (k,)
+            Ends of the steps [s].
+        rows : ndarray, shape (k, 4 + n_q + n_v)
+            Destination of (t, q, v, work) at these ends.
+        """
+        if self.version != self.detection.version:
+            self.connect()
+        at, record = self.at, self.record
+        at["q"][:], at["v"][:] = state.q, state.v
+        at["settings"][:], at["settings"][STEP_SETTINGS.index("t")] = self.first_settings, state.t
+        at["loop"][:], at["work"][:] = self.loop_settings, work
+        before = record.kept()
+        self.code.advance(*self.given, ends.size, address(ends), address(rows))
+        _, _, changed, count = record.counts.tolist()
+        changes = record.recorded(at["changes"][: CHANGE * changed], before)
+        ended = int(self.integers["status"][0]) == FINISHED
+        doubtful = ended and bool(at["results"][RESULTS.index("doubtful")])
+        return LoopOfSteps(count, float(at["loop"][LOOP_SETTINGS.index("largest")]), changes, doubtful)
