@@ -7,9 +7,11 @@ Run it with:
 Pinocchio and MuJoCo give these functions to Python one state at a time: their time stands beside each of ours. Where
 joints close loops, the functions are those of the spanning tree, for all engines. The difference is the largest one to
 Pinocchio's results, in the rates of gauss, relative to the largest number. CPU time of the process; medians of rounds.
-Writes benchmarks/results/functions.csv and .md.
+Beside the rows below the goals of 4 × and 20 × stand the operations of the function, the bytes of its result, and the time
+to fill the result of the batch with zeros. Writes benchmarks/results/functions.csv and .md.
 """
 
+import ctypes
 import os
 from typing import Any
 
@@ -30,17 +32,21 @@ import gauss  # noqa: E402
 from benchmarks.command import command, load_at_the_end  # noqa: E402
 from benchmarks.latency.scenes import FEET, biped  # noqa: E402
 from gauss.analysis.crosscheck.pinocchio_ import Configuration, Twin, twin  # noqa: E402
-from gauss.bench.contest import OURS, Competitor, difference, interleaved  # noqa: E402
+from gauss.bench.contest import OURS, Competitor, difference, duration, interleaved  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head, in_time  # noqa: E402
+from gauss.codegen.machine import load  # noqa: E402
 from gauss.dynamics.kinematics import kinematics  # noqa: E402
+from gauss.dynamics.state_functions import traced_function  # noqa: E402
 from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree  # noqa: E402
 from gauss.io.mjcf.write import to_mjcf  # noqa: E402
 from gauss.system import State, System, random_state  # noqa: E402
 
 CALLS, BATCH = 256, 4096
-PAD = 8  # doubles between rows: rows at multiples of 2048 bytes would share few sets of the cache
-PINOCCHIO, MUJOCO, LOOP, MANY = "Pinocchio", "MuJoCo", "loop", "batch"
+PINOCCHIO, MUJOCO, LOOP, MANY, FILL = "Pinocchio", "MuJoCo", "loop", "batch", "fill"
+ONCE_GOAL, MANY_GOAL = 4.0, 20.0  # ratios to the best peer of one call, and in batch on trees
+TREES = "Panda", "UR5", "Talos"
+DGEMM_SIZE = 512
 COMPETITORS = OURS, LOOP, MANY, PINOCCHIO, MUJOCO
 MECHANISMS: dict[str, Callable[[], gauss.Scene]] = {
     "Panda": lambda: gauss.load("robot:panda", mimic=False),
@@ -213,11 +219,13 @@ def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
         arguments = [given[one].copy() for one in wrapper.interface.vectors]
         batches = [np.tile(one, (BATCH, 1)) for one in arguments]
         out = ours(*batches)
+        parts = out if isinstance(out, tuple) else (out,)
         loop = _loop(wrapper, arguments)
         tasks = {
             OURS: Competitor(lambda f=ours, x=arguments: _repeat(f, x), CALLS),
             LOOP: Competitor(loop, CALLS),
             MANY: Competitor(lambda f=ours, x=batches, out=out: f(*x, out), BATCH),
+            FILL: Competitor(lambda parts=parts: [part.fill(0.0) for part in parts], BATCH),
             PINOCCHIO: Competitor(lambda f=theirs: _repeat(f, (others,)), CALLS),
         }
         if others.model is not None and function in BY_MUJOCO:
@@ -227,8 +235,22 @@ def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
         found = np.concatenate([np.ravel(part) for part in (found if isinstance(found, tuple) else (found,))])
         expected = None if result is None else np.ravel(result(theirs(others), others))
         line: dict[str, str | float] = {"mechanism": name, "function": function}
-        line |= {task: median(seconds[task]) if task in seconds else np.nan for task in COMPETITORS}
+        line |= {task: median(seconds[task]) if task in seconds else np.nan for task in (*COMPETITORS, FILL)}
+        line |= {"bytes": sum(part.nbytes for part in parts) / BATCH, "operations": _operations(system, full)}
         yield line | {"agreement": np.nan if expected is None else difference(found, expected)}
+
+
+def _operations(system: System, function: str) -> float:
+    """Operations of a function, a multiplication and an addition each; NaN of forward dynamics, a program of functions."""
+    if function == "forward_dynamics":
+        return np.nan
+    return float(sum(traced_function(system, (function,))[0].operations().values()))
+
+
+def _dgemm() -> float:
+    """Operations of a product of matrices a second."""
+    A = np.random.default_rng(0).standard_normal((DGEMM_SIZE, DGEMM_SIZE))
+    return 2.0 * DGEMM_SIZE**3 / min(duration(lambda: A @ A) for _ in range(9))
 
 
 def _repeat(function: Callable, arguments):
@@ -236,12 +258,35 @@ def _repeat(function: Callable, arguments):
         function(*arguments)
 
 
+LOOP_TEXT = """
+define void @"loop"(i64 %count, void (double*, double*)* %f, double* %in, i64 %n_in, double* %out, i64 %n_out) {
+entry:
+  br label %body
+body:
+  %k = phi i64 [0, %entry], [%next, %body]
+  %place_in = mul i64 %k, %n_in
+  %place_out = mul i64 %k, %n_out
+  %given = getelementptr double, double* %in, i64 %place_in
+  %found = getelementptr double, double* %out, i64 %place_out
+  call void %f(double* %given, double* %found)
+  %next = add i64 %k, 1
+  %done = icmp eq i64 %next, %count
+  br i1 %done, label %end, label %body
+end:
+  ret void
+}
+"""
+
+
 def _loop(wrapper, arguments) -> Callable:
     """Run one state after the other in machine code."""
-    stride = CALLS + PAD
-    inputs = np.tile(np.concatenate([*arguments, [0.0]])[:, None], stride)
-    outputs = np.empty((wrapper.n_out + len(wrapper.interface.limits), stride))
-    return lambda: wrapper.compute.run.call(CALLS, inputs.ctypes.data, stride, outputs.ctypes.data, stride)
+    inputs = np.tile(np.concatenate([*arguments, [0.0]]), (CALLS, 1))
+    outputs = np.empty((CALLS, wrapper.compute.outputs))
+    integer, pointer = ctypes.c_int64, ctypes.c_void_p
+    loop = load(LOOP_TEXT).entry("loop", ctypes.CFUNCTYPE(None, integer, pointer, pointer, integer, pointer, integer))
+    address = ctypes.cast(wrapper.compute.run.call, pointer)
+    given = CALLS, address, inputs.ctypes.data, inputs.shape[1], outputs.ctypes.data, outputs.shape[1]
+    return lambda kept=(inputs, outputs): loop.call(*given)
 
 
 def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
@@ -253,6 +298,7 @@ def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
             for line in rows(name, gauss.compile_scene(make()), rounds):
                 print(name, line["function"], flush=True)
                 found.append(line)
+    conditions.append(f"a product of matrices of {DGEMM_SIZE}: {_dgemm() / 1e9:.0f} operations/ns")
     return found, [*conditions, load_at_the_end()]
 
 
@@ -282,7 +328,59 @@ def page(lines: list[dict], conditions: list[str]) -> list[str]:
         "/ batch": "{many:.0f}",
         "difference": "{agreement}",
     }
-    return [*head("Functions of a state", conditions), *formatted_table(titles, made), ""]
+    profiled = below(lines) if FILL in lines[0] else []  # tables of before do not hold it
+    return [*head("Functions of a state", conditions), *formatted_table(titles, made), "", *profiled, ""]
+
+
+WHY = f"""\
+A goal leaves a function the time of the best peer, divided by {ONCE_GOAL:g} or {MANY_GOAL:g}. Two figures say what stands
+against it. *needed*: operations a nanosecond with which all operations of the function would fit into that time; the head of
+this page says how many a product of matrices reaches, which loads and stores next to nothing, in vectors of all lanes (one
+call has the lanes only where parts of a mechanism are alike). *filled*: the share of that time that it takes to write zeros
+to the result and nothing else; from 100 % on no function of this result can meet the goal. The results of a batch are dense
+arrays (n, …) in C order, structural zeros included, and larger than the caches; the peers leave theirs, of one state, in the
+nearest cache."""
+
+
+def below(lines: list[dict]) -> list[str]:
+    """Section of the rows that do not meet the goals, and what stands against it."""
+    rows = []
+    for line in lines:
+        best = np.nanmin([float(line[PINOCCHIO]), float(line[MUJOCO])])
+        many = [(MANY, MANY_GOAL)] if line["mechanism"] in TREES else []
+        for case, goal in [(OURS, ONCE_GOAL), *many]:
+            if best < goal * float(line[case]):
+                rows.append(_below(line, case, best, goal))
+    titles = {
+        "mechanism": "{mechanism}",
+        "function": "`{function}`",
+        "": "{case}",
+        "best peer / gauss": "{ratio:.1f}",
+        "operations": "{operations}",
+        "operations/ns": "{rate}",
+        "needed": "{needed}",
+        "bytes of the result": "{bytes:.0f}",
+        "filled": "{filled}",
+    }
+    return ["## Below the goals", "", *WHY.split("\n"), "", *formatted_table(titles, rows)]
+
+
+def _below(line: dict, case: str, best: float, goal: float) -> dict:
+    """Row of the section of a function that does not meet a goal."""
+    seconds, left = float(line[case]), best / goal
+    operations, filled = float(line["operations"]), float(line[FILL]) / left
+    known = np.isfinite(operations)
+    return {
+        "mechanism": line["mechanism"],
+        "function": line["function"],
+        "case": "one call" if case == OURS else "batch",
+        "ratio": best / seconds,
+        "operations": f"{operations:.0f}" if known else "–",
+        "rate": f"{1e-9 * operations / seconds:.1f}" if known else "–",
+        "needed": f"{1e-9 * operations / left:.1f}" if known else "–",
+        "bytes": float(line["bytes"]),
+        "filled": f"{100.0 * filled:.0f} %" if case == MANY else "–",
+    }
 
 
 if __name__ == "__main__":

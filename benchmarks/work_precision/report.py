@@ -4,7 +4,7 @@ import csv
 from dataclasses import astuple, fields
 from pathlib import Path
 
-from benchmarks.work_precision.beaten import beaten, best, rewrite, section
+from benchmarks.work_precision.beaten import WHY, beaten, best, rewrite, section
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table, when_and_where
 from gauss.bench.precision import Attempt
@@ -74,6 +74,8 @@ def write(attempts: AttemptTable, folder: Path, readme: Path, about: str):
         "## Where another engine is faster",
         "",
         *beaten(attempts.found),
+        "",
+        *WHY.split("\n"),
         "",
         "## Failures",
         "",

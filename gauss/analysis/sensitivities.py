@@ -103,7 +103,8 @@ def sensitivities(
     inputs : array_like, shape (steps, n_u), optional
         Inputs held in each step, in the order of the scene; zero when not given.
     parameters : sequence of str
-        Parameters, as "mass:arm" or "stiffness:spring"; see :meth:`gauss.System.parameter_derivatives`.
+        Parameters, as "mass:arm" or "stiffness:spring"; see :meth:`gauss.System.parameter_derivatives`. Lengths of loops are
+        refused: with another length the start does not close them.
     integrator : str
         Explicit Runge–Kutta method with fixed steps: "rk4", "dopri5" or "dop853". A motion with events is that of
         :func:`gauss.simulate`, and its derivatives are exact to the order of this method.

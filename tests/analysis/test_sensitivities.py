@@ -6,6 +6,7 @@ import pytest
 import gauss
 from gauss.dynamics.motion_step import TABLEAUS
 from gauss.errors import ArgumentError, SimulationError, StateError
+from tests.dynamics.test_parameter_terms import with_moved_joint
 
 ACCURACY = 1e-8  # of extrapolated differences, relative to the largest derivative of the motion
 DIFFERENCE = 2e-3  # largest of the differences that are extrapolated, in the unit of what is changed
@@ -104,6 +105,26 @@ def test_derivatives_by_parameters_are_those_of_other_scenes(name, body):
     by_mass, by_gravity = found.parameters[f"mass:{body}"], found.parameters["gravity"]
     close(by_mass[-1][:, 0], derivative(heavier), accuracy=accuracy)
     close(by_gravity[-1][:, down], derivative(pulled), accuracy=accuracy)
+
+
+@pytest.mark.parametrize("where", ["parent_at", "child_at"])
+def test_derivatives_by_lengths_of_a_tree(where):
+    system = gauss.compile_scene(gauss.load("double_pendulum"))
+    start, parameter = system.initial_state(), f"{where}:B"
+    found = gauss.sensitivities(system, SPAN, step=STEP, parameters=[parameter]).parameters[parameter][-1]
+    wanted = [
+        derivative(lambda e, axis=axis: end(with_moved_joint(system, where, "B", e * axis), start)) for axis in np.eye(3)
+    ]
+    close(found, np.array(wanted).T)
+
+
+@pytest.mark.parametrize("parameter", ["child_at:D", "parent_at:B"])
+@pytest.mark.parametrize("call", ["sensitivities", "motion_gradient"])
+def test_lengths_of_loops_are_refused(parameter, call):
+    """A start that closes the loops closes them for no other length."""
+    loss = [] if call == "sensitivities" else [lambda q, v: q[0]]
+    with pytest.raises(ArgumentError, match=parameter):
+        getattr(gauss, call)(gauss.load("four_bar"), SPAN, *loss, step=STEP, parameters=[parameter])
 
 
 def test_gradients_by_inputs_are_those_of_held_tables():

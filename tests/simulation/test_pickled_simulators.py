@@ -115,3 +115,41 @@ def test_other_processes_continue_simulators():
     for simulator, there in zip(made, found, strict=True):
         for one, other in zip(_moved(simulator, 5), there, strict=True):
             np.testing.assert_array_equal(one, other)
+
+
+def _used(thing):
+    """What another process finds with it."""
+    if isinstance(thing, gauss.System):
+        return gauss.simulate(thing, 0.02, progress=False).q[-1]
+    if isinstance(thing, gauss.Trajectory):
+        return thing.body(thing.system.structure.bodies[-1]).position[-1]
+    if isinstance(thing, gauss.Simulator):
+        thing.step(n=3)
+        return thing.coordinates[0]
+    return thing.qdd
+
+
+def _all_kinds() -> list:
+    """A system, a motion, a solution and a simulator."""
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    solution = gauss.solve(gauss.assemble(system, system.initial_state()))
+    return [system, gauss.simulate(system, 0.02, progress=False), solution, gauss.Simulator(system, STEP)]
+
+
+@pytest.mark.slow
+def test_a_spawned_pool_uses_all_kinds():
+    with get_context("spawn").Pool(1) as pool:
+        for there, thing in zip(pool.map(_used, _all_kinds()), _all_kinds(), strict=True):
+            np.testing.assert_array_equal(there, _used(thing))
+
+
+@pytest.mark.slow
+def test_joblib_uses_all_kinds_under_laws_without_names():
+    """Workers of loky: functions go by cloudpickle, what they take by pickle."""
+    joblib = pytest.importorskip("joblib")
+    scene = gauss.load("double_pendulum")
+    scene.drive("A", name="motor", torque=lambda t: 0.1 * np.sin(t))
+    things = [*_all_kinds(), gauss.compile_scene(scene)]
+    found = joblib.Parallel(2, backend="loky")(joblib.delayed(lambda one: _used(one))(thing) for thing in things)
+    for there, thing in zip(found, things, strict=True):
+        np.testing.assert_array_equal(there, _used(thing))

@@ -13,6 +13,7 @@ from gauss.analysis.tangents import Tangents
 from gauss.arguments import name_list, real_array
 from gauss.dynamics import compile_scene
 from gauss.dynamics.motion_step import MotionStep
+from gauss.dynamics.parameter_terms import OF_JOINTS
 from gauss.errors import ArgumentError, SimulationError, require
 from gauss.scene import Scene
 from gauss.simulation.tolerances import check_tolerances
@@ -96,6 +97,7 @@ class Motion:
         self.h, self.start = step, system.initial_state() if state is None else state
         require(self.start, (State,), "sensitivities: state")
         self.parameters = name_list(parameters, "sensitivities: parameters")
+        _refuse_lengths_of_loops(system, self.parameters)
         self.integrator, self.system = integrator, system
         shape = self.steps, len(system.scene.inputs)
         self.inputs = np.zeros(shape) if inputs is None else real_array(inputs, "sensitivities: inputs").copy()
@@ -187,3 +189,34 @@ class Motion:
                 f"scene {scene.name!r} cannot be differentiated: events of {', '.join(map(repr, names))} (losses, backlash, "
                 "friction of contacts) have no derivatives here; leave them out, or make them smooth loads."
             )
+
+
+def _refuse_lengths_of_loops(system: System, parameters: tuple[str, ...]):
+    """Raise an ArgumentError for lengths of which loops close: no start that is given closes them for other lengths."""
+    held = _joints_of_loops(system)
+    for parameter in parameters:
+        kind, _, joint = parameter.partition(":") if isinstance(parameter, str) else ("", "", "")
+        if kind in OF_JOINTS and joint in held:
+            raise ArgumentError(
+                f"sensitivities: {parameter!r} is a length of a loop through {', '.join(map(repr, sorted(held)))}: with "
+                "another length the start does not close it. Expected a parameter that leaves the loops closed; derivatives "
+                "of accelerations by lengths of loops are system.parameter_derivatives."
+            )
+
+
+def _joints_of_loops(system: System) -> set[str]:
+    """Names of the joints on the loops that joints outside the spanning tree close."""
+    to, found = {edge.outer: edge for edge in system.structure.tree}, set()
+
+    def path(body: int) -> set[int]:
+        joints = set()
+        while body in to:
+            joints.add(to[body].constraint)
+            body = to[body].inner
+        return joints
+
+    for index in system.structure.closures:
+        if index < len(system.joints):
+            joint = system.joints[index]
+            found |= {index} | (path(joint.parent) ^ path(joint.child))
+    return {system.joints[index].name for index in found}
