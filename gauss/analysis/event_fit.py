@@ -82,8 +82,8 @@ class EventFitProblem(FitProblem):
         )
         centre = self._start(p)
         columns = []
-        for pair, size, by in zip(self._beside(p), self.steps, self.by, strict=True):
-            along = self._slope(centre, pair, size)
+        for pair, size, name, by in zip(self._beside(p), self.steps, self.names, self.by, strict=True):
+            along = self._slope(centre, pair, size, name)
             moved = found.start[self.rows] @ np.linalg.lstsq(found.start[0], along, rcond=None)[0]
             if by is not None:
                 moved = moved + found.parameters[by[0]][self.rows][:, :, by[1]]

@@ -188,7 +188,8 @@ class FitProblem:
     def slopes(self, p: np.ndarray) -> np.ndarray:
         """Derivatives (k n, p) of the fitted values."""
         centre = np.concatenate(self._moved(p))
-        directions = np.array([self._slope(centre, pair, h) for pair, h in zip(self._beside(p), self.steps, strict=True)]).T
+        beside = zip(self._beside(p), self.steps, self.names, strict=True)
+        directions = np.array([self._slope(centre, pair, h, name) for pair, h, name in beside]).T
         _, changes = self.motion(p, directions)
         assert changes is not None
         return changes.reshape(-1, p.size)
@@ -198,11 +199,13 @@ class FitProblem:
         """Differences (p,) of the parameters."""
         return DIFFERENCE * self.units
 
-    def _slope(self, centre: np.ndarray, pair: np.ndarray, h: float) -> np.ndarray:
-        """Derivative of the start and the numbers; one-sided beside parameters that no scene has, as of a thin rod."""
+    def _slope(self, centre: np.ndarray, pair: np.ndarray, h: float, name: str) -> np.ndarray:
+        """Derivative of the start and the numbers by a parameter; one-sided beside values that no scene has."""
         less, more = (self._if_valid(p) for p in pair)
         if less is None and more is None:
-            raise StateError(f"fit_motion: no scene is near {', '.join(self.names)}.")
+            raise StateError(
+                f"fit_motion: {name!r} alone can be neither more nor less, as an inertia of a thin rod: leave it out."
+            )
         width = h * ((less is not None) + (more is not None))
         return ((centre if more is None else more) - (centre if less is None else less)) / width
 
