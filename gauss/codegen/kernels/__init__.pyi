@@ -20,7 +20,7 @@ from gauss.codegen.kernels.energy_record import (
 from gauss.codegen.kernels.explicit import ExplicitTrial, Interpolation, stride
 from gauss.codegen.kernels.first_accepted import FirstAccepted
 from gauss.codegen.kernels.fixed_point import FixedPoint
-from gauss.codegen.kernels.fixed_step import Due, Fixed
+from gauss.codegen.kernels.fixed_step import Due, Fixed, Notes
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
 from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
@@ -63,6 +63,7 @@ __all__ = [
     "CompiledMechanismStep",
     "StepFunctions",
     "Newton",
+    "Notes",
     "FirstAccepted",
     "Pivots",
     "SingleRowFunction",
