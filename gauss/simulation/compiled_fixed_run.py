@@ -72,7 +72,7 @@ class CompiledFixedRun(CompiledRun):
         self._begin(point, loop.evaluate("check", point))
         self.control.every = steps_per_check(method.evaluations)
         pairs = grid_of(method, self.start.t, self.end, step, self.samples, self.switching)
-        out = np.empty((self.budget, self.layout.row))
+        out = self._room()
         self.crossings: dict[int, float] = {}
         self.renewed: set[int] = set()
         self.holds: dict[int, int] = {}
@@ -92,6 +92,10 @@ class CompiledFixedRun(CompiledRun):
             point = self.layout.point(self.point)
             self.point = self._pack(replace(point, rates=self.evaluated(point.state)))
         return super()._is_confirmed()
+
+    def _room(self) -> np.ndarray:
+        """Room of as many samples as one call of the loop writes."""
+        return np.empty((self.budget, self.layout.row))
 
     def _functions(self) -> Fixed:
         """Functions of the step loop."""
@@ -137,9 +141,9 @@ class CompiledFixedRun(CompiledRun):
         given, (point, confirmed, grid, rows) = ctypes.byref(control), arrays
         first = bisect_right(self.stops, int(control.sample))
         for until in (*self.stops[first : first + HELD_SAMPLES], count)[:HELD_SAMPLES]:
-            while control.sample < until and control.rows < len(out):
+            while control.sample < until and max(control.rows, control.notes) < len(out):
                 done = int(control.sample)
-                steps = min(until - done, len(out) - int(control.rows))
+                steps = min(until - done, len(out) - int(max(control.rows, control.notes)))
                 self.loop.entry.call(given, point, confirmed, grid + PAIR_BYTES * done, rows, steps)
                 if control.status != LoopStatus.DONE:
                     return

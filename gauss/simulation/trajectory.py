@@ -171,8 +171,9 @@ class Trajectory:
     stats : Stats
         Statistics.
     events : tuple of Event
-        Impacts and changes of the contact mode. Where every step is returned, an impact has two samples of one time, before
-        and after it; a jump of a prescribed velocity has samples a few units in the last place before and after it.
+        Impacts and changes of the contact mode, by time stepping at the ends of its steps. Where every step is returned, an
+        impact that is located has two samples of one time, before and after it; a jump of a prescribed velocity has samples
+        a few units in the last place before and after it.
     step : float, optional
         Step of time stepping [s].
     settings : dict

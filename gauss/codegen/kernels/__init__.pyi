@@ -20,7 +20,7 @@ from gauss.codegen.kernels.energy_record import (
 from gauss.codegen.kernels.explicit import ExplicitTrial, Interpolation, stride
 from gauss.codegen.kernels.first_accepted import FirstAccepted
 from gauss.codegen.kernels.fixed_point import FixedPoint
-from gauss.codegen.kernels.fixed_step import Due, Fixed
+from gauss.codegen.kernels.fixed_step import Due, Fixed, Notes
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.free_body_step import CompiledFreeBodyStep, FreeBodyFunctions
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
@@ -70,6 +70,7 @@ __all__ = [
     "MemoryLayout",
     "StepFunctions",
     "Newton",
+    "Notes",
     "FirstAccepted",
     "Pivots",
     "SingleRowFunction",

@@ -6,6 +6,7 @@ samples do not change the motion, and have the order of the method.
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import reduce
 
 from gauss.codegen import INTEGER, Function, NativeFunction, Writer
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
@@ -22,6 +23,27 @@ class Due(IntEnum):
     SAMPLE = 1  # step and write a sample
     OFF_GRID_SAMPLE = 2  # write the sample of a step, but continue from the point before
     UNCHECKED = 3  # step, without a check where the call ends
+
+
+@dataclass(frozen=True)
+class Notes:
+    """Steps that are noted, as (t, codes, results), where codes of the point change.
+
+    Parameters
+    ----------
+    codes : slice
+        Their place in a point.
+    results : int
+        Number of further results of the step, its last ones.
+    """
+
+    codes: slice
+    results: int
+
+    @property
+    def size(self) -> int:
+        """Numbers of a note."""
+        return 1 + self.codes.stop - self.codes.start + self.results
 
 
 @dataclass(frozen=True)
@@ -45,6 +67,8 @@ class Fixed:
         Approximate number of evaluations in a step.
     rates : Function or NativeFunction
         Equations of motion: (t, q, v) → rates.
+    notes : Notes or None
+        Steps that are noted, behind the samples in ``out``: where ``notes_at`` of the control says.
     """
 
     size: int
@@ -54,6 +78,7 @@ class Fixed:
     check: Function | NativeFunction
     evaluations: int
     rates: Function | NativeFunction
+    notes: Notes | None = None
 
     def compile(self) -> Loop:
         """Machine code of the loop; its budget is the number of pairs in the grid."""
@@ -63,9 +88,9 @@ class Fixed:
 
 
 def _write(code: LoopCode, method: Fixed):
-    b, size = code.b, method.size
+    b, size, results = code.b, method.size, 0 if method.notes is None else method.notes.results
     point, grid = code.pointer["point"], code.pointer["grid"]
-    reached, error, place = code.buffer(size + 5), code.buffer(len(method.check.outputs)), code.counter(INTEGER(0))
+    reached, error, place = code.buffer(size + 5 + results), code.buffer(len(method.check.outputs)), code.counter(INTEGER(0))
     with code.loop() as leave_if:
         code.set("status", LoopStatus.DONE)
         i = b.load(place)
@@ -97,6 +122,8 @@ def _write(code: LoopCode, method: Fixed):
         with b.if_then(is_sample):
             code.copy(code.row(method.row), reached, method.row)
             code.add("rows")
+        if method.notes is not None:
+            _note(code, method.notes, size, reached, kind)
         with b.if_then(goes_on):
             code.add("steps")
             code.copy(point, reached, size)
@@ -105,6 +132,23 @@ def _write(code: LoopCode, method: Fixed):
         code.add("sample")
         b.store(i, place)
     code.finish()
+
+
+def _note(code: LoopCode, notes: Notes, size: int, reached, kind):
+    """Note a step that changes codes, unless it is a sample beside the grid, or a step of a caller without room."""
+    b, codes = code.b, notes.codes
+    differs = [
+        b.fcmp_unordered("!=", b.load(code.at(reached, k)), b.load(code.at(code.pointer["point"], k)))
+        for k in range(codes.start, codes.stop)
+    ]
+    noted = b.fcmp_ordered("<", kind, code.number(Due.OFF_GRID_SAMPLE))
+    with b.if_then(b.and_(noted, reduce(b.or_, differs))):
+        place = b.add(code.index("notes_at"), b.mul(code.index("notes"), INTEGER(notes.size)))
+        note, count = b.gep(code.pointer["out"], [place]), codes.stop - codes.start
+        b.store(b.load(reached), note)
+        code.copy(code.at(note, 1), code.at(reached, codes.start), count)
+        code.copy(code.at(note, 1 + count), code.at(reached, size + 5), notes.results)
+        code.add("notes")
 
 
 def _project(code: LoopCode, method: Fixed, project: Function, reached):

@@ -76,6 +76,8 @@ class Control(Numbers):
         Energy record, see :mod:`gauss.codegen.kernels.energy_record`.
     rows : float
         Samples written.
+    notes, notes_at : float
+        Steps noted, see :class:`gauss.codegen.kernels.Notes`, and where the first one is written, in numbers.
     sample, samples : float
         Index of the next sample, or of the next grid time, and number of samples; with none, every step is a sample.
     status : float
@@ -111,6 +113,8 @@ class Control(Numbers):
     jump: float = 0.0
     when: float = 0.0
     rows: float = 0.0
+    notes: float = 0.0
+    notes_at: float = 0.0
     sample: float = 0.0
     samples: float = 0.0
     status: float = 0.0

@@ -32,6 +32,7 @@ from gauss.dynamics.contact.paradox import (
     undetermined_sliding,
     with_sliding_friction,
 )
+from gauss.dynamics.contact.step_modes import StepModes
 from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
@@ -67,6 +68,8 @@ class MoreauStep(NamedTuple):
         Contacts with undetermined forces.
     share : float
         Share of the step in which coordinates move with the rates before it.
+    modes : ndarray
+        Modes after it, see :meth:`gauss.dynamics.contact.step_modes.StepModes.after`.
     """
 
     acceleration: np.ndarray
@@ -75,6 +78,7 @@ class MoreauStep(NamedTuple):
     error: float | None
     paradoxes: list[Paradox]
     share: float
+    modes: np.ndarray
 
 
 class MoreauStepper:
@@ -111,6 +115,11 @@ class MoreauStepper:
         )
         self.patterns: dict[bytes, tuple[np.ndarray, ContactLaws]] = {}
         self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [element.lossy for element in set_valued]]).astype(bool)
+
+    @cached_property
+    def modes(self) -> StepModes:
+        """Modes of the elements of the scene."""
+        return StepModes(self)
 
     @cached_property
     def responses(self) -> ForceResponses:
@@ -169,7 +178,9 @@ class MoreauStepper:
         force[rows] = found
         self._refuse_jam(state, at, rows[found != 0.0], responses[found != 0.0], after)
         rates = self.over(at, touch, free, state.v, h, force, acceleration)
-        return MoreauStep(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
+        modes = self.modes.after(touch, free.acceleration, acceleration, force, state.v, h, rest, share).astype(float)
+        paradoxes = self._paradoxes(state, touch, free, force, rows, W / h)
+        return MoreauStep(*rates, force * self.unit, error, paradoxes, share, modes)
 
     def relative(self, touch: ContactTerms) -> ContactTerms:
         """Contact terms in units of the scene; forces that do the same work are divided by these units."""

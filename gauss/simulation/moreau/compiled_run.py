@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss.codegen.kernels import Due, Fixed, LoopStatus
 from gauss.dynamics.contact.moreau_step import moreau_stepper
+from gauss.dynamics.contact.step_modes import UNKNOWN
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.traced_system import Program
@@ -20,6 +21,7 @@ from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.handover import finished
 from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_size
+from gauss.simulation.moreau.contact_events import ContactEvents
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
 from gauss.simulation.problem import Problem
@@ -38,11 +40,15 @@ class CompiledMoreauRun(CompiledFixedRun):
         Loads of the system without these elements.
     program : type
         Makes the functions of that system.
+    events : bool
+        Whether changes of the contact mode are recorded; a simulator has no use for them.
     """
 
-    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program):
+    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program, events: bool = True):
         self.whole, self.stepper = problem, moreau_stepper(problem.system)
         self.stepper.refuse_penetration(problem.start)
+        self.contacts, self.forces = ContactEvents(self.stepper.modes), self.stepper.lossy.size
+        self.codes = self.stepper.modes.codes if events else 0
         super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()), program)
 
     def _beside(self) -> tuple:
@@ -60,8 +66,12 @@ class CompiledMoreauRun(CompiledFixedRun):
         fallback = lambda start, samples: self.python_steps.collect(start, samples, False)  # noqa: E731
         found = replace(finished(self, fallback), system=self.whole.system, step=self.step)
         relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
-        warn_of_laws(float(method_state_of(self.layout.point(self.point))[-1]), relaxed, found.stats.steps)
+        warn_of_laws(self._law_error(), relaxed, found.stats.steps)
         return found
+
+    def _law_error(self) -> float:
+        """Largest residual of the laws of contact and friction so far."""
+        return float(method_state_of(self.layout.point(self.point))[self.forces + 1])
 
     @cached_property
     def python_steps(self) -> MoreauRun:
@@ -77,7 +87,21 @@ class CompiledMoreauRun(CompiledFixedRun):
 
     def _initial_method_state(self) -> tuple[np.ndarray, int]:
         size = method_state_size(self.stepper)
-        return np.zeros(size), size
+        return np.append(np.zeros(size), np.full(self.codes, float(UNKNOWN))), size + self.codes
+
+    def _room(self) -> np.ndarray:
+        """Room of samples; behind it are notes of as many steps."""
+        modes, row = self.stepper.modes, self.layout.row
+        samples, note = self.budget * row, 1 + self.codes + len(modes.elements)
+        room, self.control.notes_at = np.empty(samples + self.budget * note), samples
+        self.notes = room[samples:].reshape(self.budget, note)
+        return room[:samples].reshape(self.budget, row)
+
+    def _gather(self, out: np.ndarray):
+        """Keep samples, and the events of the steps that the loop has noted."""
+        super()._gather(out)
+        notes, self.control.notes = self.notes[: int(self.control.notes)], 0.0
+        self.events += self.contacts.of(notes[:, 0], notes[:, 1:])
 
     def _functions(self) -> Fixed:
         return compiled_steps(self.stepper, self.program)
@@ -100,6 +124,8 @@ class CompiledMoreauRun(CompiledFixedRun):
             control.rows += 1
         if due != Due.OFF_GRID_SAMPLE:
             self.point, control.steps = reached, control.steps + 1
+            self.notes[int(control.notes)] = [t, *self.python_steps.modes]
+            control.notes += 1
         control.sample, control.constraint_residual = control.sample + 1, np.inf  # unchecked
         if int(control.sample) in self.holds:
             self._hold(self.holds[int(control.sample)])
@@ -114,13 +140,13 @@ class CompiledMoreauRun(CompiledFixedRun):
             If the motion cannot continue.
         """
         run, begin = self.python_steps, self.layout.point(packed)
-        method_state = method_state_of(begin)
-        run.force, run.share, h = method_state[:-2], float(method_state[-2]), t - begin.state.t
+        h, method_state, n = t - begin.state.t, method_state_of(begin), self.forces
+        run.force, run.share = method_state[:n], float(method_state[n])
         rates, share = run.rates_over(begin.state, h)
         found, _ = time_step(KnownRates(run.system, rates, share), begin, h)
         state = run.project(replace(found.state, t=t))
-        method_state = np.array([*run.force, share, max(method_state[-1], run.error)])
-        return self._pack(Point(state, found.work, rates, method_state))
+        kept = *run.force, share, max(method_state[n + 1], run.error), *run.modes[: self.codes]
+        return self._pack(Point(state, found.work, rates, np.array(kept)))
 
     def _is_confirmed(self) -> bool:
         point = self.layout.point(self.point)
@@ -131,6 +157,5 @@ class CompiledMoreauRun(CompiledFixedRun):
         """Motion so far."""
         found = super().trajectory()
         relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
-        error = float(method_state_of(self.layout.point(self.point))[-1])
-        method = in_words(self.step, error, relaxed, found.stats.method)
+        method = in_words(self.step, self._law_error(), relaxed, found.stats.method)
         return replace(found, system=self.whole.system, stats=found.stats._replace(method=method), step=self.step)

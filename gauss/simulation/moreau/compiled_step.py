@@ -1,7 +1,8 @@
 """Compiled step of Moreau–Jean time stepping, traced from the equations of one step, for compiled loops of fixed steps.
 
 The method state is the contact forces of the last step, from which the solver of the next one starts, the share of that step
-in which coordinates moved with the rates before it, and the largest residual of the contact and friction laws so far.
+in which coordinates moved with the rates before it, and the largest residual of the contact and friction laws so far; of
+single motions also the contact modes after the step, which events are found from.
 """
 
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import write
-from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop
+from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop, Notes
 from gauss.dynamics.contact.moreau_step import (
     MIDPOINT,
     MISSED_CLOSING_RATE,
@@ -39,6 +40,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
     """
     layout, system, laws = program.layout, program.system, stepper.laws
     tried = len(stepper.shares)
+    noted = layout.memory - method_state_size(stepper)  # codes of contact modes
     slides, n = slice(laws.normal.size, laws.normal.size + laws.across.size), stepper.lossy.size
 
     def step(x, h, share=(0.0,)):
@@ -56,8 +58,11 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         added = H @ (touch.J.T @ force)
         jam, rates = stepper.forbids(state, added), stepper.over(state, touch, free, v, h, force, added)
         found, _ = time_step(KnownRates(system, rates, share), point, h)
-        forces = [*(force * stepper.unit), share, math.maximum(method_state[n + 1], error)]
-        end = Point(program.on_trains(found.state), found.work, rates, np.array(forces, dtype=object))
+        kept, losses = [*(force * stepper.unit), share, math.maximum(method_state[n + 1], error)], np.zeros(0)
+        if noted:
+            modes = stepper.modes.after(touch, free.acceleration, added, force, v, h, rest, share)
+            kept, losses = [*kept, *modes[:noted]], modes[noted:]
+        end = Point(program.on_trains(found.state), found.work, rates, np.array(kept, dtype=object))
         packed, violation = layout.pack(end), [0.0]
         packed, violation = program.projected(packed) if program.projects else (packed, violation)
         normals = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # above 0 without a contact normal
@@ -67,7 +72,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
         unseen = program.watch.passes(point, Point(found.state, found.work, rates))
-        return packed, violation, [1.0, 0.0, doubtful + jam + normals + sum(lost), unseen], hits
+        return packed, violation, [1.0, 0.0, doubtful + jam + normals + sum(lost), unseen, *losses], hits
 
     def check(x):
         point = layout.point(x)
@@ -76,7 +81,9 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
 
     one, check = write(step, layout.size, *[1] * tried, name="moreau_step"), write(check, layout.size, name="check")
     compiled = one if tried == 1 else FirstAccepted(one, stepper.shares)
-    return Fixed(layout.size, layout.row, compiled, program.projection(), check, 1, program.rates)
+    first = layout.row + layout.n_v + 3 + n + 2
+    notes = Notes(slice(first, first + noted), len(stepper.modes.elements)) if noted else None
+    return Fixed(layout.size, layout.row, compiled, program.projection(), check, 1, program.rates, notes)
 
 
 def compiled_batch(
@@ -87,5 +94,5 @@ def compiled_batch(
 
 
 def method_state_size(stepper: MoreauStepper) -> int:
-    """Numbers of the method state."""
+    """Numbers of the method state of a batch, without contact modes."""
     return stepper.lossy.size + 2

@@ -8,11 +8,10 @@ from gauss.codegen.kernels.step_memory import CHANGES_ROOM
 from gauss.dynamics.contact.contact_changes import ModeChange
 from gauss.dynamics.contact.contact_stepper import contact_stepper, new_contact_stepper
 from gauss.errors import GaussError
+from gauss.simulation.moreau.contact_events import event_of
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings
 from gauss.simulation.trajectory import Event
 from gauss.system import State, System
-
-CHANGES = {(0, 1): "closes", (0, 2): "closes", (1, 2): "slips", (2, 1): "holds"}  # kinds of events by the modes
 
 
 class ContactMotionState(NamedTuple):
@@ -141,12 +140,9 @@ class ContactMotion:
         """Keep changes of the contact mode as events, each at the end of its step; those that begin closed are none."""
         names, first = self.stepper.elements, self.stepper.first_set_valued
         for change in changes:
-            hits = change.hit and not change.before
             begins = not change.before and (change.element >= first or times[change.step] == self.start)
-            if hits or not begins:
-                kind = "impact" if hits else CHANGES.get((change.before, change.after), "opens")
-                t, lost = float(times[change.step + 1]), change.lost if hits else 0.0
-                self.events.append(Event(t, kind, (names[change.element],), lost))
+            event = event_of(change, names[change.element], float(times[change.step + 1]), begins)
+            self.events += [] if event is None else [event]
 
     def beside(self, begin: State, work: np.ndarray, t: float) -> tuple[State, np.ndarray]:
         """State and work at a time after a shorter step from another state; the motion does not continue from there."""

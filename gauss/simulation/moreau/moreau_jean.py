@@ -25,6 +25,7 @@ from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.loads import Applied
 from gauss.errors import SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
+from gauss.simulation.moreau.contact_events import ContactEvents
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings, warn_of_laws
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
@@ -50,7 +51,8 @@ class MoreauRun(PythonRun):
         self.stepper = moreau_stepper(system, backend)
         super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
         self.h, self.relaxed, self.error = step, 0, 0.0
-        self.paradoxes = ParadoxWarnings()
+        self.paradoxes, self.contacts = ParadoxWarnings(), ContactEvents(self.stepper.modes)
+        self.modes = self.taken = np.zeros(0)  # of the last step that was computed, and of the last one that was taken
         self.force: np.ndarray | None = None
         self.share = 0.0  # of the last step
 
@@ -64,7 +66,7 @@ class MoreauRun(PythonRun):
     def _first(self, start: State) -> Point:
         """Initial point; accelerations without contact forces are checked in every step."""
         rates, share = self.rates_over(start, self.h)
-        return Point(start, np.zeros(self.powers), rates, np.array([share]))
+        return Point(start, np.zeros(self.powers), rates, np.array([share, *self.modes]))
 
     def evaluate(self, state: State) -> Rates:
         """Mean accelerations and powers over a step from a state."""
@@ -73,7 +75,8 @@ class MoreauRun(PythonRun):
     def rates_over(self, state: State, h: float) -> tuple[Rates, float]:
         """Mean accelerations and powers over a step of length h from a state, and the share s of the old rates."""
         step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end, before=self.share)
-        self.force, self.share, self.relaxed = step.force, step.share, self.relaxed + (step.error is None)
+        self.force, self.share, self.modes = step.force, step.share, step.modes
+        self.relaxed += step.error is None
         self.error = max(self.error, step.error or 0.0)
         self.paradoxes.warn(step.paradoxes, state.t, self.stepper.owner)
         return Rates(step.acceleration, step.power), step.share
@@ -81,16 +84,20 @@ class MoreauRun(PythonRun):
     def over(self, point: Point, h: float) -> tuple[Rates, float]:
         """Rates of a point over a step of length h, and the share s of the old rates."""
         if point.method_state is None or not np.isclose(h, self.h, rtol=EQUAL_STEPS, atol=0.0):
-            return self.rates_over(point.state, h)
+            found = self.rates_over(point.state, h)
+            self.taken = self.modes
+            return found
+        self.taken = point.method_state[1:]
         return point.rates, float(point.method_state[0])
 
     def _projected(self, point: Point, t: float | None) -> Point:
         """End of a step, projected onto the constraints, with the rates of the next step."""
         state = self.project(replace(point.state, t=t))
+        self.events += self.contacts.of([state.t], self.taken[None])
         if state.t >= self.end:
             return Point(state, point.work, point.rates)
         rates, share = self.rates_over(state, self.h)
-        return Point(state, point.work, rates, np.array([share]))
+        return Point(state, point.work, rates, np.array([share, *self.modes]))
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = super()._trajectory(kept, samples, began)

@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from gauss.view.viewer.framing import VIEW, Framing
+from gauss.view.viewer.framing import FIELD, VIEW, Framing
+
+ABOVE = 0.6  # of half an upright picture: height of what is seen, above controls that cover its lower part
 
 CAMERAS = {  # from what is seen to the eye: right, away, up
     "oblique": VIEW,
@@ -16,3 +18,19 @@ def eye(view: Framing, camera: str) -> np.ndarray:
     """Position (3,) of a camera of :data:`CAMERAS` [m], as far from the middle as the first one."""
     direction = CAMERAS[camera] @ np.stack([view.right, view.away, view.up])
     return view.middle + np.linalg.norm(view.eye - view.middle) * direction / np.linalg.norm(direction)
+
+
+def placed_camera(view: Framing, camera: str, aspect: float) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) of a camera, and the point (3,) that it looks at [m], in a picture of some width over its height.
+
+    In an upright picture, as of a telephone, it stands so far away that the width holds the motion, which is seen above the
+    controls.
+    """
+    place, aim = eye(view, camera), view.middle
+    if aspect >= 1.0:
+        return place, aim
+    ahead = (aim - place) / aspect
+    distance = np.linalg.norm(ahead)
+    up = view.up - (view.up @ ahead) / distance**2 * ahead
+    lower = ABOVE * np.tan(FIELD / 2) * distance / np.linalg.norm(up) * up
+    return aim - ahead - lower, aim - lower

@@ -1,6 +1,6 @@
 """Controls of what is seen: layers, cameras, light and dark ground."""
 
-from gauss.view.viewer.cameras import CAMERAS, eye
+from gauss.view.viewer.cameras import CAMERAS, placed_camera
 
 LAYERS = {"link": "links", "joint": "joints", "contact": "shapes of contact", "frame": "frames", "path": "paths"}
 
@@ -34,9 +34,16 @@ def add_view(stage):
     @cameras.on_click
     def _(event):
         if event.client is not None:
-            with event.client.atomic():
-                event.client.camera.position = tuple(eye(stage.framing, cameras.value))
-                event.client.camera.look_at = tuple(stage.framing.middle)
+            look(event.client, cameras.value)
+
+    @stage.server.on_client_connect
+    def _(client):
+        if client.camera.aspect < 1.0:
+            look(client, "oblique")
+
+    def look(client, camera: str):
+        with client.atomic():
+            client.camera.position, client.camera.look_at = placed_camera(stage.framing, camera, client.camera.aspect)
 
     box.on_update(lambda _event: stage.stand_on(box.value))
 

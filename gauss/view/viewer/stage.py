@@ -20,6 +20,7 @@ RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contac
 ASIDE = 0.2  # of the reach of the motion: half the width of the controls
 FAINT = 1e-3  # of the largest contact force: smaller ones are not drawn
 POINT = 0.016  # radius of a contact point, of the size of the mechanism
+SKY_LIGHT, GROUND_LIGHT, DIFFUSE = (255, 255, 255), (150, 155, 165), 1.6  # of the light that casts no shadows
 SMOOTHNESS, FINEST_PATH = 6, 6000  # points of a path for each picture, and most of them
 ROLES = ("link", "joint", "contact", "frame", "path")
 
@@ -109,6 +110,8 @@ class ViewerStage:
         view, scene = self.framing, self.server.scene
         scene.set_up_direction(tuple(view.up))
         scene.configure_default_lights(enabled=True)
+        scene.configure_environment_map(None)  # its picture would be decoded and filtered before the first one is drawn
+        scene.add_light_hemisphere("/light of the sky", sky_color=SKY_LIGHT, ground_color=GROUND_LIGHT, intensity=DIFFUSE)
         self.server.gui.configure_theme(dark_mode=self.ground.dark, show_share_button=False)
         scene.set_background_image(sky(self.ground), format="png")
         turn = _quaternions(np.stack([view.right, view.away, view.up], axis=1)[None, None])[0, 0]
