@@ -144,10 +144,11 @@ class ContactMotion:
             event = event_of(change, names[change.element], float(times[change.step + 1]), begins)
             self.events += [] if event is None else [event]
 
-    def beside(self, begin: State, work: np.ndarray, t: float) -> tuple[State, np.ndarray]:
-        """State and work at a time after a shorter step from another state; the motion does not continue from there."""
+    def beside(self, begin: ContactMotionState, t: float) -> tuple[State, np.ndarray]:
+        """State and work at a time after a shorter step from what was kept; the motion does not continue from there."""
         now, events, counts = self.kept(), self.events, (self.steps, self.relaxed, self.largest)
-        self.state, self.work, self.events = begin, work, []
+        self.take(begin)
+        self.events = []
         try:
             self.advance(np.array([t]))
             return self.state, self.work

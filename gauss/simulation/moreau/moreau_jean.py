@@ -53,7 +53,7 @@ class MoreauRun(PythonRun):
         self.h, self.relaxed, self.error = step, 0, 0.0
         self.paradoxes, self.contacts = ParadoxWarnings(), ContactEvents(self.stepper.modes)
         self.modes = self.taken = np.zeros(0)  # of the last step that was computed, and of the last one that was taken
-        self.force: np.ndarray | None = None
+        self.force = np.zeros(self.stepper.unit.size)
         self.share = 0.0  # of the last step
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:

@@ -112,13 +112,14 @@ class PairKernelRun(PythonRun):
             if place in holds:
                 self._hold(holds[place])
             while done < stop:
+                begin = self.motion.kept()  # a step with samples inside is a part of its own
                 for row in self.motion.advance(ends[done:stop]):
-                    begin, reached = (point.state, point.work), self._point(row, point)
+                    reached = self._point(row, point)
                     self.unseen += self.switching.share(point, reached)[0] < 1.0
                     point, done, self.steps = reached, done + 1, self.steps + 1
                     if point.state.t >= self.end:
                         self.stepper.check(point.state)
-                    yield point, lambda t, state=begin[0], work=begin[1]: self.motion.beside(state, work, t)
+                    yield point, lambda t, begin=begin: self.motion.beside(begin, t)
 
     def _jumps(self, begin: float) -> list[tuple[float, float]]:
         """Times just before and just after possible jumps of prescribed velocities [s]."""
@@ -147,12 +148,14 @@ class PairKernelRun(PythonRun):
 def _divided(pairs: np.ndarray, changes: Iterable[int]) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Ends of all steps of a grid [s], and the parts that are made at once.
 
-    A part ends where something changes, such as inputs, after a step that has samples inside, and after :data:`CHUNK` steps.
+    A part ends where something changes, such as inputs, before and after a step that has samples inside, and after
+    :data:`CHUNK` steps.
     It is given by the number of pairs before it, and the number of steps at its end.
     """
     is_step = pairs[:, 1] != Due.OFF_GRID_SAMPLE
     steps = np.cumsum(is_step)  # at the end of each pair
-    inside = np.flatnonzero(is_step & np.concatenate([[False], ~is_step[:-1]])) + 1
-    cuts = {0, len(pairs), *inside.tolist(), *changes, *range(0, len(pairs), CHUNK)}
+    goes_inside = np.diff(~is_step, prepend=False, append=False)  # changes between steps and samples inside one
+    first, last = np.flatnonzero(goes_inside)[::2], np.minimum(np.flatnonzero(goes_inside)[1::2] + 1, len(pairs))
+    cuts = {0, len(pairs), *first.tolist(), *last.tolist(), *changes, *range(0, len(pairs), CHUNK)}
     places = sorted(cuts)
     return pairs[is_step, 0], [(a, int(steps[b - 1])) for a, b in zip(places[:-1], places[1:], strict=True)]
