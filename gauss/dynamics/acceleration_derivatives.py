@@ -8,11 +8,12 @@ those of trees without forces on bodies by composite bodies, with half of the op
 
 import numpy as np
 
-from gauss.codegen import LDLT, Scalar, forward, write
+from gauss.codegen import LDLT, Scalar, as_number, forward, write
 from gauss.dynamics.composite_bodies import CompositeBodies
 from gauss.dynamics.mechanism import Mechanism, inverse_dynamics
 from gauss.dynamics.rnea import KinematicTree
 from gauss.dynamics.traced_system import applied_loads
+from gauss.errors import SimulationError
 from gauss.system import State, System, coordinate_rates, whole
 
 
@@ -73,7 +74,7 @@ def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tu
     composites = None if loaded.forces else _composite_bodies(system, q, v)
     if composites is not None:
         by_q, by_v = _of_open_tree(system, composites, loaded.effort, q, v, rates)
-        M = LDLT(composites.mass_matrix())
+        M = _factored(system, composites.mass_matrix())
         solved = lambda columns: np.array([M.solve(column) for column in columns.T]).T  # noqa: E731
         return solved(-by_q), solved(-by_v), _mirrored(solved(unit))
 
@@ -122,6 +123,23 @@ def _of_open_tree(system: System, composites: CompositeBodies, own, q, v, accele
     """Derivatives of inverse dynamics under generalised forces (n_v,), functions of q and v."""
     found, loads = composites.inverse_dynamics_derivatives(acceleration), _slopes(system, own, q, v)
     return found[0] - loads[0], found[1] - loads[1]
+
+
+def _factored(system: System, M: np.ndarray) -> LDLT:
+    """Factors of a mass matrix.
+
+    Raises
+    ------
+    SimulationError
+        If a joint moves no inertia.
+    """
+    still = [name for name, own in zip(system.coordinates, np.diag(M), strict=True) if as_number(own) == 0]
+    if still:
+        raise SimulationError(
+            f"acceleration_derivatives: {', '.join(map(repr, still))}: a joint that moves no inertia has no determined "
+            "acceleration; give mass to what it moves."
+        )
+    return LDLT(M)
 
 
 def _mirrored(X: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import pytest
 import gauss
 from gauss.codegen import content_digest
 from gauss.dynamics.kinematics import kinematics
-from gauss.errors import ArgumentError, StateError
+from gauss.errors import ArgumentError, SimulationError, StateError
 from gauss.system import State, random_state, retract
 from tests.support import mechanisms
 
@@ -349,3 +349,14 @@ def test_coordinates_that_determine_nothing_are_refused():
         system.null_space(start.q, independent="guide")
     with pytest.raises(StateError, match="q does not meet the constraints, by "):
         system.null_space(start.q + 0.1, independent="A")
+
+
+def test_derivatives_of_a_joint_that_moves_no_inertia_are_refused():
+    scene = gauss.Scene("rods")
+    arm = scene.body("arm", mass=1.0, inertia=(0.1, 0.1, 0.1), com=(0.5, 0, 0))
+    rod = scene.body("rod", mass=1.0, inertia=(0.1, 0.1, 0.0))
+    scene.revolute("A", "ground", arm)
+    scene.revolute("B", arm, rod)
+    system = gauss.compile_scene(scene)
+    with pytest.raises(SimulationError, match="'B'"):
+        system.acceleration_derivatives(np.zeros(2), np.zeros(2), np.zeros(2))
