@@ -14,6 +14,15 @@ First answers are those of a fresh process: from the file to the accelerations o
 an empty cache of machine code and with a full one. A motion of ten robots without loads begins at the first reference state;
 floating robots do not fall. Its drift is the largest residual of the constraints, relative to the size of the robot.
 
+Loops are eliminated where they close (:mod:`gauss.dynamics.embedded_loops`). Operations of one state with its error check,
+by the general elimination before, and now: Stewart platform 27 436, 12 579; cassie 23 417, 12 931; digit 87 918, 36 901;
+disney 51 885, 29 826; delta 5 454, 3 527; talos 13 108, 8 933; wl16 58 224, 20 378; ten four-bars 43 219, 12 046. Times fall
+less than operations; why was not measured. Of the 12 579 of a Stewart platform
+about 950 are kinematics, articulated inertias and K M⁻¹ Kᵀ of its legs, 1 300 the factor of 18 rows and 6 rates of the
+platform, 3 100 biases, forces and multipliers, 1 500 the rates of all 36 coordinates, those of loop joints among them, 2 200
+the refinement that measures the error, 2 500 the residual of the given state, the rest its limits. In talos, disney and
+cassie the tree alone (2 985, 7 684, 3 604 operations) is as dear as what its loops add.
+
 CPU time of the process; medians of interleaved rounds. Writes benchmarks/results/loop_robots.csv and .md.
 """
 

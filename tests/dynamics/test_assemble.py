@@ -7,7 +7,8 @@ import pytest
 
 import gauss
 from gauss import math
-from gauss.backends.compulsion import from_blocks
+from gauss.backends.columns import from_blocks
+from gauss.dynamics.assemble import closure_rates
 from gauss.dynamics.compiled_assembly import Assembler
 from gauss.dynamics.kinematics import kinematics
 from gauss.scene import PAIRS
@@ -193,3 +194,23 @@ def test_sparse_matrices_of_blocks_add_what_lies_in_one_place():
         assert np.array_equal(columns.toarray(), dense) and np.array_equal(found.toarray(), dense)
         assert found.nnz == 13 and found.has_canonical_format
     assert from_blocks([], (3, 4)).csc().shape == (3, 4)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "rolling_disk", "planetary_gears", "stewart_platform"])
+def test_loop_constraints_alone_have_a_velocity_residual(name):
+    """A v + B q̇ − C of all rows, with rates that meet no loop: zero in the tree."""
+    system = gauss.compile_scene(gauss.load(name))
+    for seed in range(3):
+        state = random_state(system, np.random.default_rng(seed))
+        motion, nothing = kinematics(system, state), np.zeros(system.structure.n_rows)
+        compulsion = gauss.assemble(system, state).about_rest()
+        _, rows, _ = compulsion.residuals(motion.quasi_velocities(), state.v, nothing)
+        loops = np.concatenate([np.arange(system.structure.n_rows)[c.rows] for c in _closures(system)])
+        size = ROUNDING * np.abs(state.v).max()
+        assert closure_rates(motion) == pytest.approx(rows[loops], abs=size)
+        assert np.abs(np.delete(rows, loops)).max(initial=0.0) <= size
+        assert np.abs(rows[loops]).max() > 1e6 * size
+
+
+def _closures(system):
+    return [system.structure.constraints[index] for index in system.structure.closures]

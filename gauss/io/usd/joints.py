@@ -151,14 +151,16 @@ def unread_limits(prim: Usd.Prim) -> list[str]:
         joint = UsdPhysics.SphericalJoint(prim)
         cones = joint.GetConeAngle0LimitAttr(), joint.GetConeAngle1LimitAttr()
         return [str(cone.GetName()) for cone in cones if 0.0 <= float(cone.Get()) < inf]  # negative: not limited
-    if prim.GetTypeName() != "PhysicsJoint":
-        return []
+    return _unread_ranges(prim) if prim.GetTypeName() == "PhysicsJoint" else []
+
+
+def _unread_ranges(prim: Usd.Prim) -> list[str]:
+    """Names of the ranges of a D6 joint of several freedoms; that of a single freedom is read."""
     limited = {name: UsdPhysics.LimitAPI(prim, name) for name in FREEDOMS if prim.HasAPI(UsdPhysics.LimitAPI, name)}
     ranges = [(name, float(one.GetLowAttr().Get()), float(one.GetHighAttr().Get())) for name, one in limited.items()]
+    finite = [f"limit:{name}" for name, low, high in ranges if low <= high and (low, high) != (-inf, inf)]
     locked = sum(low > high for _, low, high in ranges)
-    if len(FREEDOMS) - locked < 2:
-        return []  # that of a single freedom is read
-    return [f"limit:{name}" for name, low, high in ranges if low <= high and (low, high) != (-inf, inf)]
+    return finite if len(FREEDOMS) - locked > 1 else []
 
 
 def limits_of(prim: Usd.Prim, low: float, high: float, kind: str, units: StageUnits) -> tuple[float, float] | None:

@@ -65,13 +65,17 @@ def read_usd(path, limits: str = "start", root_folder=None) -> Scene:
         raise FileError(f"{path}: {error}") from error
     except NOT_OF_SCHEMA as error:
         raise FileError(f"{path}: USD refuses it, or a value is not of the type of its schema: {error}") from error
-    left = [prim.GetName() for prim in moving_prims(stage) if prim.HasAPI(UsdPhysics.CollisionAPI)]
-    if left:
-        warnings.warn(f"{path}: not read: contacts of {_shown(left)}.", NotImportedWarning, stacklevel=2)
-    limits_left = [f"{prim.GetName()} ({', '.join(names)})" for prim, names in _unread_limits(stage)]
-    if limits_left:
-        warnings.warn(f"{path}: not read: limits of {_shown(limits_left)}.", NotImportedWarning, stacklevel=2)
+    for left in _unread(stage):
+        warnings.warn(f"{path}: not read: {left}.", NotImportedWarning, stacklevel=2)
     return scene
+
+
+def _unread(stage: Usd.Stage) -> list[str]:
+    """What is not read, in words: contacts, and limits of joints."""
+    prims = moving_prims(stage)
+    contacts = [prim.GetName() for prim in prims if prim.HasAPI(UsdPhysics.CollisionAPI)]
+    limits = [f"{prim.GetName()} ({', '.join(names)})" for prim, names in _unread_limits(stage)]
+    return [f"{what} of {_shown(names)}" for what, names in (("contacts", contacts), ("limits", limits)) if names]
 
 
 def _shown(names: list[str]) -> str:
