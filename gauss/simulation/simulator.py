@@ -360,8 +360,8 @@ def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSte
         return PairKernelSteps(problem)
     laws = smooth_question(problem.question).laws if problem.method.nonsmooth else problem.laws
     if dynamics == "callbacks":
-        return CalledMoreauRun(problem, laws, events=False) if problem.method.nonsmooth else CalledFixedRun(problem)
-    return CompiledMoreauRun(problem, laws, events=False) if problem.method.nonsmooth else CompiledFixedRun(problem)
+        return CalledMoreauRun(problem, laws) if problem.method.nonsmooth else CalledFixedRun(problem)
+    return CompiledMoreauRun(problem, laws) if problem.method.nonsmooth else CompiledFixedRun(problem)
 
 
 def _unchecked(n: int) -> np.ndarray:

@@ -16,10 +16,8 @@ class CalledMoreauRun(CalledFixedRun, CompiledMoreauRun):
         As of :class:`gauss.simulation.moreau.compiled_run.CompiledMoreauRun`.
     laws : Laws
         Loads of the system without unilateral and set-valued elements.
-    events : bool
-        As of :class:`gauss.simulation.moreau.compiled_run.CompiledMoreauRun`.
     """
 
-    def __init__(self, problem: Problem, laws: Laws, events: bool = True):
-        CompiledMoreauRun.__init__(self, problem, laws, CalledProgram, events)
+    def __init__(self, problem: Problem, laws: Laws):
+        CompiledMoreauRun.__init__(self, problem, laws, CalledProgram)
         self._receive()

@@ -40,15 +40,13 @@ class CompiledMoreauRun(CompiledFixedRun):
         Loads of the system without these elements.
     program : type
         Makes the functions of that system.
-    events : bool
-        Whether changes of the contact mode are recorded; a simulator has no use for them.
     """
 
-    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program, events: bool = True):
+    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program):
         self.whole, self.stepper = problem, moreau_stepper(problem.system)
         self.stepper.refuse_penetration(problem.start)
         self.contacts, self.forces = ContactEvents(self.stepper.modes), self.stepper.lossy.size
-        self.codes = self.stepper.modes.codes if events else 0
+        self.codes = self.stepper.modes.codes
         super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()), program)
 
     def _beside(self) -> tuple:

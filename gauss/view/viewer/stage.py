@@ -20,7 +20,7 @@ RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contac
 ASIDE = 0.2  # of the reach of the motion: half the width of the controls
 FAINT = 1e-3  # of the largest contact force: smaller ones are not drawn
 POINT = 0.016  # radius of a contact point, of the size of the mechanism
-SKY_LIGHT, GROUND_LIGHT, DIFFUSE = (255, 255, 255), (150, 155, 165), 1.6  # of the light that casts no shadows
+SKY_LIGHT, GROUND_LIGHT, DIFFUSE = (255, 255, 255), (170, 175, 185), 3.2  # of the light that casts no shadows
 SMOOTHNESS, FINEST_PATH = 6, 6000  # points of a path for each picture, and most of them
 ROLES = ("link", "joint", "contact", "frame", "path")
 
