@@ -45,7 +45,8 @@ def contact_grid(begin: float, end: float, step: float, samples, switching: Swit
     """Pairs of Moreau–Jean time stepping, which evaluates loads at the start of a step or in its middle.
 
     A step therefore ends just after a switching time: the nearest time of the grid is moved there, or a time is added where
-    that one is a sample. At jumps of prescribed velocities steps end before and after, as with other methods.
+    that one is a sample; a step that is longer by that is halved. At jumps of prescribed velocities steps end before and
+    after, as with other methods.
     """
     pairs = _even(begin, end, step, samples)
     stops = [stop for stop in switching.times.stops(begin, end) if stop[0] < stop[1]]
@@ -54,8 +55,11 @@ def contact_grid(begin: float, end: float, step: float, samples, switching: Swit
     jumps = [t for stop in stops if switching.jumps.within(*stop) for t in stop]
     afters = [after for before, after in stops if not switching.jumps.within(before, after)]
     pairs = _with_ends(pairs, np.full(len(pairs), samples is None) | (pairs[:, 1] == Due.STEP), afters, begin, step)
-    added = np.column_stack([jumps, np.full(len(jumps), float(Due.STEP))]) if jumps else pairs[:0]
-    pairs = np.concatenate([pairs, added])
+    ends = pairs[pairs[:, 1] != Due.OFF_GRID_SAMPLE, 0]
+    lengths = np.diff(ends, prepend=begin)
+    longer = lengths > step * (1.0 + EQUAL_TIMES)
+    added = np.concatenate([jumps, ends[longer] - 0.5 * lengths[longer]])
+    pairs = np.concatenate([pairs, np.column_stack([added, np.full(added.size, float(Due.STEP))])])
     return pairs[np.argsort(pairs[:, 0], kind="stable")]
 
 

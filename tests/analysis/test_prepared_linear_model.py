@@ -10,7 +10,7 @@ from gauss.errors import SimulationError, StateError
 from models import families
 
 AGREEMENT = 1e-12  # relative to the largest entry of a matrix: another order of operations
-NEAR_SINGULAR = 1e-8  # the same for Bricard's linkage, whose rows are redundant
+NEAR_SINGULAR = 1e-7  # of Bricard's linkage, whose redundant rows leave pivots of about the root of round-off; 2e-8 is seen
 MATRICES = "ABCD"
 
 

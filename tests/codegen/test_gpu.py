@@ -39,6 +39,7 @@ ANGLES = 1e9  # [rad] up to which a GPU has sines
 ROOT = Path(gauss.__file__).parents[1]
 SHIPPED = [path for folder in ("", "linkages", "servo") for path in sorted((ROOT / "models" / folder).glob("*.toml"))]
 CONTACTS = 1e-12  # relative: the compiler fuses multiply-adds of contact problems as it likes
+LOOPS = 1e-10  # the host eliminates each loop at its innermost link, devices all loops at once
 LEAST_NORM = 1e-9  # relative: random matrices of this size have condition numbers up to 1e4
 CONTRACTIBLE = re.compile(r"\b(?:mul|add|sub)\.f64")
 FIXED = {"steps": 20, "step": 1e-3, "every": 5}
@@ -129,7 +130,8 @@ def test_shipped_scenes_run_on_a_device(path, assembled):
         q, v = _states(system, 3)
         load = np.ones_like(v)
         function = system.function("forward_dynamics", device="lanes")
-        assert np.array_equal(function(q, v, load), system.forward_dynamics(q, v, load))
+        there, here = function(q, v, load), system.forward_dynamics(q, v, load)
+        assert np.allclose(there, here, rtol=LOOPS, atol=LOOPS) if system.structure.closures else np.array_equal(there, here)
         assert not CONTRACTIBLE.search(assembled.texts[0])  # by the assembler, which rounds once then
     assert ".entry" in assembled.texts[0]
 

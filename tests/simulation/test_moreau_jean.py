@@ -8,8 +8,12 @@ import pytest
 
 import gauss
 from gauss.codegen import Writer, machine
+from gauss.codegen.kernels import Due
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
+from gauss.dynamics.laws.switching import switching
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import PainleveWarning, SimulationError
+from gauss.simulation.grid import contact_grid
 from gauss.simulation.moreau.moreau_jean import MoreauRun
 
 SAME = 1e-7  # of the largest coordinate or rate: forces are found to 1e-10 times 1 + the largest rate, step by step
@@ -189,3 +193,18 @@ def test_steps_that_end_at_breaks_leave_a_block_on_its_plane(name, times):
     assert np.abs(found.q[:, 1:3]).max() <= 1e-9  # it slides along the line of fall [m]
     assert np.abs(found.v[-1, 1:]).max() <= 1e-9
     assert (np.diff(found.t) > 0).all()
+
+
+@pytest.mark.parametrize("begin", [0.4003, 0.4004, 0.4006, 0.4009])
+@pytest.mark.parametrize("samples", [None, np.array([0.1, 0.40071, 0.5])], ids=["steps", "samples"])
+def test_steps_beside_switching_times_are_no_longer_than_asked(begin, samples):
+    """A ramp of 1.4 ms is one step of 2 ms, and two of 1 ms: half the steps have another mesh there, and see the error."""
+    scene = gauss.load("slider_crank")
+    scene.drive(next(iter(scene.joints)), torque=lambda t: 0.1 * gauss.math.clip((t - begin) / 1.4e-3, 0.0, 1.0))
+    system = gauss.compile_scene(scene)
+    times = switching(system, Laws(system), system.initial_state(), 0.5)
+    for step in (2e-3, 1e-3):
+        pairs = contact_grid(0.0, 0.5, step, samples, times)
+        t = pairs[pairs[:, 1] != Due.OFF_GRID_SAMPLE, 0]
+        assert np.diff(t, prepend=0.0).max() <= step * (1.0 + 1e-9) and (np.diff(pairs[:, 0]) > 0.0).all()
+        assert all(np.abs(t - end).min() < 1e-9 for end in (begin, begin + 1.4e-3))
