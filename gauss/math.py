@@ -268,9 +268,7 @@ def piecewise(polynomial, x):
 def _piecewise(polynomial, pieces, x):
     breaks = polynomial.x
     if polynomial.extrapolate == "periodic":
-        turn = 2.0 * np.pi / (breaks[-1] - breaks[0])
-        phase = turn * (x - breaks[0]) - np.pi
-        x = breaks[0] + (np.arctan2(np.sin(phase), np.cos(phase)) + np.pi) / turn
+        x = breaks[0] + (x - breaks[0]) % (breaks[-1] - breaks[0])
     start, coefficients = float(breaks[0]), [float(c) for c in pieces[:, 0]]
     for k in range(1, pieces.shape[1]):
         inside = x > float(breaks[k])

@@ -235,6 +235,7 @@ class EmbeddedLoops(ArticulatedBody):
                 self._carry_outward(cluster, own, biases, rates, accelerations)
             for edge, _ in cluster:
                 self._open(edge.outer, accelerations, y, reduced)
+        accelerations[GROUND] = base
         return rates, accelerations, np.array([*(y[row] for row in range(self.n_rows)), None], dtype=object)[:-1]
 
     def _reduced(self, forces, biases, tau, rhs) -> tuple[dict, dict]:

@@ -18,19 +18,20 @@ from gauss.system import State
 def refined_once(program: Program, q, v, tau, t, elimination: type[Mechanism] = Mechanism):
     """q̈ after one refinement, and [its error, constraint residual of the state, sum of all inputs].
 
-    The error is the size of the refinement and of the remaining residual of the loop constraints, not zero near singular
-    configurations and for inconsistent redundant rows. A subsystem may not depend on an input, but the result is not finite
-    if one of them is not.
+    The error is the size of the refinement and of the remaining residuals of loop joints and loop constraints, not zero
+    near singular configurations and for inconsistent redundant rows. A subsystem may not depend on an input, but the
+    result is not finite if one of them is not.
     """
     state, system = State(t[0], q, v), program.system
     own, forces, _ = applied_loads(system, program.loads, state)
     mechanism, total = elimination(system, q, v, state.t), own + tau
     found, multipliers = mechanism.motion(total, forces)
     change, _ = mechanism.response(*mechanism.residual(found, multipliers, total, forces))
-    rows = mechanism.acceleration_residual(found + change)
-    left = np.abs(change * program.own).sum() + np.abs(rows * program.shares).sum()
+    reached = found + change
+    rows, along = mechanism.acceleration_residual(reached), mechanism.dependent_accelerations(reached) - reached
+    left = np.abs(change * program.own).sum() + np.abs(along * program.own).sum() + np.abs(rows * program.shares).sum()
     error = left / math.maximum(largest(found * program.own), program.error_scale(v))
-    return found + change, [error, program.residual(state), _sum(q, v, total, t)]
+    return reached, [error, program.residual(state), _sum(q, v, total, t)]
 
 
 def embedded_once(program: Program, q, v, tau, t):

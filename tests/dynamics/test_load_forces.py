@@ -16,7 +16,7 @@ ROUNDING = 1e-10  # of accelerations, relative to the largest
 SAME_MOTION = 1e-9  # of coordinates and work
 CALLED = {("compiled loop", "compiled"): "callbacks"}  # dynamics whose machine code calls opaque laws
 LARGE = LARGE_TREE_BODIES + 1
-SCENES = {  # scene, and dynamics of its single states and of motions
+SCENES = {  # scene, and dynamics of its motions; single states of compiled loops have theirs embedded
     "four-bar": (mechanisms.four_bar, "compiled"),
     "tree of all kinds": (lambda: gauss.load("random_tree", n=8, seed=3), "compiled"),
     "large tree": (
@@ -49,7 +49,8 @@ def case(request):
 @pytest.mark.slow
 def test_loads_beside_machine_code_have_the_accelerations_of_the_certified_recursion(case):
     system, dynamics = case
-    assert ACCELERATIONS.plan(Question(system, Laws(system, trace=False))).dynamics == dynamics
+    of_states = "embedded loops" if system.has_closures and dynamics == "compiled" else dynamics
+    assert ACCELERATIONS.plan(Question(system, Laws(system, trace=False))).dynamics == of_states
     state, rng = system.initial_state(), np.random.default_rng(0)
     states = [state] if system.has_closures else [state, random_state(system, rng)]
     for one in states:

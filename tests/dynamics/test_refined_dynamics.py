@@ -135,7 +135,7 @@ def test_answers_are_right_and_their_error_is_no_more_than_they_say(name, seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["chain, 1e9", "ladder 3, 1e-6", "slider-crank, 1e9"])
+@pytest.mark.parametrize("name", ["chain, 1e9", "ladder 3, flat"])
 def test_what_simple_machine_code_cannot_confirm_is_soon_found_by_refinement(name, monkeypatch):
     monkeypatch.setattr(tiering, "COMPILE_THRESHOLD", 2)
     rng = np.random.default_rng(0)

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 import gauss
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.contact.moreau_step import advance_positions, moreau_stepper
+from gauss.dynamics.contact.moreau_step import advance_positions, advance_rates, moreau_stepper
 from gauss.dynamics.gap_functions import gaps, slips
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -105,23 +105,27 @@ def test_a_spinning_tripod_agrees_with_an_independent_cone_programme():
     start = system.initial_state()
     step = moreau_stepper(system).step(start, h)
     assert step.error < 1e-9
-    motion = kinematics(system, advance_positions(system, start, h, step.share))  # in the middle of the step
-    problem = assemble_motion(motion, Applied(motion))
+    middle = advance_positions(system, start, h, step.share)
+    motion = kinematics(system, middle)
+    pushed = kinematics(system, advance_rates(middle, step.acceleration, h, step.share))
+    problem = assemble_motion(pushed, Applied(pushed))  # forces that depend on rates are those of the middle of the step
     normals, friction = contact_parts(motion, step.force)
     # generalised forces r = (normal, two along) of each foot; its rates after the step are W r + b
     gap, slip = gaps(motion), slips(motion)
     J = np.concatenate([np.vstack([gap.J[i], slip.J[i]]) for i in range(3)])
-    D = np.concatenate([[gap.D[i], *slip.D[i]] for i in range(3)])
+    D = np.concatenate([[gaps(pushed).D[i], *slips(pushed).D[i]] for i in range(3)])
     now = np.concatenate([[gap.rate[i], *slip.rate[i]] for i in range(3)])
     free = gauss.solve(problem)
     x = np.concatenate([free.a, free.qdd])
     n, responses = problem.Phi.size, []
     for row in J:
-        pushed = gauss.solve(_pushed(problem, row[:n], row[n:]))
-        responses.append(np.concatenate([pushed.a, pushed.qdd]) - x)
-    found = moreau_stepper(system).kernel(motion.state).bias  # what changes rates without any accelerations q̈
-    bias = np.concatenate([[found[i], *found[3 + 2 * i : 5 + 2 * i]] for i in range(3)])
-    W, b = h * J @ np.array(responses).T, now + h * (J @ x - D - step.share * bias)
+        under = gauss.solve(_pushed(problem, row[:n], row[n:]))
+        responses.append(np.concatenate([under.a, under.qdd]) - x)
+    first, later = (moreau_stepper(system).kernel(at.state).bias for at in (motion, pushed))  # changes rates without any q̈
+    bias = np.concatenate(
+        [[x[i], *x[3 + 2 * i : 5 + 2 * i]] for x in ((1.0 - step.share) * first - later,) for i in range(3)]
+    )
+    W, b = h * J @ np.array(responses).T, now + h * (J @ x - D + bias)
     forces = np.concatenate([[normals[i], *(slip.axes[i] @ friction[i])] for i in range(3)])
     after = W @ forces + b
     for i in range(3):

@@ -9,6 +9,7 @@ from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
+from gauss.dynamics.contact.step_modes import UNKNOWN
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.outputs import shape_of, split
@@ -248,13 +249,16 @@ class SimulatorBatch:
             self._alone = Simulator(self.system, self.step_size, self.integrator)
         alone = self._alone
         alone.reset()
-        alone.restore(SimulatorState(before.tobytes(), alone.snapshot().control, 0.0, self._steps - n))
+        fresh, end = alone.snapshot(), before.size - len(self.inputs)
+        more = len(np.frombuffer(fresh.point)) - before.size  # codes of contact modes, which the points of a batch lack
+        point = np.insert(before, end, [UNKNOWN] * more)
+        alone.restore(SimulatorState(point.tobytes(), fresh.control, 0.0, self._steps - n))
         try:
             alone.step(self._u[k, 0] if self.inputs else None, n)
         except SimulationError as error:
             self._batch.points[1:, k], self.reasons[k] = np.nan, str(error)
             return False
-        self._batch.points[:, k] = np.frombuffer(alone.snapshot().point)
+        self._batch.points[:, k] = np.delete(np.frombuffer(alone.snapshot().point), slice(end, end + more))
         return True
 
     @property
