@@ -21,7 +21,7 @@ from gauss.servo.switching import servo_switching
 from gauss.servo.tracking import Tracking
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
-from gauss.simulation.arguments import check_arguments, check_breaks, chosen, sample_times
+from gauss.simulation.arguments import check_arguments, check_breaks, chosen, refuse_without_step, sample_times
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.tolerances import shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_switching
@@ -85,7 +85,7 @@ def simulate(
     require(servo, (Servo,), "servo.simulate")
     if state is not None:
         require(state, (State,), "servo.simulate: state")
-    check_arguments(duration, integrator, step, rtol, atol)
+    refuse_without_step(check_arguments(duration, integrator, step, rtol, atol), step, "a motion under servos")
     refuse_surfaces(servo.system, "a motion under servos")
     method = chosen(integrator)
     if isinstance(method, Library | Taylor) or (isinstance(method, FixedStep) and method.mechanical):

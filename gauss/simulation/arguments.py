@@ -18,9 +18,11 @@ from gauss.simulation.held_inputs import HeldInputs
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
-from gauss.simulation.tolerances import check_tolerances, tolerance
+from gauss.simulation.tolerances import check_tolerances, shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System, refuse_changed
+
+LEAST_CONTROLLED_RTOL = 1e-7  # of time stepping by error control: gaps are rounded, and its order is low
 
 
 def checked_problem(
@@ -61,7 +63,7 @@ def checked_problem(
         system,
         laws,
         method,
-        tolerance(system, rtol, atol),
+        tolerance(system, rtol, shares_of_scale(system, rtol) if is_controlled(method, step) and atol is None else atol),
         step,
         backend,
         stabilisation,
@@ -78,6 +80,11 @@ def checked_problem(
         problem = problem._replace(method=integrators.RadauGGL())
     warn_of_times(system, problem.switching.times)
     return problem
+
+
+def is_controlled(method: Integrator, step: float | None) -> bool:
+    """Whether error control chooses the steps of a method of fixed ones."""
+    return isinstance(method, FixedStep) and step is None
 
 
 def held_inputs(problem: Problem, control, rate: float | None) -> HeldInputs | None:
@@ -168,9 +175,22 @@ def check_arguments(duration, integrator, step, rtol, atol) -> Integrator:
     """
     method = chosen(integrator)
     check_tolerances(duration=duration, rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
-    if isinstance(method, FixedStep) and step is None:
+    if isinstance(method, FixedStep) and step is None and not method.nonsmooth:
         raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
+    if isinstance(method, FixedStep) and step is None and rtol < LEAST_CONTROLLED_RTOL:
+        raise SimulationError(
+            f"integrator {method.name!r}: give step= [s], for instance step=1e-3, or, for steps by error control, rtol= of "
+            f"{LEAST_CONTROLLED_RTOL:g} or more, for instance rtol=1e-4."
+        )
     return method
+
+
+def refuse_without_step(method: Integrator, step: float | None, what: str):
+    """Raise a SimulationError if a method of fixed steps is given none, where steps by error control are not taken."""
+    if isinstance(method, FixedStep) and step is None:
+        raise SimulationError(
+            f"integrator {method.name!r} of {what} has a fixed step: give step= [s], for instance step=1e-3."
+        )
 
 
 def sample_times(times, start: float, duration: float):

@@ -4,7 +4,7 @@ Each imports what it runs: one motion needs one of them.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar
 
 from gauss.dynamics import engines
 from gauss.dynamics.conditions import smooth_question
@@ -131,6 +131,10 @@ def _events(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
+    if problem.step is None:
+        from gauss.simulation.moreau.error_control import controlled_motion
+
+        return controlled_motion(problem, plan)
     if plan.dynamics == "compiled":
         from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 
@@ -145,7 +149,7 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
         return PairKernelRun(problem).collect(problem.start, problem.samples, problem.progress)
     from gauss.simulation.moreau.moreau_jean import MoreauRun
 
-    run = MoreauRun(problem.system, problem.backend, cast(float, problem.step), problem.end, problem.switching)
+    run = MoreauRun(problem.system, problem.backend, problem.step, problem.end, problem.switching)
     return run.collect(problem.start, problem.samples, problem.progress)
 
 

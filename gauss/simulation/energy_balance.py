@@ -94,7 +94,7 @@ def watch_balance(trajectory: Trajectory, start: State):
     BalanceWarning
         With the residual, its time, and advice.
     """
-    record, collected = trajectory.energies or _record(_some(trajectory, start, FEW_SAMPLES)), _COLLECTED.get()
+    record, collected = trajectory.energies or energy_record(_some(trajectory, start, FEW_SAMPLES)), _COLLECTED.get()
     if collected is None and record.off <= WRONG * record.kinetic:  # the usual case, quickly
         return
     found = _imbalance(record, WRONG if trajectory.step is None else FIRST_ORDER)
@@ -128,7 +128,7 @@ def warn_of_balance(trajectory: Trajectory):
     if not len(trajectory):
         return
     start = trajectory.state(0)
-    found = _imbalance_by_samples(trajectory, start, _record(trajectory))
+    found = _imbalance_by_samples(trajectory, start, energy_record(trajectory))
     if found.is_wrong:
         _warn(trajectory, found)
 
@@ -208,7 +208,7 @@ def _imbalance(record: EnergyRecord, allowed: float, magnitude: float = 0.0) -> 
 def _imbalance_by_samples(trajectory: Trajectory, start: State, record: EnergyRecord) -> Imbalance:
     """Imbalance by more samples; zero for a system at rest."""
     some = _some(trajectory, start, MORE_SAMPLES)
-    again = _record(some)
+    again = energy_record(some)
     clear = again if record.off < again.off else record  # NaN stays
     whole = clear._replace(
         kinetic=max(record.kinetic, again.kinetic),
@@ -237,7 +237,7 @@ def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
     return replace(trajectory, **columns, energies=None)
 
 
-def _record(trajectory: Trajectory) -> EnergyRecord:
+def energy_record(trajectory: Trajectory) -> EnergyRecord:
     """Energies of all samples."""
     energies = _energies(trajectory)
     return EnergyRecord(*map(float, recorded_energies(trajectory.t, energies)))

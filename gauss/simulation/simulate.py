@@ -72,7 +72,8 @@ def simulate(
         rounding with any step, and the momenta of coordinates on which no force acts, but not those of rotations about axes
         of space; "time_stepping" (Moreau–Jean), the one for friction of contacts, of order 2 without impacts, stick–slip
         transitions, loops and restitution, else of order 1 (see
-        :mod:`gauss.simulation.moreau.moreau_jean`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau",
+        :mod:`gauss.simulation.moreau.moreau_jean`); without ``step`` it chooses its steps by ``rtol``, 1e-7 or more (see
+        :mod:`gauss.simulation.moreau.error_control`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau",
         "scipy_lsoda", and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints by multipliers,
         stabilised (index 2).
     step : float, optional
@@ -81,7 +82,8 @@ def simulate(
         Local error of coordinates and rates: atol (rad, m, rad/s, m/s) + rtol · size. A pair of atol is for coordinates and
         for rates. A dict gives a number or a pair for kinds of coordinates, "angle" and "length", and for joints by name:
         ``atol={"length": 1e-6, "wrist": (1e-8, 1e-6)}``. What is not given is 1e-12 of the scale of the scene, its length
-        and 1 rad, and these in its time (``system.scale``; :meth:`gauss.System.explain` prints it).
+        and 1 rad, and these in its time (``system.scale``; :meth:`gauss.System.explain` prints it); by time stepping
+        ``rtol`` of it.
     backend : str, Backend or class
         Solver of the accelerations: a name, an object of the form of :class:`gauss.backends.Backend`, or a class that
         makes one for this motion; see :func:`gauss.solve`. "auto": compiled code where the scene allows it (``explain()``

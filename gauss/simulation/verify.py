@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -37,8 +36,8 @@ def verified(motion: Trajectory, problem: Problem, again: Callable[..., Trajecto
     method, step, tolerance = problem.method, problem.step, problem.tolerance
     times, rows = np.unique(motion.t, return_index=True)
     try:
-        if isinstance(method, FixedStep):
-            finer = again(cast(float, step) / 2.0, tolerance, times, ())
+        if isinstance(method, FixedStep) and step is not None:
+            finer = again(step / 2.0, tolerance, times, ())
             share = 2.0**method.order / (2.0**method.order - 1.0)
         else:
             finer, share = _finer(motion, step, tolerance, times, again), 1.0

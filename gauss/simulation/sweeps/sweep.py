@@ -17,7 +17,7 @@ from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, r
 from gauss.scene import Scene
 from gauss.scene.named_numbers import scene_of
 from gauss.simulation import INTEGRATORS, Trajectory
-from gauss.simulation.arguments import check_arguments
+from gauss.simulation.arguments import check_arguments, refuse_without_step
 from gauss.simulation.batch.fixed_step_batch import cores
 from gauss.simulation.energy_balance import warn_of_many
 from gauss.simulation.progress import Progress
@@ -190,7 +190,7 @@ def _check(scene, duration, samples, integrator, step, rtol, atol, measure, work
         require(scene, (Scene,), "sweep")
     if not isinstance(integrator, str):
         raise SimulationError(f"integrator: expected a name, got {integrator!r}. {did_you_mean('', INTEGRATORS)}")
-    check_arguments(duration, integrator, step, rtol, atol)
+    refuse_without_step(check_arguments(duration, integrator, step, rtol, atol), step, "a sweep")
     if not isinstance(samples, int) or samples < 2:
         raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r}.")
     _check_workers(workers)

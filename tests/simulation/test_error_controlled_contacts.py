@@ -1,0 +1,150 @@
+"""Time stepping with error control: closed forms, located events, another method, late forces, refusals."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.errors import SimulationError
+
+g = 9.81
+WITHIN = 1.0  # of rtol: global error over the size of the motion; extrapolation leaves a margin of about ten
+CLAIM = 0.1  # least share of the true error that verify claims
+AT_REST = 1e-12  # m/s
+BY_EVENTS = 1e-10  # rtol of the event-driven motion that is compared with
+
+
+def _bouncing(e: float = 0.7) -> gauss.Scene:
+    scene = gauss.Scene("bouncing", gravity=(0.0, 0.0, -g))
+    scene.body("ball", 1.0, (0.01, 0.01, 0.01))
+    scene.prismatic("height", "ground", "ball", axis=(0.0, 0.0, 1.0))
+    scene.stop("height", 0.0, restitution=e)
+    scene.start("height", 1.0)
+    return scene
+
+
+def _height(t: float, e: float = 0.7) -> float:
+    fall, speed = np.sqrt(2.0 / g), np.sqrt(2.0 * g)
+    if t < fall:
+        return 1.0 - g * t * t / 2.0
+    t = t - fall
+    while True:
+        speed *= e
+        if t < 2.0 * speed / g:
+            return speed * t - g * t * t / 2.0
+        t -= 2.0 * speed / g
+
+
+MU, RADIUS, SPEED = 0.2, 0.1, 2.0
+
+
+def _sliding(balls: int) -> gauss.Scene:
+    """Balls that slide, then roll; many of them move by kernels of pairs of shapes."""
+    scene = gauss.Scene("sliding", gravity=(0.0, 0.0, -g))
+    scene.half_space("floor")
+    for k in range(balls):
+        scene.body(f"ball{k}", 1.0, (0.4 * RADIUS**2,) * 3)
+        scene.free(f"free{k}", "ground", f"ball{k}")
+        scene.sphere(f"round{k}", f"ball{k}", radius=RADIUS)
+        scene.contact(f"C{k}", f"round{k}", "floor", friction=MU)
+        scene.start(f"free{k}", position=(0.0, 5.0 * k, RADIUS, 1.0, 0.0, 0.0, 0.0), rate=(SPEED, 0, 0, 0, 0, 0))
+    return scene
+
+
+ROLLS = 2.0 * SPEED / (7.0 * MU * g)  # s: from then on the ball rolls with 5/7 of its speed
+
+
+def _way(t: float) -> float:
+    slid = min(t, ROLLS)
+    return SPEED * slid - MU * g * slid**2 / 2.0 + 5.0 / 7.0 * SPEED * max(t - ROLLS, 0.0)
+
+
+MOTIONS = {  # scene, coordinate of interest, its closed form, duration [s]
+    "bouncing": (_bouncing, 0, _height, 2.0),
+    "one sliding ball": (lambda: _sliding(1), 0, _way, 1.0),
+    "many sliding balls": (lambda: _sliding(9), 0, _way, 1.0),
+}
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5])
+@pytest.mark.parametrize("name", MOTIONS)
+def test_the_tolerance_is_honoured(name, rtol):
+    make, index, exact, duration = MOTIONS[name]
+    times = np.linspace(0.0, duration, 23)
+    motion = gauss.simulate(make(), duration, integrator="time_stepping", rtol=rtol, times=times)
+    expected = np.array([exact(t) for t in times])
+    assert np.abs(motion.q[:, index] - expected).max() <= WITHIN * rtol * max(1.0, np.abs(expected).max())
+    whole = gauss.simulate(make(), duration, integrator="time_stepping", rtol=rtol)
+    expected = np.array([exact(t) for t in whole.t])
+    assert np.abs(whole.q[:, index] - expected).max() <= WITHIN * rtol * max(1.0, np.abs(expected).max())
+    assert whole.stats.steps == len(whole) - 1
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5])
+def test_impacts_are_events_at_their_times(rtol):
+    motion = gauss.simulate(_bouncing(), 1.6, integrator="time_stepping", rtol=rtol)
+    found = [event.t for event in motion.events if event.kind == "impact"]
+    fall, e = np.sqrt(2.0 / g), 0.7
+    expected = fall + np.cumsum([0.0, *(2.0 * fall * e**k for k in (1, 2))])
+    assert found[:3] == pytest.approx(expected, abs=WITHIN * rtol)
+    lost = [event.loss for event in motion.events if event.kind == "impact"]
+    assert lost[0] == pytest.approx((1.0 - e**2) * g, rel=10.0 * rtol)
+
+
+def test_a_mechanism_agrees_with_located_events():
+    scene = gauss.load("double_pendulum_stops")
+    times = np.linspace(0.0, 1.0, 11)
+    exact = gauss.simulate(scene, 1.0, rtol=BY_EVENTS, times=times)
+    errors = []
+    for rtol in (1e-3, 1e-5):
+        motion = gauss.simulate(scene, 1.0, integrator="time_stepping", rtol=rtol, times=times)
+        errors.append(np.abs(motion.q - exact.q).max())
+    assert errors[1] <= 1e-1 * errors[0] and errors[1] <= 100.0 * 1e-5  # impacts amplify errors between them
+
+
+def test_a_short_late_force_is_not_stepped_over():
+    """A block at rest on its floor is pushed for 10 ms after 3 s, slides, and stays where friction stops it."""
+    scene = gauss.Scene("pushed", gravity=(0.0, 0.0, -g))
+    scene.body("block", 1.0, (0.1, 0.1, 0.1))
+    scene.prismatic("slide", "ground", "block", axis=(1.0, 0.0, 0.0))
+    scene.joint_friction("slide", 2.0)
+    scene.drive("slide", force=lambda t: gauss.math.where((t >= 3.0) & (t < 3.01), 102.0, 0.0))
+    motion = gauss.simulate(scene, 4.0, integrator="time_stepping", rtol=1e-4, times=[4.0])
+    speed = 100.0 * 0.01
+    assert motion.q[-1, 0] == pytest.approx(speed * 0.01 / 2.0 + speed**2 / (2.0 * 2.0), abs=1e-4)
+    assert abs(motion.v[-1, 0]) < AT_REST
+
+
+def test_verify_covers_the_error_and_contact_forces_are_those_of_rest():
+    motion = gauss.simulate(_sliding(1), 1.0, integrator="time_stepping", rtol=1e-4, verify=True)
+    true = max(abs(x - _way(t)) for t, x in zip(motion.t, motion.q[:, 0], strict=True))
+    assert motion.stats.global_error[0] >= CLAIM * true
+    assert gauss.contact_forces(motion, "C0")[-1].sum() == pytest.approx(g, rel=1e-6)
+
+
+REFUSED = {
+    "default tolerance": lambda scene: gauss.simulate(scene, 1.0, integrator="time_stepping"),
+    "too tight": lambda scene: gauss.simulate(scene, 1.0, integrator="time_stepping", rtol=1e-9),
+    "other methods": lambda scene: gauss.simulate(gauss.load("pendulum"), 1.0, integrator="rk4", rtol=1e-4),
+    "another backend": lambda scene: gauss.simulate(scene, 1.0, integrator="time_stepping", rtol=1e-4, backend="kkt"),
+    "a sweep": lambda scene: gauss.sweep(lambda h: scene, {"h": [1.0, 2.0]}, 1.0, integrator="time_stepping", rtol=1e-4),
+    "a simulator": lambda scene: gauss.Simulator(scene, None, "time_stepping"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_refused(what):
+    with pytest.raises(gauss.GaussError, match="step"):
+        REFUSED[what](_bouncing())
+
+
+def test_a_law_that_raises_leaves_the_motion_so_far():
+    def law(t):
+        if t > 0.3:
+            raise ValueError("no more")
+        return 0.0
+
+    scene = _bouncing()
+    scene.drive("height", force=law)
+    with pytest.raises(SimulationError, match="no more") as caught:
+        gauss.simulate(scene, 1.0, integrator="time_stepping", rtol=1e-4)
+    assert 0.2 < caught.value.trajectory.t[-1] <= 0.3
