@@ -153,7 +153,7 @@ def draw(rows: list[dict]):
     """Error against time, one panel a motion."""
     from matplotlib import pyplot
 
-    figure, panels = pyplot.subplots(1, len(CASES), figsize=(12, 4), sharey=True, layout="constrained")
+    figure, panels = pyplot.subplots(1, len(CASES), figsize=(12, 4), sharex=True, sharey=True, layout="constrained")
     for panel, name in zip(panels, CASES, strict=True):
         for how, marker in ((FIXED, "o"), (CONTROLLED, "s"), (MUJOCO, "^")):
             own = [row for row in rows if row["motion"] == name and row["how"] == how]

@@ -33,7 +33,7 @@ FIRST = 1e-3  # of the scale of times of the scene: first step
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.1, 4.0  # of the change of the step
 LEAST = 1e-9  # of the scale of times: shorter steps are taken whatever their error, for gaps are rounded
 MOST_UNMET = 1000  # steps of the least length in a row
-LOOKS = 60  # steps whose energies are looked at
+LOOKS = 6  # steps whose energies are looked at
 TO_END = 1e-9  # of a step: a remainder up to the next stop that is added to it
 
 
