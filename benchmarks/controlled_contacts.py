@@ -13,6 +13,7 @@ time of a motion after one that was not measured, the least of the rounds. Write
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import mujoco
@@ -100,11 +101,11 @@ def slid(t: float) -> float:
 CASES = {"rolls": Case(rolling, 1.0, rolled), "bounces": Case(bouncing, 2.0, bounced), "is pushed": Case(pushed, 4.0, slid)}
 
 
-def ours(case: Case, **how) -> Callable[[], np.ndarray]:
+def ours(case: Case, step: float | None = None, rtol: float = 1e-12) -> Callable[[], np.ndarray]:
     """Positions of a motion of gauss."""
     system, times = gauss.compile_scene(case.scene()), np.linspace(0.0, case.duration, SAMPLES)
-    given = {"integrator": "time_stepping", "times": times, "progress": False} | how
-    return lambda: gauss.simulate(system, case.duration, **given).q[:, 0]
+    run = partial(gauss.simulate, system, case.duration, integrator="time_stepping", times=times, progress=False)
+    return lambda: run(step=step, rtol=rtol).q[:, 0]
 
 
 def theirs(step: float) -> Callable[[], np.ndarray]:

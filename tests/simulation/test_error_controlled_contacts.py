@@ -114,6 +114,22 @@ def test_a_short_late_force_is_not_stepped_over():
     assert abs(motion.v[-1, 0]) < AT_REST
 
 
+@pytest.mark.parametrize("others", [0, 9])
+def test_fast_bodies_do_not_pass_through_thin_ones(others):
+    """A ball without gravity meets a plate of 1 mm after 1.8 m of free flight; with other balls it moves by pair kernels."""
+    scene = gauss.Scene("bullet", gravity=(0.0, 0.0, 0.0))
+    scene.box("plate", "ground", (0.001, 1.0, 1.0))
+    for k in range(1 + others):
+        scene.body(f"ball{k}", 0.01, (1e-8,) * 3)
+        scene.free(f"free{k}", "ground", f"ball{k}")
+        scene.sphere(f"round{k}", f"ball{k}", radius=0.002)
+        scene.contact(f"hit{k}", f"round{k}", "plate")
+        scene.start(f"free{k}", position=(-1.8, 0.1 * k - 0.3, 0, 1, 0, 0, 0), rate=(100.0, 0, 0, 0, 0, 0))
+    motion = gauss.simulate(scene, 0.022, integrator="time_stepping", rtol=1e-3, times=[0.022])
+    assert motion.q[-1, 0] == pytest.approx(-0.0025, abs=1e-5)
+    assert any(event.kind == "impact" for event in motion.events)
+
+
 def test_verify_covers_the_error_and_contact_forces_are_those_of_rest():
     motion = gauss.simulate(_sliding(1), 1.0, integrator="time_stepping", rtol=1e-4, verify=True)
     true = max(abs(x - _way(t)) for t, x in zip(motion.t, motion.q[:, 0], strict=True))
