@@ -12,13 +12,16 @@ import rich
 
 import gauss
 from gauss.errors import FileError
+from gauss.view.skeleton import placed
 from gauss.view.viewer import export_html, page, show
-from gauss.view.viewer.cameras import CAMERAS
+from gauss.view.viewer.cameras import CAMERAS, placed_camera
 from gauss.view.viewer.forms import forms
+from gauss.view.viewer.framing import FIELD, framing
 from gauss.view.viewer.show import LOOPBACK, _free_port
 from gauss.view.viewer.shown import resampled
 
 FLOATS = 1e-6  # relative: positions travel in single precision
+WIDE, HIGH, CONTROLS = 1280, 800, 330  # pixels of a window, and of what its controls cover at the right
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card is needed
 
@@ -50,6 +53,27 @@ def test_the_stage_shows_the_motion(viewer):
         along = (tip - root) / np.linalg.norm(tip - root)
         force = stage.reactions["C"][k]
         assert along == pytest.approx(force / np.linalg.norm(force), abs=1e-3)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("others", [0, 1])
+def test_cameras_show_the_motions_beside_the_controls(motion, others, camera):
+    found = show(motion, beside=motion if others else None, port=_free_port())
+    try:
+        stages = found.player.stages
+        eye, aim = placed_camera(stages[0].framing, camera, WIDE / HIGH)
+        ahead = (aim - eye) / np.linalg.norm(aim - eye)
+        right = np.cross(ahead, stages[0].framing.up)
+        right /= np.linalg.norm(right)
+        points = np.concatenate([part.reshape(-1, 3) for part in placed(motion).values()])
+        alone = framing(motion)
+        aside = others * alone.reach * alone.right  # where the second one stands
+        seen = np.concatenate([points, points + aside]) - eye
+        scale = HIGH / 2 / np.tan(FIELD / 2)  # pixels
+        x, y = (scale * (seen @ axis) / (seen @ ahead) for axis in (right, np.cross(right, ahead)))
+        assert abs(y).max() < HIGH / 2 and -WIDE / 2 < x.min() and x.max() < WIDE / 2 - CONTROLS
+    finally:
+        found.close()
 
 
 def test_the_viewer_is_seen_by_this_machine_only(viewer):
