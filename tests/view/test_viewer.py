@@ -16,12 +16,11 @@ from gauss.view.skeleton import placed
 from gauss.view.viewer import export_html, page, show
 from gauss.view.viewer.cameras import CAMERAS, placed_camera
 from gauss.view.viewer.forms import forms
-from gauss.view.viewer.framing import FIELD, framing
+from gauss.view.viewer.framing import FIELD, framing, joined
 from gauss.view.viewer.show import LOOPBACK, _free_port
 from gauss.view.viewer.shown import resampled
 
 FLOATS = 1e-6  # relative: positions travel in single precision
-WIDE, HIGH, CONTROLS = 1280, 800, 330  # pixels of a window, and of what its controls cover at the right
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card is needed
 
@@ -57,23 +56,21 @@ def test_the_stage_shows_the_motion(viewer):
 
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("others", [0, 1])
-def test_cameras_show_the_motions_beside_the_controls(motion, others, camera):
-    found = show(motion, beside=motion if others else None, port=_free_port())
-    try:
-        stages = found.player.stages
-        eye, aim = placed_camera(stages[0].framing, camera, WIDE / HIGH)
-        ahead = (aim - eye) / np.linalg.norm(aim - eye)
-        right = np.cross(ahead, stages[0].framing.up)
-        right /= np.linalg.norm(right)
-        points = np.concatenate([part.reshape(-1, 3) for part in placed(motion).values()])
-        alone = framing(motion)
-        aside = others * alone.reach * alone.right  # where the second one stands
-        seen = np.concatenate([points, points + aside]) - eye
-        scale = HIGH / 2 / np.tan(FIELD / 2)  # pixels
-        x, y = (scale * (seen @ axis) / (seen @ ahead) for axis in (right, np.cross(right, ahead)))
-        assert abs(y).max() < HIGH / 2 and -WIDE / 2 < x.min() and x.max() < WIDE / 2 - CONTROLS
-    finally:
-        found.close()
+@pytest.mark.parametrize("width, height, right, lower", [(1280, 800, 330, 0), (390, 844, 0, 506)])  # of the controls
+def test_cameras_show_the_motions_beside_the_controls(motion, others, camera, width, height, right, lower):
+    alone = framing(motion)
+    displacement = alone.reach * alone.right
+    view = joined(alone, alone, displacement) if others else alone
+    eye, aim = placed_camera(view, camera, width / height)
+    assert (eye - view.floor) @ view.up > 0
+    ahead = (aim - eye) / np.linalg.norm(aim - eye)
+    across = np.cross(ahead, view.up) / np.linalg.norm(np.cross(ahead, view.up))
+    points = np.concatenate([part.reshape(-1, 3) for part in placed(motion).values()])
+    seen = np.concatenate([points, points + others * displacement]) - eye
+    scale = height / 2 / np.tan(FIELD / 2)  # pixels
+    x, y = (scale * (seen @ axis) / (seen @ ahead) for axis in (across, np.cross(across, ahead)))
+    assert -width / 2 < x.min() and x.max() < width / 2 - right
+    assert lower - height / 2 < y.min() and y.max() < height / 2
 
 
 def test_the_viewer_is_seen_by_this_machine_only(viewer):

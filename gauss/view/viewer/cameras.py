@@ -34,7 +34,8 @@ def placed_camera(view: Framing, camera: str, aspect: float) -> tuple[np.ndarray
     distance = np.linalg.norm(ahead)
     up = view.up - (view.up @ ahead) / distance**2 * ahead
     lower = ABOVE * np.tan(FIELD / 2) * distance / np.linalg.norm(up) * up
-    return aim - ahead - lower, aim - lower
+    level = CAMERAS[camera][2] == 0.0  # lower, it would stand under the floor: it looks down instead
+    return aim - ahead - (0.0 if level else lower), aim - lower
 
 
 def shifted(view: Framing, place: np.ndarray, aim: np.ndarray, share: float = ASIDE) -> tuple[np.ndarray, np.ndarray]:
