@@ -231,7 +231,7 @@ def chart(
     root: Root = "fixed",
 ):
     """Chart what a digit costs: error against wall time of integrators and backends, beside a reference made on the fly."""
-    from gauss.bench.precision import attempts, front, reference
+    from gauss.bench.precision import attempts, described, front, reference
     from gauss.view.precision import plot_precision, refusals
     from gauss.view.style import check_format
 
@@ -247,7 +247,7 @@ def chart(
     for one in attempts(system, duration, against, integrator, time_limit, backend):
         done.append(one)
         if not one.reason:
-            typer.echo(f"  {one.method:20} {one.setting:8.2g}  error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms")
+            typer.echo(f"  {one.method:20} {described(one):16}  error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms")
     if refused := refusals(done):
         typer.echo("No result:")
     for reason, methods in refused.items():
@@ -255,7 +255,7 @@ def chart(
     typer.echo("Pareto front:")
     for one in front(done):
         error = f"{one.error:.1e} m" if one.error else "the reference to the last bit"
-        typer.echo(f"  {error} in {1e3 * one.seconds:.3g} ms by {one.method}, {one.setting:.2g}")
+        typer.echo(f"  {error} in {1e3 * one.seconds:.3g} ms by {one.method}, {described(one)}")
     name = found.name or scene
     title, note = f"What a digit costs: {name}, {duration:g} s", f"reference: {against.source}"
     plot_precision({name: done}, output, title, note, {name: against.uncertainty})

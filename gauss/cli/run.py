@@ -1,6 +1,7 @@
 """Command ``gauss run``."""
 
 import warnings
+from collections import Counter
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -174,8 +175,8 @@ def _report(trajectory):
         coordinates, rates = stats.global_error
         lines["global error"] = f"{coordinates:.1e} of coordinates [rad, m], {rates:.1e} of rates [rad/s, m/s], estimated"
     if trajectory.events:
-        impacts = sum(event.kind == "impact" for event in trajectory.events)
-        lines["events"] = f"{impacts} impacts, {len(trajectory.events) - impacts} openings and closings"
+        counts = Counter(event.kind for event in trajectory.events)
+        lines["events"] = ", ".join(f"{number} × {kind}" for kind, number in counts.most_common())
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")

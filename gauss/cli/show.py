@@ -7,13 +7,14 @@ from typing import Annotated, Any
 import typer
 
 import gauss
-from gauss.cli.common import Root, load, started
+from gauss.cli.common import Read, Root, load, started
 from gauss.errors import FileError
 
 Shown = Annotated[
     str,
     typer.Argument(
-        help="A scene, as for `gauss run`, which is simulated; or a motion that `gauss run --output` wrote as .nc or .zarr.",
+        help="A scene, as for `gauss run`, which is simulated; or a motion that `gauss run --output` wrote as .nc, .h5 or "
+        ".zarr.",
         show_default=False,
     ),
 ]
@@ -27,6 +28,7 @@ def show(
     start: Annotated[list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE; may be repeated.")] = None,
     speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE; may be repeated.")] = None,
     root: Root = "fixed",
+    read: Read = None,
     reactions: Annotated[
         list[str] | None, typer.Option(help="Joint whose reaction is drawn as an arrow, or all; may be repeated.")
     ] = None,
@@ -38,18 +40,19 @@ def show(
         list[str] | None, typer.Option(help="Body or frame that leaves a trace; may be repeated. Tips when not given.")
     ] = None,
     beside: Annotated[
-        Path | None, typer.Option(help="Second motion, that `gauss run` wrote as .nc or .zarr, played beside the first.")
+        Path | None,
+        typer.Option(help="Second motion (.nc, .h5, .zarr, of `gauss run`), played beside the first."),
     ] = None,
     dark: Annotated[bool, typer.Option("--dark", help="Begin with the dark ground.")] = False,
     port: Annotated[int, typer.Option(help="Port of the viewer.", min=1, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
     """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
-    if Path(scene).suffix.lower() in import_module("gauss.io.load").LABELLED:
+    if Path(scene).suffix.lower() in import_module("gauss.io.load").RESULTS:
         thing = gauss.load_motion(scene)
         visuals = _kept(scene, thing.system.scene)
     else:
-        found = load(scene, root)
+        found = load(scene, root, read)
         found = found if isinstance(found, gauss.Scene) else found.system.scene
         visuals = import_module("gauss.io.visuals").read_visuals(scene, root)
         found = started(found, start, speed)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.cli.common import INTERRUPTED, Atol, Root, SceneName, check_files, load, tolerances
+from gauss.cli.common import INTERRUPTED, Atol, Read, Root, SceneName, check_files, load, tolerances
 from gauss.errors import FileError, extra
 from gauss.simulation import INTEGRATORS
 
@@ -44,10 +44,11 @@ def sweep(
         ),
     ] = None,
     root: Root = "fixed",
+    read: Read = None,
 ):
     """Simulate a scene with many values of its masses, lengths, starts, …, and report their outcomes."""
     check_files("dataset", output)
-    found = load(scene, root)
+    found = load(scene, root, read)
     if not isinstance(found, gauss.Scene):
         raise FileError(f"{scene}: servos are not simulated in sweeps; sweep the scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)

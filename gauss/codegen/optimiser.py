@@ -101,7 +101,7 @@ class Optimiser:
             QUICK: "quick only",
             OPTIMISED: "optimised before it runs",
         }
-        waiting = f"; {left} modules are being optimised" if left else ""
+        waiting = f"; modules that are being optimised: {left}" if left else ""
         failed = f"; optimisation failed, the code stays quick: {'; '.join(self.failures)}" if self.failures else ""
         return f"{words[tier]} ({VARIABLE}={tier}){waiting}{failed}"
 

@@ -40,7 +40,7 @@ def build(output: Path, program, gallery: bool = True, strict: bool = False) -> 
         If Sphinx or one of its extensions is not installed.
     """
     with extra("docs"):
-        for package in ("furo", "myst_parser", "sphinx_copybutton", "sphinx_design", "sphinx_gallery"):
+        for package in ("furo", "joblib", "myst_parser", "sphinx_copybutton", "sphinx_design", "sphinx_gallery"):
             import_module(package)
         sphinx = import_module("sphinx.cmd.build")
     work = output / ".build"

@@ -50,6 +50,7 @@ sphinx_gallery_conf = {
     "reset_modules": (figures.reset,),
     "backreferences_dir": None,
     "download_all_examples": False,
+    "parallel": True,  # as many processes as Sphinx has
     "show_memory": False,
     "show_signature": False,
     "min_reported_time": 1_000_000,

@@ -1,13 +1,15 @@
 """Environment of one motion."""
 
-import gymnasium
 import numpy as np
 
 from gauss.dynamics.outputs import split
-from gauss.errors import ArgumentError, SimulationError
+from gauss.errors import ArgumentError, SimulationError, extra
 from gauss.gym.task import Task
 from gauss.simulation import Simulator
 from gauss.simulation.held_inputs import real_numbers
+
+with extra("gym"):
+    import gymnasium
 
 
 class MechanismEnv(gymnasium.Env):

@@ -1,14 +1,16 @@
 """Environments of many motions: all of them make their steps in one call, in the lanes of vector registers."""
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 
 from gauss.dynamics.outputs import split
-from gauss.errors import ArgumentError, SimulationError
+from gauss.errors import ArgumentError, SimulationError, extra
 from gauss.gym.task import Task
 from gauss.simulation import SimulatorBatch
 from gauss.system import State, retract
+
+with extra("gym"):
+    from gymnasium.vector import AutoresetMode, VectorEnv
+    from gymnasium.vector.utils import batch_space
 
 
 class MechanismVectorEnv(VectorEnv):

@@ -13,6 +13,7 @@ from gauss.dynamics import Plan, compile_scene
 from gauss.errors import ArgumentError, FileError, MissingPackageError, require
 from gauss.io.columns import COLUMNS, as_dataset, columns
 from gauss.io.labelled import of_motion, of_rollout, of_rotors, of_tracking
+from gauss.io.load import LABELLED, RESULTS
 from gauss.rotors import RotorMotion
 from gauss.scene.toml import from_tables
 from gauss.servo import Tracking
@@ -132,7 +133,7 @@ def load_motion(path) -> Trajectory:
     Parameters
     ----------
     path : str or Path
-        The file, .nc, or folder, .zarr.
+        The file, .nc or .h5, or folder, .zarr.
 
     Returns
     -------
@@ -146,6 +147,10 @@ def load_motion(path) -> Trajectory:
     """
     if not Path(path).exists():
         raise FileError(f"{path}: no such file.")
+    kind = Path(path).suffix.lower()
+    if kind in RESULTS and kind not in LABELLED:
+        others = ", ".join(LABELLED)
+        raise FileError(f"{path}: {kind} files hold numbers without their scene; motions are read from {others}.")
     try:
         engine = "zarr" if Path(path).suffix == ".zarr" else "h5netcdf"
         with library("xarray").open_dataset(path, engine=engine) as file:

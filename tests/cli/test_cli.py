@@ -30,6 +30,11 @@ def test_run_writes_what_it_is_asked_for(tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
+def test_events_are_counted_by_their_kind():
+    result = call("run", "friction_oscillator", "--duration", 3)
+    assert "4 × slips, 1 × holds" in result.output  # at the half swings of 0.1 π s, until it sticks
+
+
 def test_starts_from_the_command_line(tmp_path):
     motion = tmp_path / "motion.npz"
     arguments = ("--start", "A=0.3", "--speed", "A=-2", "--speed", "B=1", "--duration", 0.01, "--output", motion)
@@ -119,6 +124,8 @@ def test_help_of_a_group_lists_whole_summaries(group):
         (("run", "pendulum", "--duration", "1e9", "--output", "none/motion.csv"), "there is no folder 'none'"),
         (("run", "pendulum", "--duration", "1e9", "--plot", "none/motion.png"), "there is no folder 'none'"),
         (("check", "pendulum", "--states", "0"), "states: expected a positive number"),
+        (("show", "motion.npz"), "motion.npz: no such file"),
+        (("show", "pendulum", "--read", "stopps"), "--read: no 'stopps'. Did you mean 'stops'?"),
     ],
 )
 def test_errors_are_one_line_and_an_exit_code(arguments, words):

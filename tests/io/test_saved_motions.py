@@ -130,6 +130,13 @@ def test_what_is_no_motion_is_told_in_one_line(tmp_path, what):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("ending", [".csv", ".json", ".npz"])
+def test_numbers_without_their_scene_are_refused_with_what_is_read(tmp_path, ending):
+    path = gauss.save(gauss.simulate(gauss.load("pendulum"), 0.01), tmp_path / f"motion{ending}")
+    with pytest.raises(FileError, match=r"motions are read from \.nc, \.h5, \.zarr"):
+        gauss.load_motion(path)
+
+
 @pytest.mark.parametrize("text", ["", "\n# nothing yet\n", 'name = "s"\ngravity = [0, 0, -1]\n'])
 def test_a_scene_file_without_bodies_is_named(tmp_path, text):
     path = tmp_path / "scene.toml"

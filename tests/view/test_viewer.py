@@ -12,9 +12,11 @@ import rich
 
 import gauss
 from gauss.errors import FileError
+from gauss.view.skeleton import placed
 from gauss.view.viewer import export_html, page, show
-from gauss.view.viewer.cameras import CAMERAS
+from gauss.view.viewer.cameras import CAMERAS, placed_camera
 from gauss.view.viewer.forms import forms
+from gauss.view.viewer.framing import FIELD, framing, joined
 from gauss.view.viewer.show import LOOPBACK, _free_port
 from gauss.view.viewer.shown import resampled
 
@@ -50,6 +52,25 @@ def test_the_stage_shows_the_motion(viewer):
         along = (tip - root) / np.linalg.norm(tip - root)
         force = stage.reactions["C"][k]
         assert along == pytest.approx(force / np.linalg.norm(force), abs=1e-3)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("others", [0, 1])
+@pytest.mark.parametrize("width, height, right, lower", [(1280, 800, 330, 0), (390, 844, 0, 506)])  # of the controls
+def test_cameras_show_the_motions_beside_the_controls(motion, others, camera, width, height, right, lower):
+    alone = framing(motion)
+    displacement = alone.reach * alone.right
+    view = joined(alone, alone, displacement) if others else alone
+    eye, aim = placed_camera(view, camera, width / height)
+    assert (eye - view.floor) @ view.up > 0
+    ahead = (aim - eye) / np.linalg.norm(aim - eye)
+    across = np.cross(ahead, view.up) / np.linalg.norm(np.cross(ahead, view.up))
+    points = np.concatenate([part.reshape(-1, 3) for part in placed(motion).values()])
+    seen = np.concatenate([points, points + others * displacement]) - eye
+    scale = height / 2 / np.tan(FIELD / 2)  # pixels
+    x, y = (scale * (seen @ axis) / (seen @ ahead) for axis in (across, np.cross(across, ahead)))
+    assert -width / 2 < x.min() and x.max() < width / 2 - right
+    assert lower - height / 2 < y.min() and y.max() < height / 2
 
 
 def test_the_viewer_is_seen_by_this_machine_only(viewer):

@@ -4,6 +4,7 @@ import numpy as np
 
 from gauss.view.viewer.framing import FIELD, VIEW, Framing
 
+ASIDE = 0.2  # of the reach of the motion: half the width of the controls
 ABOVE = 0.6  # of half an upright picture: height of what is seen, above controls that cover its lower part
 
 CAMERAS = {  # from what is seen to the eye: right, away, up
@@ -24,13 +25,21 @@ def placed_camera(view: Framing, camera: str, aspect: float) -> tuple[np.ndarray
     """Position (3,) of a camera, and the point (3,) that it looks at [m], in a picture of some width over its height.
 
     In an upright picture, as of a telephone, it stands so far away that the width holds the motion, which is seen above the
-    controls.
+    controls; else these stand on its right.
     """
     place, aim = eye(view, camera), view.middle
     if aspect >= 1.0:
-        return place, aim
+        return shifted(view, place, aim)
     ahead = (aim - place) / aspect
     distance = np.linalg.norm(ahead)
     up = view.up - (view.up @ ahead) / distance**2 * ahead
     lower = ABOVE * np.tan(FIELD / 2) * distance / np.linalg.norm(up) * up
-    return aim - ahead - lower, aim - lower
+    level = CAMERAS[camera][2] == 0.0  # lower, it would stand under the floor: it looks down instead
+    return aim - ahead - (0.0 if level else lower), aim - lower
+
+
+def shifted(view: Framing, place: np.ndarray, aim: np.ndarray, share: float = ASIDE) -> tuple[np.ndarray, np.ndarray]:
+    """Camera and what it looks at, moved to the right by a share of the size of what is seen."""
+    right = np.cross(aim - place, view.up)
+    shift = share * view.reach * right / np.linalg.norm(right)
+    return place + shift, aim + shift

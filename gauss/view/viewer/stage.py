@@ -8,6 +8,7 @@ from gauss.analysis import reactions
 from gauss.dynamics.kinematics import kinematics
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS
+from gauss.view.viewer.cameras import ASIDE, shifted
 from gauss.view.viewer.forms import forms, size
 from gauss.view.viewer.framing import FIELD, framing, joined
 from gauss.view.viewer.ground import ground, sky
@@ -17,7 +18,6 @@ from gauss.view.viewer.touches import touches
 STEEL, CONTACT = (0.32, 0.34, 0.38), (0.85, 0.65, 0.3)  # colours of joints and shapes of contact
 ARROW = 0.35  # longest arrow, of the size of the mechanism
 RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contact forces
-ASIDE = 0.2  # of the reach of the motion: half the width of the controls
 FAINT = 1e-3  # of the largest contact force: smaller ones are not drawn
 POINT = 0.016  # radius of a contact point, of the size of the mechanism
 SKY_LIGHT, GROUND_LIGHT, DIFFUSE = (255, 255, 255), (170, 175, 185), 3.2  # of the light that casts no shadows
@@ -101,10 +101,8 @@ class ViewerStage:
         if beside is not None:
             self.framing = joined(self.framing, beside.framing, self.place_beside(beside))
         view, camera = self.framing, self.server.initial_camera
-        ahead = view.middle - view.eye
-        right = np.cross(ahead, view.up)
-        shift = aside * view.reach * right / np.linalg.norm(right)
-        camera.look_at, camera.position = tuple(view.middle + shift), tuple(view.eye + shift)
+        place, aim = shifted(view, view.eye, view.middle, aside)
+        camera.look_at, camera.position = tuple(aim), tuple(place)
 
     def _surroundings(self):
         view, scene = self.framing, self.server.scene
