@@ -112,20 +112,19 @@ class MechanismMemory(CompiledStepMemory):
         given[given.size - inputs.size :] = inputs
         if self.stepper.kernels.receiver is not None:
             return self._calling(state, work, ends, rows)
-        modes = self.record.kept()
         found = super().advance(state, work, ends, rows)
         last = rows[found.steps - 1]
-        return found if not found.steps or isfinite(last @ last) else self._sound(found, rows, modes)
+        return found if not found.steps or isfinite(last.dot(last)) else self._sound(found, rows)
 
-    def _sound(self, found: LoopOfSteps, rows: np.ndarray, modes: np.ndarray) -> LoopOfSteps:
+    def _sound(self, found: LoopOfSteps, rows: np.ndarray) -> LoopOfSteps:
         """Steps before one without finite results, which is left to Python; the forces that it begins from are forgotten."""
         finite = np.isfinite(rows[: found.steps]).all(axis=1)
         if finite.all():
             return found
-        sound = int(finite.argmin())
+        sound, modes = int(finite.argmin()), self.record.kept()
+        for change in reversed(found.changes):
+            modes[change.element] = modes[change.element] if change.step < sound else change.before
         changes = [change for change in found.changes if change.step < sound]
-        for change in changes:
-            modes[change.element] = change.after
         self.stepper.forget_forces()
         self.record.take(modes)
         return LoopOfSteps(sound, 0.0, changes, False)
