@@ -85,7 +85,7 @@ def real_array(value, what: str, expected: str = "numbers") -> np.ndarray:
     """
     try:
         found = np.asarray(value)
-    except ValueError:  # rows of several lengths
+    except (ValueError, RuntimeError):  # rows of several lengths; a tensor of torch in a graph of gradients
         found = np.asarray(None)
     if found.dtype.kind not in "biuf" and found.size:
         raise ArgumentError(f"{what}: expected {expected}, got {value!r:.80}.")

@@ -11,6 +11,7 @@ import numpy as np
 from gauss.errors import ArgumentError, GaussError, StateError
 
 CONVERTIBLE_KINDS = "biufO"  # kinds of numpy dtypes converted to float; complex would lose its imaginary part
+LINE = 64  # bytes of a cache line
 Shape = tuple[int, ...]
 
 
@@ -173,7 +174,7 @@ class PythonWrapper:
         if targets is not None and targets[k].size and targets[k].flags.c_contiguous:
             if not any(np.may_share_memory(targets[k], given) for given in inputs):
                 return targets[k].reshape(shape)
-        return np.empty(shape)
+        return _aligned(shape)
 
     def _one_of_batch(self, row: int, inputs, found):
         """Replace the results of a row that exceeds its limits by those of the other function."""
@@ -222,6 +223,13 @@ def _unpacked(results: list):
     return results[0] if len(results) == 1 else tuple(results)
 
 
+def _aligned(shape: Shape) -> np.ndarray:
+    """New array that begins at a cache line: JAX shares no memory that begins elsewhere."""
+    room = np.empty(prod(shape) + LINE // 8)
+    first = -room.__array_interface__["data"][0] % LINE // 8
+    return room[first : first + prod(shape)].reshape(shape)
+
+
 def _target(out, shape: Shape) -> np.ndarray:
     """Writeable array of doubles of a shape; memory of other libraries is taken as it is (DLPack)."""
     array = _as_array(out)
@@ -236,6 +244,8 @@ def _as_array(given):
     """Array of another library as an array of numpy, without a copy where its memory can be shared; else what was given."""
     if isinstance(given, np.ndarray) or not hasattr(given, "__dlpack__"):
         return given
+    if hasattr(given, "is_neg") and given.is_neg():  # torch: its memory holds the numbers with the other sign
+        return given
     try:
         return np.from_dlpack(given)
     except (BufferError, RuntimeError, TypeError, ValueError):  # on another device, or part of a graph of gradients
@@ -247,7 +257,7 @@ def as_doubles(given) -> np.ndarray | None:
     try:
         array = np.asarray(_as_array(given))
         return array.astype(float, copy=False) if array.dtype.kind in CONVERTIBLE_KINDS else None
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, RuntimeError):  # the last of torch: part of a graph of gradients, or a negative view
         return None
 
 
@@ -288,6 +298,9 @@ def _number(name: str, given) -> float:
 def described(given) -> str:
     """What was given, for a message."""
     if not isinstance(given, np.ndarray):
+        if hasattr(given, "shape") and hasattr(given, "dtype"):
+            graph = ", part of a graph of gradients: detach() it" if getattr(given, "requires_grad", False) else ""
+            return f"a {type(given).__name__} of shape {tuple(given.shape)} and type {given.dtype}{graph}"
         text = repr(given)
         return text if len(text) <= 60 else f"{text[:60]}…"
     locked = "" if given.flags.writeable else "read-only "

@@ -7,8 +7,8 @@ driver              dynamics        applies to
 ==================  ==============  =====================================================================================
 constant            none            scenes without degrees of freedom
 time stepping       compiled        ``integrator="time_stepping"``
-time stepping       pair kernels    the same with many contacts of shapes
 time stepping       callbacks       the same with opaque laws, called by machine code
+time stepping       pair kernels    the same with many contacts of shapes
 time stepping       certified       the same, where the dynamics cannot be compiled
 events              compiled        unilateral constraints, joint friction, limited forces, losses
 events              certified       the same, with an explicit backend
@@ -148,7 +148,7 @@ _CODE = own_backend, compilable
 _WHOLE = *_CODE, written_out, traced_laws, narrow
 _DENSE_STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem
 _STEP, _CALLING_STEP = (*_DENSE_STEP, smooth(traced_laws)), (*_DENSE_STEP, callbacks, few_contact_operations)
-_PAIR_KERNELS = own_backend, smooth(traced_laws), takes_pair_kernels
+_PAIR_KERNELS = own_backend, takes_pair_kernels
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
 _KERNEL_LOOP = *_CODE, callbacks, explicit, no_held_inputs
@@ -158,8 +158,8 @@ MOTIONS = RuleTable(
     (
         Rule("constant", "none", when=_motionless),
         Rule("time stepping", "compiled", "certified", is_time_stepping, (*_STEP, few_contact_operations)),
-        Rule("time stepping", "pair kernels", "", _both(is_time_stepping, shapes_in_contact), _PAIR_KERNELS),
         Rule("time stepping", "callbacks", "certified", _both(is_time_stepping, has_opaque_laws), _CALLING_STEP),
+        Rule("time stepping", "pair kernels", "", _both(is_time_stepping, shapes_in_contact), _PAIR_KERNELS),
         Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs, closed_form_contacts)),
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, closed_form_contacts)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, closed_form_contacts)),

@@ -143,7 +143,7 @@ def _numbers(value, expected: str) -> np.ndarray:
     """Array of numbers, or a SimulationError with what was expected; text is no number."""
     try:
         found = np.asarray(value)
-    except ValueError:  # ragged
+    except (ValueError, RuntimeError):  # ragged; a tensor of torch in a graph of gradients
         found = np.asarray(None)
     if found.size and found.dtype.kind not in "iuf":
         raise SimulationError(f"{expected}, got {value!r}.")

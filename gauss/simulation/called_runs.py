@@ -15,13 +15,13 @@ from gauss.codegen.tiers import EntryPoint
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT
 from gauss.dynamics.load_forces import LoadForces
+from gauss.dynamics.load_receiver import LoadReceiver
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Rates
 from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_run import CompiledRun
-from gauss.simulation.load_receiver import LoadReceiver
 from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import PROGRESS_TRIALS, SMALLEST_STEP
 from gauss.simulation.trajectory import Trajectory

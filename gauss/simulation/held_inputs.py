@@ -150,7 +150,7 @@ def real_numbers(value) -> np.ndarray | None:
     """Array of numbers; None of anything else."""
     try:
         found = np.asarray(value)
-    except ValueError:  # ragged
+    except (ValueError, RuntimeError):  # ragged; a tensor of torch in a graph of gradients
         return None
     return found.astype(float) if found.dtype.kind in "biuf" else None
 

@@ -17,6 +17,7 @@ from gauss.codegen import one_tier
 from gauss.codegen.kernels import Due, LoopStatus
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.laws.switching import Switching
+from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.traced_system import Program
@@ -28,7 +29,6 @@ from gauss.simulation.called_runs import CalledFixedRun
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.held_inputs import HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
-from gauss.simulation.load_receiver import output_kernel
 from gauss.simulation.moreau.called_run import CalledMoreauRun
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
@@ -388,7 +388,7 @@ def random_changes(seed, spread: float, shape: tuple[int, ...]) -> np.ndarray:
 def _floats(u) -> np.ndarray | None:
     try:
         return np.asarray(u, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, RuntimeError):  # the last of torch
         return None
 
 

@@ -7,6 +7,7 @@ import pytest
 
 import gauss
 from gauss.codegen import content_digest
+from gauss.codegen.python_wrapper import as_doubles
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import ArgumentError, SimulationError, StateError
 from gauss.system import State, random_state, retract
@@ -291,6 +292,36 @@ def test_arrays_of_any_strides_types_and_libraries_give_the_same(arm):
     frame = list(arm.frames)[-1]
     assert arm.forward_kinematics(Q, frame, out=parts) is parts
     assert all(np.array_equal(*pair) for pair in zip(parts, arm.forward_kinematics(Q, frame), strict=True))
+
+
+def test_tensors_of_torch_share_their_memory(arm):
+    torch = pytest.importorskip("torch")
+    Q, V = states(arm, 9)
+    q, v, out = torch.from_numpy(Q), torch.from_numpy(V), torch.zeros(9, arm.n_v, dtype=torch.float64)
+    taken = as_doubles(q)
+    assert taken is not None and taken.ctypes.data == q.data_ptr()
+    expected, place = arm.bias_forces(Q, V), out.data_ptr()
+    assert arm.bias_forces(q, v, out=out) is out and out.data_ptr() == place and np.array_equal(out.numpy(), expected)
+    found = arm.bias_forces(q, v)
+    assert torch.from_dlpack(found).data_ptr() == found.ctypes.data and np.array_equal(found, expected)
+    with pytest.raises(StateError, match="detach"):
+        arm.bias_forces(q.clone().requires_grad_(True), v)
+    with pytest.raises(StateError, match="Tensor of shape"):
+        arm.bias_forces(torch._neg_view(q), v)  # noqa: SLF001  # as the imaginary part of a conjugate: memory of the other sign
+
+
+def test_arrays_of_jax_share_their_memory(arm):
+    jax = pytest.importorskip("jax")
+    Q, V = states(arm, 9)
+    with jax.enable_x64(True):
+        q, v = jax.numpy.array(Q), jax.numpy.array(V)
+        taken = as_doubles(q)
+        assert taken is not None and taken.ctypes.data == q.unsafe_buffer_pointer()
+        found = arm.bias_forces(q, v)
+        assert jax.dlpack.from_dlpack(found).unsafe_buffer_pointer() == found.ctypes.data
+        assert np.array_equal(found, arm.bias_forces(Q, V))
+        with pytest.raises(StateError, match="writeable"):
+            arm.bias_forces(q, v, out=jax.numpy.zeros_like(v))
 
 
 def test_functions_that_a_system_keeps_leave_its_content_known():

@@ -16,11 +16,19 @@ SMOOTH = ("rk4", "semi_implicit_euler", "time_stepping")
 CASES = [(model, method) for model in MODELS for method in SMOOTH] + [("friction_oscillator", "time_stepping")]
 
 
-def systems(model: str) -> list[gauss.System]:
-    """A system with an opaque law of a rate, and that with the same law, traced."""
+def with_boxes(scene: gauss.Scene, at: float = 5.0) -> gauss.Scene:
+    """The scene with a box on its last body beside a wall: more operations of contacts than are written out."""
+    scene.box("plate", list(scene.bodies)[-1], (0.1, 0.1, 0.1))
+    scene.box("wall", "ground", (0.2, 2.0, 2.0), at=(at, 0.0, 0.0))
+    scene.contact("touch", "plate", "wall", friction=0.2)
+    return scene
+
+
+def systems(model: str, at: float | None = None) -> list[gauss.System]:
+    """A system with an opaque law of a rate, and that with the same law, traced; with a wall if its place is given."""
 
     def made(number) -> gauss.System:
-        scene = gauss.load(model)
+        scene = gauss.load(model) if at is None else with_boxes(gauss.load(model), at)
         hinges = [name for name, joint in scene.joints.items() if joint.pair.n_v == 1]
         scene.input("u", hinges[0], limits=LIMIT)
         scene.drive(hinges[-1], torque=lambda t, at: -0.3 * number(at.rate(hinges[-1])) + 0.1 * number(t))
@@ -78,6 +86,30 @@ def test_simulators_batches_and_rollouts(model, method):
             same(one, other)
 
 
+@pytest.mark.parametrize("at, close", [(5.0, SAME), (0.35, 1e-8)])  # a wall out of reach, and one that is hit
+def test_contacts_of_many_operations(at, close):
+    motions, held, stepped = [], [], []
+    control = {"control": lambda t, q, v: 3.0 * np.sin(7.0 * t), "rate": RATE}
+    for system in systems("double_pendulum", at):
+        motions.append(gauss.simulate(system, 1.0, integrator="time_stepping", step=STEP, progress=False))
+        run = {"integrator": "time_stepping", "step": STEP, "progress": False}
+        held.append(gauss.simulate(system, DURATION, **run, **control).q)
+        simulator = gauss.Simulator(system, step=STEP)
+        simulator.step([1.0], n=50)
+        kept = simulator.snapshot()
+        simulator.step([2.0], n=300)
+        reached = np.concatenate([*simulator.coordinates, simulator.output_vector()])
+        simulator.restore(kept)
+        simulator.step([2.0], n=300)
+        assert np.array_equal(np.concatenate([*simulator.coordinates, simulator.output_vector()]), reached)
+        stepped.append(reached)
+    opaque, traced = motions
+    assert opaque.stats.plan.dynamics == traced.stats.plan.dynamics == "pair kernels"
+    assert len(opaque.events) == len(traced.events) and bool(opaque.events) == (at < 1.0)
+    for one, other in ((opaque.q, traced.q), (opaque.v, traced.v), (opaque.work, traced.work), stepped, held):
+        np.testing.assert_allclose(one, other, rtol=close, atol=close * max(1.0, np.abs(other).max()))
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_prepared_motions_and_adaptive_rollouts(model):
     run = {"integrator": "dop853", "rtol": 1e-10, "times": [0.0, 0.07, DURATION]}
@@ -106,6 +138,24 @@ def _ending(last: float) -> gauss.System:
 
     scene.drive("pin", torque=law)
     return gauss.compile_scene(scene)
+
+
+@pytest.mark.parametrize("failed", [lambda: 1 / 0, lambda: np.nan])
+def test_a_law_that_fails_beside_contacts_of_many_operations_leaves_the_state_before(failed):
+    scene = with_boxes(gauss.load("double_pendulum"))
+    scene.drive("A", torque=lambda t, at: 0.1 if float(t) < 0.1 else failed())
+    system = gauss.compile_scene(scene)
+    simulator = gauss.Simulator(system, step=1e-2)
+    simulator.step(n=10)
+    reached = simulator.coordinates
+    simulator.reset()
+    with pytest.raises(SimulationError, match="drive of A"):
+        simulator.step(n=200)
+    assert simulator.t == pytest.approx(0.1, rel=SAME)
+    np.testing.assert_array_equal(simulator.coordinates, reached)
+    with pytest.raises(SimulationError, match="drive of A") as caught:
+        gauss.simulate(system, 1.0, integrator="time_stepping", step=1e-2, progress=False)
+    assert len(caught.value.trajectory) == 11
 
 
 def test_a_law_that_raises_leaves_a_simulator_as_it_was():

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss import Plan
-from gauss.errors import StateError
+from gauss.errors import SimulationError, StateError
 from tests.simulation.test_mechanism_contacts import GAIN, SAME_STEPS, STEP, arm, driven
 
 KERNELS, WRITTEN_OUT = Plan("time stepping", "pair kernels"), Plan("time stepping", "compiled")
@@ -180,3 +180,16 @@ def test_a_gripper_holds_up_to_the_limit_of_friction(squeeze):
     slides = max(0.0, 9.81 - 2.0 * 0.5 * squeeze)
     assert simulator.state.v[0] == pytest.approx(-0.1 * slides, abs=1e-8)
     assert simulator.state.q[0] == pytest.approx(-0.5 * slides * 0.1**2, abs=1e-6)
+
+
+def test_a_law_without_numbers_leaves_the_state_before():
+    scene = with_motor()
+    scene.drive("hinge 1", name="failing", torque=lambda t, at: gauss.math.sqrt(0.1003 - t))
+    simulator = gauss.Simulator(gauss.compile_scene(scene), step=1e-3)
+    simulator.step(n=100)
+    reached = simulator.coordinates
+    simulator.reset()
+    with pytest.raises(SimulationError, match="not finite"):
+        simulator.step(n=200)
+    assert simulator.t == pytest.approx(0.1)
+    np.testing.assert_array_equal(simulator.coordinates, reached)

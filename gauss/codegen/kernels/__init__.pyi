@@ -24,7 +24,7 @@ from gauss.codegen.kernels.fixed_step import Due, Fixed, Notes
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.free_body_step import CompiledFreeBodyStep, FreeBodyFunctions
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
-from gauss.codegen.kernels.mechanism_loop import CompiledSteps
+from gauss.codegen.kernels.mechanism_loop import CallingSteps, CompiledSteps
 from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
@@ -44,6 +44,7 @@ __all__ = [
     "BlockLDLT",
     "CallTable",
     "CallingLoop",
+    "CallingSteps",
     "CallRecorder",
     "ContactForces",
     "Control",

@@ -7,6 +7,7 @@ finished, or whose sliding contacts are to be examined, and where there is no ro
 """
 
 import ctypes
+from contextlib import suppress
 
 from llvmlite import ir
 
@@ -24,8 +25,11 @@ from gauss.codegen.kernels.step_memory import (
     MemoryLayout,
     StepMemory,
 )
+from gauss.codegen.python_callback import HOLDING
+from gauss.errors import GaussError
 
-ADVANCE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3, ctypes.c_int64, *[ctypes.c_void_p] * 2)
+ARGUMENTS = *[ctypes.c_void_p] * 3, ctypes.c_int64, *[ctypes.c_void_p] * 2
+ADVANCE, HOLDING_ADVANCE = ctypes.CFUNCTYPE(None, *ARGUMENTS), HOLDING(None, *ARGUMENTS)
 
 
 class _LoopWriter:
@@ -100,13 +104,15 @@ class CompiledSteps:
         What it works on.
     """
 
+    signature = ADVANCE
+
     def __init__(self, step: ir.Function, layout: MemoryLayout = MECHANISM):
         _LoopWriter(step, step.module, layout).write()
         self.code = machine.load(str(step.module))
         self._bind()
 
     def _bind(self):
-        self._advance = self.code.entry("advance", ADVANCE)
+        self._advance = self.code.entry("advance", self.signature)
 
     def __getstate__(self) -> dict:
         return {"code": self.code}
@@ -118,3 +124,23 @@ class CompiledSteps:
     def advance(self, ints: int, addresses: int, work: int, count: int, ends: int, rows: int):
         """Take steps to some times; the arrays of times and of rows are given by their addresses, too."""
         self._advance.call(ints, addresses, work, count, ends, rows)
+
+
+class CallingSteps(CompiledSteps):
+    """Steps whose kernels call Python, see :mod:`gauss.codegen.python_callback`.
+
+    Parameters
+    ----------
+    steps : CompiledSteps
+        Machine code of the steps.
+    """
+
+    signature = HOLDING_ADVANCE
+
+    def __init__(self, steps: CompiledSteps):
+        self.__setstate__(steps.__getstate__())
+
+    def advance(self, ints: int, addresses: int, work: int, count: int, ends: int, rows: int):
+        """Take steps to some times, up to one in which Python raises: who repeats it hears why."""
+        with suppress(GaussError):
+            super().advance(ints, addresses, work, count, ends, rows)

@@ -1,12 +1,13 @@
 """Working memory and addresses of the compiled step of a mechanism: :mod:`gauss.codegen.kernels.mechanism_step`."""
 
 from functools import cache
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.codegen import Function, from_disk, write
-from gauss.codegen.kernels import CompiledMechanismStep, StepFunctions
+from gauss.codegen.kernels import CallingSteps, CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.step_memory import MECHANISM, STEP_SETTINGS, TERMS
 from gauss.dynamics.contact.compiled_step_memory import CompiledStepMemory, LoopOfSteps
 from gauss.dynamics.contact.contact_step import contact_solver
@@ -72,7 +73,8 @@ class MechanismMemory(CompiledStepMemory):
         }
         parts = dict(zip(MechanismTerms._fields, kernels.layout.parts, strict=True))
         terms = {f"flat:{name}": ("flat", parts[name][0].start) for name in TERMS}
-        super().__init__(compiled_mechanism_step(), MECHANISM, sizes, terms)
+        steps = compiled_mechanism_step() if kernels.receiver is None else CallingSteps(compiled_mechanism_step())
+        super().__init__(steps, MECHANISM, sizes, terms)
         self._fill(N)
 
     def _fill(self, N: np.ndarray):
@@ -102,13 +104,48 @@ class MechanismMemory(CompiledStepMemory):
 
     def kernels(self) -> dict[str, int]:
         """Addresses of kernels of the scene."""
-        return {name: getattr(self.stepper.kernels, name).address() for name in ("begin", "forces", "move")}
+        return self.stepper.kernels.addresses()
 
     def advance(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
         """Steps to some times, with the inputs that are held."""
         inputs, given = self.stepper.inputs, self.at["given"]
         given[given.size - inputs.size :] = inputs
-        return super().advance(state, work, ends, rows)
+        if self.stepper.kernels.receiver is not None:
+            return self._calling(state, work, ends, rows)
+        found = super().advance(state, work, ends, rows)
+        last = rows[found.steps - 1]
+        return found if not found.steps or isfinite(last.dot(last)) else self._sound(found, rows)
+
+    def _sound(self, found: LoopOfSteps, rows: np.ndarray) -> LoopOfSteps:
+        """Steps before one without finite results, which is left to Python; the forces that it begins from are forgotten."""
+        finite = np.isfinite(rows[: found.steps]).all(axis=1)
+        if finite.all():
+            return found
+        sound, modes = int(finite.argmin()), self.record.kept()
+        for change in reversed(found.changes):
+            modes[change.element] = modes[change.element] if change.step < sound else change.before
+        changes = [change for change in found.changes if change.step < sound]
+        self.stepper.forget_forces()
+        self.record.take(modes)
+        return LoopOfSteps(sound, 0.0, changes, False)
+
+    def _calling(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
+        """Steps whose kernels call opaque laws, up to one in which such a law raises or returns no numbers."""
+        known, modes = self.known, self.record.kept()
+        try:
+            with self.stepper.kernels.receiver:
+                found = super().advance(state, work, ends, rows)
+        except BaseException:
+            self.known = known
+            self.record.take(modes)
+            raise
+        finite = np.isfinite(rows[: found.steps]).all(axis=1)
+        if finite.all():
+            return found
+        self.known = known
+        self.record.take(modes)
+        sound = int(np.argmin(finite))
+        return self._calling(state, work, ends[:sound], rows) if sound else LoopOfSteps(0, 0.0, [], False)
 
     @property
     def known(self) -> KnownForces:

@@ -12,11 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Kernel, as_number, forward, jacobian, write
+from gauss.codegen import CallingKernel, Kernel, as_number, forward, jacobian, write
+from gauss.dynamics.called_program import called_loads
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.load_forces import generalised_forces
+from gauss.dynamics.load_forces import LoadForces, generalised_forces
+from gauss.dynamics.load_receiver import LoadReceiver, received
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.loop_joints import LoopJoint
 from gauss.dynamics.mechanism import loop_constraints
@@ -117,9 +119,12 @@ class MechanismKernels:
         Whether the inputs of the scene are the last arguments of forces; otherwise they are zero.
     """
 
+    receiver = None  # machine code calls no opaque laws
+
     def __init__(self, system: System, smooth: System, carriers: tuple[int, ...], inputs: bool = False):
         self.system, self.smooth, self.carriers = system, smooth, carriers
         laws = Laws(smooth)
+        self.called, kind = called_loads(smooth) if laws.called else None, CallingKernel if laws.called else Kernel
         self.loads = [*laws.traced, *(input_loads(smooth) if inputs else ())]
         self.inputs = tuple(smooth.scene.inputs) if inputs else ()
         n_q, n_v = smooth.n_q, smooth.n_v
@@ -130,8 +135,8 @@ class MechanismKernels:
             self.layout = arrays
             return (arrays.outputs,)
 
-        self.begin = Kernel(write(begin, 1, n_q, n_v, name="mechanism"), batch=False)
-        self.forces = Kernel(write(self._forces, 1, n_q, n_v, name="forces"), batch=False)
+        self.begin = kind(write(begin, 1, n_q, n_v, name="mechanism"), batch=False)
+        self.forces = kind(write(self._forces, 1, n_q, n_v, name="forces"), batch=False)
         self.move = Kernel(write(lambda q, by: (retract(smooth, q, by),), n_q, n_v, name="move"), batch=False)
 
     def __getstate__(self) -> dict:
@@ -141,6 +146,10 @@ class MechanismKernels:
         """Terms of a state; M, poses, Jacobians and rows."""
         given = np.concatenate([[t], q, v, inputs])
         return MechanismTerms(*self.layout.filled(self.begin(given)))
+
+    def addresses(self) -> dict[str, int]:
+        """Addresses of the kernels by name."""
+        return {name: getattr(self, name).address() for name in ("begin", "forces", "move")}
 
     def _terms(self, t, q, v) -> MechanismTerms:
         terms = StateTerms(self.smooth, q, v, t)
@@ -178,7 +187,11 @@ class MechanismKernels:
         """Generalised forces and power of the loads."""
         motion = Kinematics(self.smooth, State(t, q, v))
         applied = Applied(motion, self.loads)
-        return generalised_forces(motion, applied), [applied.driven, applied.loaded, applied.dissipated]
+        forces, power = generalised_forces(motion, applied), np.array([applied.driven, applied.loaded, applied.dissipated])
+        if self.called is None:
+            return forces, power
+        found = self.called([t], q, v)
+        return forces + found[: self.smooth.n_v], power + found[self.smooth.n_v :]
 
     def _rows(self, t, q, v):
         """Gap functions, rates, Jacobian and biases of stops, ropes and set-valued elements."""
@@ -215,6 +228,23 @@ class MechanismKernels:
         return B, beta
 
 
+class CallingMechanismKernels:
+    """Machine code of one system that calls opaque laws.
+
+    Parameters
+    ----------
+    kernels : MechanismKernels
+        The machine code.
+    receiver : LoadReceiver
+        The loads with opaque laws.
+    """
+
+    def __init__(self, kernels: MechanismKernels, receiver: LoadReceiver):
+        self.kernels, self.receiver = kernels, receiver
+        self.layout, self.move, self.addresses = kernels.layout, kernels.move, kernels.addresses
+        self.terms, self.forces = received(kernels.terms, receiver), received(kernels.forces, receiver)
+
+
 def _body(terms: StateTerms, body: int) -> np.ndarray:
     """Pose, velocities and their rates with q̈ = 0 (24,) of a body in its principal central axes."""
     tree, link = terms.tree, terms.tree.links[body]
@@ -238,7 +268,12 @@ def other_gaps(system: System) -> list[ClosedGap]:
     return [side for side in sides(system.scene) if not isinstance(side.whole, Contact)]
 
 
-def mechanism_kernels(system: System, smooth: System, carriers: tuple[int, ...], inputs: bool = False) -> MechanismKernels:
-    """Machine code of a system, cached with it, and by its content on disk."""
+def mechanism_kernels(
+    system: System, smooth: System, carriers: tuple[int, ...], inputs: bool = False
+) -> MechanismKernels | CallingMechanismKernels:
+    """Machine code of a system, cached with it, and by its content on disk; opaque laws are called beside it."""
+    laws = Laws(smooth)
+    names = tuple(bound.load.name for bound in laws.called)  # a law traced before has other machine code
     make: Callable[[], MechanismKernels] = lambda: MechanismKernels(system, smooth, carriers, inputs)  # noqa: E731
-    return cached_on_disk(system, (MechanismKernels, carriers, inputs, Laws(smooth).key), make)
+    found = cached_on_disk(system, (MechanismKernels, carriers, inputs, laws.key, names), make)
+    return CallingMechanismKernels(found, LoadReceiver(LoadForces(smooth, laws.called))) if laws.called else found

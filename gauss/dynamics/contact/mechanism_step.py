@@ -97,7 +97,7 @@ class MechanismStepper:
     Parameters
     ----------
     system : System
-        A system with contacts of shapes, whose loads are traced.
+        A system with contacts of shapes.
     held : bool
         Whether the inputs of the scene are held in each step; otherwise they are zero.
 
@@ -177,12 +177,15 @@ class MechanismStepper:
         """Forget the forces and inputs of the last step: a new motion begins."""
         self.detection.connect()
         self.inputs[:] = 0.0
-        count = len(self.rows.others) + self.rows.limit.size
-        nothing = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
-        self.known = KnownForces(*nothing, np.zeros(count), 0.0)
+        self.forget_forces()
         self.record.forget()
         if self.memory is not None:
             self.memory.connect()
+
+    def forget_forces(self):
+        """Forget the forces of the last step alone."""
+        count = len(self.rows.others) + self.rows.limit.size
+        self.known = KnownForces(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(count), 0.0)
 
     @property
     def known(self) -> KnownForces:
@@ -284,6 +287,8 @@ class MechanismStepper:
         terms = kernels.terms(t, q, state.v, self.inputs)
         H, offset = self.compliance.of(terms)
         acceleration, power = H @ terms.tau + offset, terms.power
+        if not np.isfinite(acceleration).all():
+            raise SimulationError(f"t = {t:.6g} s: accelerations are not finite; a law or a very fast motion makes them so.")
         return _FreeStep(q, terms, H, offset, acceleration, power)
 
     def _at_later_rates(

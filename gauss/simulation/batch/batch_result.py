@@ -10,6 +10,7 @@ import numpy as np
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import FORCES, INERTIAL, shape_of, split
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean
@@ -19,7 +20,6 @@ from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.machine_code import fixed_step_code
 from gauss.simulation.held_inputs import RecordedInput, driven_as
 from gauss.simulation.integrators import INTEGRATORS
-from gauss.simulation.load_receiver import output_kernel
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import System

@@ -12,6 +12,7 @@ from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.step_modes import UNKNOWN
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.rules import Question
 from gauss.dynamics.scene_compilation import compile_scene
@@ -25,7 +26,6 @@ from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fix
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.integrators import usual_fixed_step
-from gauss.simulation.load_receiver import output_kernel
 from gauss.simulation.simulator import Simulator, SimulatorState, random_changes
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import refuse_jumps, warn_of_passages, warn_of_short_features

@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.codegen.kernels import Control, LoopStatus
+from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.contact_stepper import contact_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
@@ -43,7 +44,8 @@ class PairKernelSteps:
         self.motion.stepper.check(problem.start)
         measured = any(output.kind == "contact_force" for output in problem.system.scene.outputs.values())
         self.gaps = self.motion.stepper.gap_count if measured else 0
-        self.program = Program(ask.system, ask.laws, memory=self.gaps, inputs=held)
+        program = CalledProgram if ask.laws.called else Program
+        self.program = program(ask.system, ask.laws, memory=self.gaps, inputs=held)
         self.layout, self.key = self.program.layout, (ask.laws.key, held, self.gaps)
         self.inputs = np.zeros(len(self.layout.parameters))
 
