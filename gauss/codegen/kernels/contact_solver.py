@@ -231,7 +231,7 @@ class _ContactSolverWriter:
             self.f[i] = self.f[i] + step[i]
 
 
-class CompiledContactSolver:
+class CompiledContactSolver(machine.CodeCaller):
     """Python interface of the contact solver.
 
     Parameters
@@ -246,14 +246,11 @@ class CompiledContactSolver:
         r = Routine(ir.Function(writer.module, inner.function_type, "solve"))
         r.call(inner, *r.integers, *r.arrays)
         r.done()
-        self.__setstate__(machine.load(str(writer.module)))
+        self.code = machine.load(str(writer.module))
+        self._bind()
 
-    def __getstate__(self) -> machine.MachineCode:
-        return self.code
-
-    def __setstate__(self, code: machine.MachineCode):
-        self.code = code
-        self._solve = code.entry("solve", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8))
+    def _bind(self):
+        self._solve = self.code.entry("solve", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8))
 
     def __call__(self, W, b, under, friction, limit, start) -> tuple[np.ndarray, float]:
         """Forces (n,) and the residual of the laws, −1 if no solution was found.

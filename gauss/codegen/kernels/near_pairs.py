@@ -130,7 +130,7 @@ def write_near(place: Function, module: ir.Module) -> ir.Function:
     return _NearPairsWriter(place, module).write()
 
 
-class NearPairs:
+class NearPairs(machine.CodeCaller):
     """Python interface.
 
     Parameters
@@ -147,13 +147,6 @@ class NearPairs:
 
     def _bind(self):
         self._near = self.code.entry("near", NEAR)
-
-    def __getstate__(self) -> dict:
-        return {"code": self.code}
-
-    def __setstate__(self, state: dict):
-        vars(self).update(state)
-        self._bind()
 
     def __call__(self, counts: tuple[int, int, int, int], addresses: list[int]):
         """Find the near contacts; arrays are given by their addresses."""
