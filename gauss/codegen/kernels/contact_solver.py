@@ -14,7 +14,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function, Writer, constant_array, machine
-from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
 
 SMALLEST_DIAGONAL = 1e-300  # lower bound of the largest diagonal entry of W, against a division by zero
@@ -80,7 +80,7 @@ class ContactSolver:
         double* limit, double* f, double* residual, double* room)``: ``f`` holds the initial forces, then the solution;
         ``residual`` the residual of the laws, −1 if no solution was found.
         """
-        kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGER.as_pointer()] + [POINTER] * 5
+        kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGERS] + [POINTER] * 5
         return _ContactSolverWriter(self, subroutine(module, "solve_contacts", kinds)).write()
 
 
