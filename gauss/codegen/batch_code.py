@@ -15,7 +15,7 @@ from gauss.codegen import machine, processor
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import counted_loop
-from gauss.codegen.lanes import DOUBLE, INTEGER, kind
+from gauss.codegen.lanes import DOUBLE, INTEGER, kind, lane_indices
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface
 
@@ -188,7 +188,7 @@ class _BatchWriter:
             high = [j + step if not j & step else width + j for j in range(width)]
             for i in pairs:
                 one, other = block[i], block[i + step]
-                found[i], found[i + step] = (self.b.shuffle_vector(one, other, _places(order)) for order in (low, high))
+                found[i], found[i + step] = (self.b.shuffle_vector(one, other, lane_indices(order)) for order in (low, high))
             block, step = found, 2 * step
         return block
 
@@ -207,7 +207,3 @@ class _BatchWriter:
     def _store(self, vector, pointer, offset):
         place = self.b.gep(pointer, [offset])
         self.b.store(vector, self.b.bitcast(place, kind(self.width).as_pointer()), align=8)
-
-
-def _places(order) -> ir.Constant:
-    return ir.Constant(ir.VectorType(LANE, len(order)), list(order))

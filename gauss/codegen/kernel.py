@@ -14,7 +14,7 @@ ARGUMENTS = ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ct
 SIGNATURE, HOLDING_SIGNATURE = ctypes.CFUNCTYPE(None, *ARGUMENTS), HOLDING(None, *ARGUMENTS)
 
 
-class Kernel:
+class Kernel(machine.CodeCaller):
     """Compiled function of vectors.
 
     Parameters
@@ -46,13 +46,6 @@ class Kernel:
     def address(self) -> int:
         """Address of ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, in the present tier."""
         return self._run.address()
-
-    def __getstate__(self) -> dict:
-        return {name: value for name, value in vars(self).items() if name != "_run"}
-
-    def __setstate__(self, state: dict):
-        vars(self).update(state)
-        self._bind()
 
     def __call__(self, inputs, out=None) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).

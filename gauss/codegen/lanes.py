@@ -52,7 +52,7 @@ class Lanes:
         """Broadcast one number to every lane."""
         if self.width == 1:
             return value
-        places = ir.Constant(ir.VectorType(ir.IntType(32), self.width), [0] * self.width)
+        places = lane_indices([0] * self.width)
         single = self.b.insert_element(ir.Constant(self.kind, ir.Undefined), value, ir.IntType(32)(0))
         return self.b.shuffle_vector(single, ir.Constant(self.kind, ir.Undefined), places)
 
@@ -144,7 +144,7 @@ class Lanes:
         while len(values) > 1:
             width *= 2
             pairs = zip(values[::2], values[1::2], strict=True)
-            values = [self.b.shuffle_vector(x, y, _lanes(range(width))) for x, y in pairs]
+            values = [self.b.shuffle_vector(x, y, lane_indices(range(width))) for x, y in pairs]
         return values[0]
 
     def lane_group(self, vector, place: int):
@@ -152,7 +152,7 @@ class Lanes:
         if self.width == 1:
             return self.b.extract_element(vector, ir.IntType(32)(place))
         lanes = range(place * self.width, (place + 1) * self.width)
-        return self.b.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), _lanes(lanes))
+        return self.b.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), lane_indices(lanes))
 
     def sincos_together(self, angles: dict):
         """Compute sines and cosines of angles {node: value}, a vector register of angles at a time."""
@@ -200,5 +200,6 @@ def _is_condition(value) -> bool:
     return value.type == BIT or (isinstance(value.type, ir.VectorType) and value.type.element == BIT)
 
 
-def _lanes(places) -> ir.Constant:
+def lane_indices(places) -> ir.Constant:
+    """Constant of the lanes that a shuffle takes."""
     return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))

@@ -10,12 +10,35 @@ import zlib
 from gauss.codegen import object_cache, tiers
 from gauss.codegen.object_code import about, linked, optimised_objects, packed, quick_objects, unpacked
 from gauss.codegen.optimiser import OPTIMISER
-from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, MachineCode
+from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, EntryPoint, MachineCode
 
-__all__ = ["MachineCode", "load", "load_cached"]
+__all__ = ["CodeCaller", "MachineCode", "load", "load_cached"]
 
 SHORT = 50_000  # characters of a module that is optimised at once, in less than 30 ms
 COMPRESSION = 1  # level of zlib: 4 ms for a megabyte
+
+
+class CodeCaller:
+    """Base of objects that call machine code; a copy of one, in another process or from disk, looks its functions up anew.
+
+    Attributes
+    ----------
+    code : MachineCode
+        The code.
+    """
+
+    code: MachineCode
+
+    def _bind(self):
+        """Look up the functions that are called."""
+        raise NotImplementedError
+
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in vars(self).items() if not isinstance(value, EntryPoint)}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
 
 
 def load(ir_text: str, optimise: int = 1) -> MachineCode:

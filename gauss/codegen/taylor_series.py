@@ -17,7 +17,7 @@ from gauss.codegen import processor
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER, counted_loop
-from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
+from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes, lane_indices
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.recurrences import LEAD, ROW, SUMS, WINDOW, SeriesPlan
 
@@ -180,7 +180,7 @@ class _ConvolutionWriter(_SeriesWriter):
         none = block.constant(0.0)
         for name, terms in groupby(products, lambda product: product[0]):
             place, after = self.window(name, j), self.window(name, b.add(j, INTEGER(block.width)))
-            total = b.shuffle_vector(block.load(*place), block.load(*after), _places(range(1, block.width + 1)))
+            total = b.shuffle_vector(block.load(*place), block.load(*after), lane_indices(range(1, block.width + 1)))
             for _, sign, one, other in terms:
                 latest = [block.broadcast(self.lanes.load(*self.latest(factor))) for factor in (one, other)]
                 early = b.select(before, block.load(*self.place(one, j)), none)
@@ -312,8 +312,4 @@ def _in_all(b: ir.IRBuilder, value, width: int):
     """Broadcast an integer to every lane."""
     kind = ir.VectorType(INTEGER, width)
     single = b.insert_element(ir.Constant(kind, ir.Undefined), value, ir.IntType(32)(0))
-    return b.shuffle_vector(single, ir.Constant(kind, ir.Undefined), _places([0] * width))
-
-
-def _places(lanes) -> ir.Constant:
-    return ir.Constant(ir.VectorType(ir.IntType(32), len(lanes)), list(lanes))
+    return b.shuffle_vector(single, ir.Constant(kind, ir.Undefined), lane_indices([0] * width))

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.backends.structure import GROUND
 from gauss.codegen.kernels import BlockLDLT, CallRecorder, Operand
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.coupling_calls import CouplingCalls
@@ -29,7 +30,6 @@ from gauss.dynamics.tree_recursion import link_numbers, link_of
 from gauss.system import Subsystem
 
 MOST_LINK_KINDS = 24  # beyond, links are not distinguished by the zeros among their constants
-GROUND = -1
 DAMPED = float(np.sqrt(MU))  # regularisation: along rows with smaller pivots accelerations are undetermined
 
 

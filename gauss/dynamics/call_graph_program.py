@@ -2,7 +2,7 @@
 
 from functools import cached_property
 
-from gauss.codegen.kernels import ENERGY_SAMPLE, RowCode, RowFunction
+from gauss.codegen.kernels import RowCode, RowFunction
 from gauss.dynamics.call_graph_code import CallGraphCode
 from gauss.dynamics.engines.call_graph import call_graph_code
 from gauss.dynamics.kernel_program import KernelProgram
@@ -15,20 +15,10 @@ class CallGraphProgram(KernelProgram):
     has_redundant_rows = False  # the proximal iteration takes redundant rows as they are
 
     @cached_property
-    def rates(self) -> RowFunction:
-        """Function (t, q, v) → (q̈, power of the loads)."""
-        return RowFunction("rates", 1 + self.system.n_q + self.system.n_v, self.system.n_v + 3, self._emit_rates)
-
-    @cached_property
     def projected_rates(self) -> RowFunction:
         """Function (t, q, v) → (q, v) on the constraints, q̈ and power there, 1, position residual."""
         n_q, n_v = self.system.n_q, self.system.n_v
         return RowFunction("projected_rates", 1 + n_q + n_v, n_q + 2 * n_v + 5, self._emit_projected_rates)
-
-    @cached_property
-    def point_check(self) -> RowFunction:
-        """Function of a point → (error of its accelerations, 0, energy sample)."""
-        return RowFunction("check", self.layout.size, 2 + ENERGY_SAMPLE, self._emit_check)
 
     @cached_property
     def _code(self) -> CallGraphCode:

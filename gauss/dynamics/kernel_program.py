@@ -9,7 +9,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from gauss.codegen import Function, PythonCallback, write
-from gauss.codegen.kernels import RowCode
+from gauss.codegen.kernels import ENERGY_SAMPLE, RowCode, RowFunction
 from gauss.dynamics.called_program import called_loads
 from gauss.dynamics.energies import energy_sample, least_magnitude, stored_energies
 from gauss.dynamics.kinematics import Kinematics
@@ -24,6 +24,22 @@ class KernelProgram(Program):
     """Functions of a large system whose dynamics are kernels of its links."""
 
     checks_bodies = False  # the check is by inverse dynamics in link frames
+
+    @cached_property
+    def rates(self) -> RowFunction:
+        """Function (t, q, v) → (q̈, power of the loads)."""
+        return RowFunction("rates", 1 + self.system.n_q + self.system.n_v, self.system.n_v + 3, self._emit_rates)
+
+    @cached_property
+    def point_check(self) -> RowFunction:
+        """Function of a point → (error of its accelerations, 0, energy sample)."""
+        return RowFunction("check", self.layout.size, 2 + ENERGY_SAMPLE, self._emit_check)
+
+    def _emit_rates(self, code: RowCode):
+        raise NotImplementedError
+
+    def _emit_check(self, code: RowCode):
+        raise NotImplementedError
 
     @cached_property
     def _ground(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from functools import cached_property
 
-from gauss.codegen.kernels import ENERGY_SAMPLE, Correction, RowCode, RowFunction
+from gauss.codegen.kernels import Correction, RowCode
 from gauss.dynamics.error_scale import acceleration_scale
 from gauss.dynamics.kernel_program import KernelProgram, ground_acceleration
 from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
@@ -17,16 +17,6 @@ def tree_correction(system: System) -> Correction:
 
 class TreeProgram(KernelProgram):
     """Functions of a large tree; states are not projected, for a tree has no loop constraints."""
-
-    @cached_property
-    def rates(self) -> RowFunction:
-        """Function (t, q, v) → (q̈, power of the loads)."""
-        return RowFunction("rates", 1 + self.system.n_q + self.system.n_v, self.system.n_v + 3, self._emit_rates)
-
-    @cached_property
-    def point_check(self) -> RowFunction:
-        """Function of a point → (error of its accelerations, 0, energy sample)."""
-        return RowFunction("check", self.layout.size, 2 + ENERGY_SAMPLE, self._emit_check)
 
     @cached_property
     def _correction(self) -> Correction:

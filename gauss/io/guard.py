@@ -13,6 +13,7 @@ from gauss.errors import FileError
 from gauss.io.numbers import number
 
 LARGEST_FILE = 20_000_000  # bytes
+MOST_INCLUDES = 1000  # included files of one file, nested ones counted: more is a mistake, or an attack
 DEEPEST = 200  # elements inside elements; parsers call themselves for each
 LARGEST_MAGNITUDE = 1e20  # of a number, in any SI unit: above those of any mechanism
 NAMES = ("name", "link", "joint", "body")  # attributes that may look like numbers and are none

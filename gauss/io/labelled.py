@@ -14,7 +14,6 @@ from gauss.simulation.provenance import library, made_by, plain, provenance, sce
 from gauss.system.coordinate_names import axis_labels
 
 RESIDUALS = "m, rad or rates of these"
-RELATION = "residual of each relation, at its own level"
 AXES, COMPONENTS = ("x", "y", "z"), ("w", "x", "y", "z")
 
 

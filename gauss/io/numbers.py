@@ -4,7 +4,10 @@ import re
 
 import numpy as np
 
+from gauss.errors import FileError, did_you_mean
+
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+LIMITS = ("start", "stops")  # how limits of joints are read: for the search of the initial state, or as stops, too
 UNLIMITED = 1e16  # rad or m: formats write this, the largest double or infinity where there is no limit
 
 
@@ -19,6 +22,18 @@ def numbers(text: str | None, count: int) -> tuple[float, ...] | None:
     if len(found) != count or len((text or "").split()) != count or not np.isfinite(found).all():
         return None
     return tuple(found)
+
+
+def check_option(path, name: str, given: str, options: tuple[str, ...]):
+    """Refuse an option of a reader that is none.
+
+    Raises
+    ------
+    FileError
+        With the file, the name of the option, its values, and the one that may have been meant.
+    """
+    if given not in options:
+        raise FileError(f"{path}: {name}: expected {' or '.join(map(repr, options))}. {did_you_mean(str(given), options)}")
 
 
 def bounds(lowest: float, highest: float) -> tuple[float, float] | None:

@@ -10,9 +10,10 @@ from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, full_turn
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.cycles import cycle
-from gauss.linkages.elements import GROUND, PlanarLink
+from gauss.linkages.elements import PlanarLink
 from gauss.linkages.loads import centre
 from gauss.linkages.plane import cross
+from gauss.scene import GROUND
 
 ANGLES = 360  # crank angles at which a balance is fitted
 

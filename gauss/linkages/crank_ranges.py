@@ -10,8 +10,8 @@ from gauss.errors import LinkageError
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, end_of_turn
 from gauss.linkages.motion import closure_slack, ternaries
+from gauss.linkages.quadrature import SAMPLES
 
-SAMPLES = 1440  # crank angles of a turn: a range narrower than ¼° may be missed
 BISECTIONS = 45  # ends of ranges to 2π / 1440 / 2⁴⁵ ≈ 1e-16 rad
 GRID_STEP = np.radians(1.0)  # between poses kept on the branch of a class III group
 SHORTEST = 1e-10  # step at which the end of a branch is reached [rad]

@@ -14,14 +14,13 @@ from gauss.linkages.chain import Chain
 from gauss.linkages.conditioning import conditions, loss
 from gauss.linkages.crank_ranges import near
 from gauss.linkages.cycle_result import Cycle
-from gauss.linkages.extended import FIELDS, extended
+from gauss.linkages.extended import DOUBLE_EPSILON, FIELDS, extended
 from gauss.linkages.motion import move
 from gauss.linkages.placed import LinkMotion
 from gauss.linkages.plane import angle
 from gauss.linkages.reactions import react
 
 EXTENDED_CONDITION = 1e2  # condition number of a group from which twice the precision is used: doubles lose six digits
-DOUBLE_EPSILON = 2.0**-52
 
 
 def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float | None = None) -> Cycle:

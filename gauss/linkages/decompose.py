@@ -4,7 +4,8 @@ from itertools import combinations
 
 from gauss.errors import LinkageError, did_you_mean
 from gauss.linkages.chain import Chain, Dyad, Leg, Triad
-from gauss.linkages.elements import GROUND, Driver, LinkJoint, Load, PlanarLink
+from gauss.linkages.elements import Driver, LinkJoint, Load, PlanarLink
+from gauss.scene import GROUND
 
 LETTER = {"revolute": "R", "prismatic": "P"}
 MOST_SEARCHED = 12  # links: all their subsets are tried

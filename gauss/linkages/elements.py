@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 
-GROUND = "ground"
 KINDS = ("revolute", "prismatic")
 AXES = ("world", "link")
 

@@ -13,11 +13,12 @@ import numpy as np
 from gauss.codegen import Kernel, forward, write
 from gauss.errors import ArgumentError
 from gauss.linkages.chain import Dyad, Leg
-from gauss.linkages.elements import GROUND, PlanarLink
+from gauss.linkages.elements import PlanarLink
 from gauss.linkages.linkage import Linkage
 from gauss.linkages.placed import Pose
 from gauss.linkages.plane import Cartesian, unit
 from gauss.linkages.position import place
+from gauss.scene import GROUND
 
 DIMENSIONS = ("A_x", "A_y", "D_x", "D_y", "crank", "coupler", "rocker", "along", "across")
 

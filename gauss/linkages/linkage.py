@@ -11,8 +11,8 @@ from gauss.linkages.chain import Chain, end_of_turn, full_turn
 from gauss.linkages.crank_ranges import closing_ranges, sweep
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.decompose import decompose
-from gauss.linkages.elements import GROUND, CrankMotor, Driver, LinkJoint, Load, PlanarLink
-from gauss.scene import Scene, values
+from gauss.linkages.elements import CrankMotor, Driver, LinkJoint, Load, PlanarLink
+from gauss.scene import GROUND, Scene, values
 from gauss.scene.builder import name_of
 
 

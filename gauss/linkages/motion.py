@@ -9,10 +9,10 @@ from gauss.linkages import dyad as dyads
 from gauss.linkages import position
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, Dyad
-from gauss.linkages.elements import GROUND
 from gauss.linkages.placed import FRAME, LinkMotion, PinFreedom, Pose, Real, moved
 from gauss.linkages.plane import Cartesian, conjugate, unit
 from gauss.linkages.plane import angle as turned
+from gauss.scene import GROUND
 
 CLOSED = 1e-10  # loop residual of a class III group, relative to its size, at which Newton's method has converged
 

@@ -4,7 +4,7 @@ import numpy as np
 
 POINTS = 10  # Gauss–Legendre points in a panel
 PANEL = np.radians(4.0)  # widest panel; the forces of a linkage are smooth over it
-SAMPLES = 1440  # crank angles of a turn among which sign changes are looked for
+SAMPLES = 1440  # crank angles of a turn in first searches: what is narrower than ¼° may be missed
 BISECTIONS = 52
 
 

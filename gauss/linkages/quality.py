@@ -9,12 +9,11 @@ from gauss.linkages.chain import Chain, Dyad
 from gauss.linkages.crank_ranges import FULL, closing_ranges, near
 from gauss.linkages.cycle_result import transmission_angles
 from gauss.linkages.cycles import cycle
-from gauss.linkages.elements import GROUND
 from gauss.linkages.motion import move
-from gauss.linkages.quadrature import zeros
+from gauss.linkages.quadrature import SAMPLES, zeros
+from gauss.scene import GROUND
 
 POOR_TRANSMISSION = np.radians(30.0)  # designers keep transmission angles above this
-SAMPLES = 1440  # crank angles of the first search for the least transmission angle
 REFINEMENTS = 6  # searches, each 20 times finer
 END = 1e-9  # from the ends of a closing range, where a group is singular [rad]
 CHANGE_POINT = 1e-12  # margin, relative to the sum of the lengths, that is taken for zero

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from gauss.linkages import dyad as dyads
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Dyad
-from gauss.linkages.elements import GROUND
 from gauss.linkages.forces import Wrench, reaction
 from gauss.linkages.loads import acting, centre
 from gauss.linkages.motion import LinkageKinematics
 from gauss.linkages.placed import Complex, Real
+from gauss.scene import GROUND
 
 
 def react(motion: LinkageKinematics) -> tuple[dict[str, Complex], Real]:

@@ -6,10 +6,10 @@ from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.balancing import shaking
 from gauss.linkages.crank_ranges import FULL
 from gauss.linkages.cycle_result import Cycle
-from gauss.linkages.elements import GROUND
 from gauss.linkages.energy import power_balance
 from gauss.linkages.linkage import Linkage
 from gauss.linkages.quality import POOR_TRANSMISSION
+from gauss.scene import GROUND
 
 WORK_ROUNDING = 1e-12  # relative to the largest torque [rad]: smaller work is zero
 

@@ -17,15 +17,10 @@ from gauss.rotors.reduced import ReducedNetwork
 from gauss.rotors.surfaces import Surfaces
 from gauss.rotors.traced_laws import TracedLaws
 from gauss.scene.stateful_laws import preserved
+from gauss.simulation.undetected_switching import LARGEST_DEFECT, REJECTED_SHARE, RESOLVED_STEP, SHIFTS, defect_times
 
 if TYPE_CHECKING:
     from gauss.rotors.run import RotorRun
-
-DEFECT_PLACES = (0.187, 0.431, 0.569, 0.813)  # of a step: no stages of the integrators
-DIFFERENCE_STEP = 1e-4  # of a step, for the slope of the dense output
-ALLOWED_DEFECT = 1e5  # errors allowed: defects of smooth laws stay far below
-REFUSED_SHARE = 0.5  # of a step that is made instead
-SHORTEST_SEARCHED = 1e-6  # of the run: in shorter steps no defect is sought
 
 RESOLVED = 1e-14  # of the duration: crossings closer than that are one, and shorter steps are not searched
 
@@ -98,16 +93,15 @@ def resolved_share(run: "RotorRun", begin: float, end: float, dense: Callable) -
         share, jump = switching.surfaces.share(begin, end, lambda t: dense(t)[: 2 * run.n_g], switching.finest)
         if jump is not None:
             share = min(share, (jump - begin - switching.finest) / (end - begin))
-    if share == 1.0 and switching.opaque and end - begin > SHORTEST_SEARCHED * switching.duration:
-        share = REFUSED_SHARE if any(_defective(run, begin, end, dense, place) for place in DEFECT_PLACES) else 1.0
+    if share == 1.0 and switching.opaque and end - begin > RESOLVED_STEP * switching.duration:
+        samples = defect_times(begin, end - begin).reshape(-1, len(SHIFTS))
+        share = REJECTED_SHARE if any(_defective(run, end - begin, times, dense(times)) for times in samples) else 1.0
     return share, jump
 
 
-def _defective(run: "RotorRun", begin: float, end: float, dense: Callable, place: float) -> bool:
-    """Whether the defect of the speeds at a place in a step exceeds what is allowed."""
-    h, speeds = end - begin, slice(run.n_g, 2 * run.n_g)
-    times = begin + (place + DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0])) * h
-    y = dense(times)
+def _defective(run: "RotorRun", h: float, times: np.ndarray, y: np.ndarray) -> bool:
+    """Whether the defect of the speeds in a step of length h exceeds what is allowed, by dense output y at three times."""
+    speeds = slice(run.n_g, 2 * run.n_g)
     slope = (y[speeds, 2] - y[speeds, 0]) / (times[2] - times[0])
     defect = slope - run.phase.instant(times[1], *run.split(y[:, 1])).acceleration
-    return bool((h * np.abs(defect) > ALLOWED_DEFECT * (run.atol[speeds] + run.rtol * np.abs(y[speeds, 1]))).any())
+    return bool((h * np.abs(defect) > LARGEST_DEFECT * (run.atol[speeds] + run.rtol * np.abs(y[speeds, 1]))).any())

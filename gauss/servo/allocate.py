@@ -6,11 +6,10 @@ Bounds by least distance programming (Lawson and Hanson, Solving Least Squares P
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.servo.instant import ServoInstant
+from gauss.servo.instant import DEPENDENT, ServoInstant
 from gauss.servo.servo import Servo
 
 TENSION_ROUNDING = 1e-9  # relative to the largest effort or its terms: a tension below its bound by less is at the bound
-DEPENDENT = 1e-10  # singular value, relative to the largest, of the null space
 
 
 class SlackError(SimulationError):

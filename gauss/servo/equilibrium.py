@@ -16,6 +16,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.projection import LEAST_DAMPING
 from gauss.errors import StateError
+from gauss.servo.instant import DEPENDENT
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.lagrange import contact_scalars, generalised_forces, loop_constraints, require_written
 from gauss.servo.project import first_accepted, sizes_of
@@ -25,7 +26,6 @@ from gauss.shapes import Shaped
 from gauss.system import State, retract
 
 BALANCED = 1e-11  # relative to the largest force, and to the sizes of rows: residuals of an equilibrium
-DEPENDENT = 1e-10  # singular value, relative to the largest, of undetermined directions, which keep their values
 
 
 class Equilibrium(NamedTuple):

@@ -17,7 +17,7 @@ import numpy as np
 from gauss.codegen import Expression, Scalar
 from gauss.shapes import Shaped
 
-DEPENDENT = 1e-10  # singular value, relative to the largest, of dependent rows of contacts
+DEPENDENT = 1e-10  # singular value or pivot, relative to the largest, of dependent rows and undetermined directions
 
 
 def number(value: Scalar) -> float:

@@ -18,6 +18,7 @@ from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError
 from gauss.rotations import cross
+from gauss.servo.instant import DEPENDENT
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.observed import MotionSymbols
 from gauss.servo.relation import as_relations
@@ -25,8 +26,6 @@ from gauss.servo.rows import ScalarRelation, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, System, whole
-
-DEPENDENT = 1e-10  # pivot, relative to the largest, of dependent rows
 
 
 class LagrangeSolution(NamedTuple):

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen.kernels import CallingLoop, Control, Loop, LoopStatus
+from gauss.codegen.kernels import LAST_STEP_SHARE, CallingLoop, Control, Loop, LoopStatus
 from gauss.codegen.tiers import EntryPoint
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT
@@ -34,7 +34,6 @@ from gauss.simulation.undetected_switching import (
 )
 from gauss.system import State
 
-LAST_STEP_SHARE = 1.0 - 1e-12  # share of the remaining time above which the loop stretches a step to the end
 UNLIMITED = 1e150  # tolerances of a step that is accepted whatever its error
 OWN = "samples", "sample", "rows", "rtol", "atol", "atol_rates"  # settings of a single step that are not those of the motion
 NEVER = np.array([np.inf])  # samples of a step that has none [s]

@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from gauss.codegen.kernels import Due
+from gauss.codegen.kernels import LAST_STEP_SHARE, Due
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.laws.switching import Switching, endless
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT, onward
@@ -42,7 +42,6 @@ from gauss.simulation.undetected_switching import REJECTED_SHARE, RESOLVED_STEP,
 from gauss.system import State, System
 
 SLIDING_PROGRESS = 1e-3  # relative to the duration, per PROGRESS_TRIALS, below which a sliding motion is refused
-WHOLE_STEP = 1.0 - 1e-12  # a step that reaches this share of the remaining time goes to its end
 
 
 class PythonRun:
@@ -142,7 +141,7 @@ class PythonRun:
                 measured_from = point.state.t
             h = min(h, largest)
             remaining = end - point.state.t
-            tried = remaining if h >= remaining * WHOLE_STEP else h
+            tried = remaining if h >= remaining * LAST_STEP_SHARE else h
             if not tried >= smallest:  # or NaN
                 laws = self.switching.conditional + self.switching.called
                 error = SimulationError(too_small(point.state.t, self.tolerance.rtol, laws))

@@ -4,11 +4,10 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from gauss.view.style import PAGE_DPI, saved
+from gauss.view.style import LINES, PAGE_DPI, saved
 
 SMALLEST_SHOWN, LARGEST_SHOWN = 1e-17, 1e1  # of the errors that are drawn; what is off is drawn at the edge
 COLOURS = {"low": "#9ecae1", "mid": "#4292c6", "high": "#08519c", "tightest": "#08306b", "own": "#d95f02"}
-LINES = ("-", "--", "-.", ":")
 
 
 def plot_errors(names, problems, errors, broken, path=None, title: str = "") -> Figure:

@@ -7,7 +7,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 
 from gauss.linkages import Chain, Cycle
-from gauss.linkages.elements import GROUND
+from gauss.scene import GROUND
 from gauss.view.style import COLOURS, INK
 
 PIN = 0.018  # sizes relative to the size of the drawing

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from gauss.errors import FileError
 from gauss.linkages import Cycle
-from gauss.linkages.elements import GROUND
+from gauss.scene import GROUND
 from gauss.view.linkage_drawing import INK, Drawing
 from gauss.view.style import check_format, saved
 

@@ -12,13 +12,12 @@ import numpy as np
 from gauss import compile_scene
 from gauss.bench.fuzz.laws import random_law
 from gauss.bench.fuzz.problems import CLOSING, decades, polygon, put_body, put_joint, random_tree
-from gauss.scene import Joint, Scene
+from gauss.scene import GROUND, Joint, Scene
 from gauss.scene.profiles import Move, Ramp, Sine
 from gauss.system import System
 
 ODD_UNITS = 0.03  # share of scenes whose sizes are 1e-6 to 1e6 m
 MASSLESS = 0.08  # share of scenes with a cross without mass
-GROUND = "ground"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
+from gauss.codegen.kernels.adaptive import LAST_STEP_SHARE, TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
 from gauss.codegen.kernels.adaptive_batch import MOTION_RECORD, AdaptiveBatchLoop, MotionQueue
 from gauss.codegen.kernels.block_contacts import BlockContactLaws, BlockContactSolver, ContactGraph
 from gauss.codegen.kernels.block_ldlt import BlockLDLT
@@ -57,6 +57,7 @@ __all__ = [
     "Fixed",
     "CheckedSwitch",
     "Interpolation",
+    "LAST_STEP_SHARE",
     "ENERGY_SAMPLE",
     "Loop",
     "FixedStepBatchLoop",

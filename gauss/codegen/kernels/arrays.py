@@ -21,7 +21,7 @@ from gauss.codegen import (
     straight_line,
 )
 
-BIT = ir.IntType(1)
+INTEGERS = INTEGER.as_pointer()
 
 
 class Value:
@@ -238,6 +238,11 @@ class Routine:
             leave_if(i >= count)
             yield i
             place[0] = i + 1
+
+    def copy(self, target: Array, source: Array, count):
+        """Copy the first numbers of an array to another."""
+        with self.each(count) as i:
+            target[i] = source[i]
 
     @contextmanager
     def when(self, condition: Value):

@@ -288,7 +288,7 @@ def write_block_contacts(laws: BlockContactLaws, module: ir.Module) -> ir.Functi
     return _BlockContactWriter(laws, module).write()
 
 
-class BlockContactSolver:
+class BlockContactSolver(machine.CodeCaller):
     """Python interface of the solver.
 
     Parameters
@@ -306,13 +306,6 @@ class BlockContactSolver:
 
     def _bind(self):
         self._order, self._solve = self.code.entry("order", ORDER), self.code.entry("contacts", SOLVE)
-
-    def __getstate__(self) -> dict:
-        return {"code": self.code}
-
-    def __setstate__(self, state: dict):
-        vars(self).update(state)
-        self._bind()
 
     def graph(self, n: int, bodies: np.ndarray) -> "ContactGraph":
         """Order of elimination of n bodies with contacts between ``bodies`` (m, 2), −1 for the ground."""

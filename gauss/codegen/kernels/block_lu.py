@@ -8,10 +8,8 @@ it is zero; the neighbours of the k-th eliminated body are ``list[start[k]] … 
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
-from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
 from gauss.codegen.kernels.vectors import BLOCK, WIDTH, write_apply, write_inverse, write_product
-
-INTEGERS = INTEGER.as_pointer()
 
 
 def write_order(module: ir.Module) -> ir.Function:

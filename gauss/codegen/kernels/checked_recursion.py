@@ -9,7 +9,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import Function, NativeFunction, Writer
-from gauss.codegen.kernels.arrays import Array, Routine, Strided, Value, routine
+from gauss.codegen.kernels.arrays import Array, Routine, Strided, routine
 from gauss.codegen.kernels.tree_recursion import TreeRecursion
 
 
@@ -49,7 +49,7 @@ class Correction(NativeFunction):
         r, given, result = _begin(self, writer, width)
         n_v, v = self.forward.result, self.forward.sizes["q"]  # v: where the rates begin
         state = r.buffer(v + 2 * n_v + self.ground.size)
-        _copy(r, state, given, v + 2 * n_v)
+        r.copy(state, given, v + 2 * n_v)
         _fill(state.after(v + 2 * n_v), self.ground)
         force, change, found = r.buffer(n_v), r.buffer(n_v), v + n_v
         r.call(writer.body(self.inverse), state, 1, force, 1)
@@ -105,16 +105,16 @@ class CorrectedRecursion(NativeFunction):
         n_v, n_in = forward.result, self.arity[0]
         effort = n_in - 1 - n_v  # where the forces begin
         inputs, state = r.buffer(effort + n_v + ground.size), r.buffer(effort + 1)
-        _copy(r, state, given, effort)
+        r.copy(state, given, effort)
         state[effort] = given[effort + n_v]
-        _copy(r, inputs, given, effort + n_v)
+        r.copy(inputs, given, effort + n_v)
         loads, found, change, whole = (r.buffer(size) for size in (n_v + 1, n_v, n_v + 1, effort + 2 * n_v))
         r.call(writer.body(self.loads), state, 1, loads, 1)
         with r.each(n_v) as i:
             inputs[i + effort] = inputs[i + effort] + loads[i]
         _fill(inputs.after(effort + n_v), ground)
         r.call(writer.body(forward), inputs, 1, found, 1)
-        _copy(r, whole, inputs, effort)
+        r.copy(whole, inputs, effort)
         with r.each(n_v) as i:
             whole[i + effort] = found[i]
             whole[i + (effort + n_v)] = inputs[i + effort]
@@ -134,11 +134,6 @@ def _begin(function: NativeFunction, writer: Writer, width: int) -> tuple[Routin
     for array in (given, result):
         array.pointer.add_attribute("noalias")
     return r, given, result
-
-
-def _copy(r: Routine, target: Array, source: Array, count: int | Value):
-    with r.each(count) as i:
-        target[i] = source[i]
 
 
 def _fill(target: Array, values: np.ndarray):

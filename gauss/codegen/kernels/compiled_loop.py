@@ -99,7 +99,7 @@ class CallingLoop(Loop):
         self.__setstate__(loop.__getstate__())
 
 
-class BatchLoop:
+class BatchLoop(machine.CodeCaller):
     """Base of compiled loops over a batch of motions, one per SIMD lane.
 
     Parameters
@@ -125,13 +125,6 @@ class BatchLoop:
         array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
         signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(self.control), *[array] * self.arrays, ctypes.c_int64)
         self._run = self.code.entry(self.name, signature)
-
-    def __getstate__(self) -> dict:
-        return {name: value for name, value in vars(self).items() if name != "_run"}
-
-    def __setstate__(self, state: dict):
-        vars(self).update(state)
-        self._bind()
 
 
 def address(array: np.ndarray) -> int:

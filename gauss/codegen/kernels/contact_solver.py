@@ -14,7 +14,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function, Writer, constant_array, machine
-from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
 
 SMALLEST_DIAGONAL = 1e-300  # lower bound of the largest diagonal entry of W, against a division by zero
@@ -80,7 +80,7 @@ class ContactSolver:
         double* limit, double* f, double* residual, double* room)``: ``f`` holds the initial forces, then the solution;
         ``residual`` the residual of the laws, −1 if no solution was found.
         """
-        kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGER.as_pointer()] + [POINTER] * 5
+        kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGERS] + [POINTER] * 5
         return _ContactSolverWriter(self, subroutine(module, "solve_contacts", kinds)).write()
 
 
@@ -231,7 +231,7 @@ class _ContactSolverWriter:
             self.f[i] = self.f[i] + step[i]
 
 
-class CompiledContactSolver:
+class CompiledContactSolver(machine.CodeCaller):
     """Python interface of the contact solver.
 
     Parameters
@@ -246,14 +246,11 @@ class CompiledContactSolver:
         r = Routine(ir.Function(writer.module, inner.function_type, "solve"))
         r.call(inner, *r.integers, *r.arrays)
         r.done()
-        self.__setstate__(machine.load(str(writer.module)))
+        self.code = machine.load(str(writer.module))
+        self._bind()
 
-    def __getstate__(self) -> machine.MachineCode:
-        return self.code
-
-    def __setstate__(self, code: machine.MachineCode):
-        self.code = code
-        self._solve = code.entry("solve", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8))
+    def _bind(self):
+        self._solve = self.code.entry("solve", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8))
 
     def __call__(self, W, b, under, friction, limit, start) -> tuple[np.ndarray, float]:
         """Forces (n,) and the residual of the laws, −1 if no solution was found.

@@ -7,9 +7,7 @@ column pivoting; the first rows R₁ of R up to the rank, R₁ᵀ = Z S; x = P Z
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
-from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
-
-INTEGERS = INTEGER.as_pointer()
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
 
 
 def least_norm(r: Routine, n: Value, A: Array, x: Array, room: Array, work: Array, rank_relative: float):

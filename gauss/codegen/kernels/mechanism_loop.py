@@ -93,7 +93,7 @@ class _LoopWriter:
         self.at.copy(row.after(n_q + n_v + 1), work, 3)
 
 
-class CompiledSteps:
+class CompiledSteps(machine.CodeCaller):
     """Python interface of the steps of a module.
 
     Parameters
@@ -113,13 +113,6 @@ class CompiledSteps:
 
     def _bind(self):
         self._advance = self.code.entry("advance", self.signature)
-
-    def __getstate__(self) -> dict:
-        return {"code": self.code}
-
-    def __setstate__(self, state: dict):
-        vars(self).update(state)
-        self._bind()
 
     def advance(self, ints: int, addresses: int, work: int, count: int, ends: int, rows: int):
         """Take steps to some times; the arrays of times and of rows are given by their addresses, too."""

@@ -10,7 +10,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function, machine
-from gauss.codegen.kernels.arrays import Array, Routine, Value
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value
 
 PART = 16  # own rotation (9), centre (3), sizes (4) of a part in its body
 MOVED = 31  # pose and velocities (24), sizes (4), centre of mass of the body (3)
@@ -21,7 +21,6 @@ FEATURE = 1 + 2 * MOVED  # address of its rows, places of the columns of both sh
 KIND = 4  # address of the distances, number of features, first feature, whether overlaps may be missed
 MOST = 128  # pairs of features of one pair of shapes, and one more
 NEAR = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 14)
-INTEGERS = ir.IntType(64).as_pointer()
 
 
 class _NearPairsWriter:
@@ -130,7 +129,7 @@ def write_near(place: Function, module: ir.Module) -> ir.Function:
     return _NearPairsWriter(place, module).write()
 
 
-class NearPairs:
+class NearPairs(machine.CodeCaller):
     """Python interface.
 
     Parameters
@@ -147,13 +146,6 @@ class NearPairs:
 
     def _bind(self):
         self._near = self.code.entry("near", NEAR)
-
-    def __getstate__(self) -> dict:
-        return {"code": self.code}
-
-    def __setstate__(self, state: dict):
-        vars(self).update(state)
-        self._bind()
 
     def __call__(self, counts: tuple[int, int, int, int], addresses: list[int]):
         """Find the near contacts; arrays are given by their addresses."""

@@ -33,23 +33,18 @@ def write_equations(module: ir.Module) -> ir.Function:
     r = subroutine(module, "equations", [INTEGER, POINTER, POINTER, POINTER])
     (n,), (A, x, room) = r.integers, r.arrays
     kept, given = room, room.after(n * n)
-    _copy(r, kept, A, n * n)
-    _copy(r, given, x, n)
+    r.copy(kept, A, n * n)
+    r.copy(given, x, n)
     if_singular = r.variable(0, INTEGER)
     _eliminate(r, n, A, x, if_singular)
     with r.when(if_singular[0] > 0):
-        _copy(r, A, kept, n * n)
-        _copy(r, x, given, n)
+        r.copy(A, kept, n * n)
+        r.copy(x, given, n)
         if isinstance(module, DeviceModule):
             least_norm(r, n, A, x, kept, given, RANK_RELATIVE)
         else:
             _shortest(r, n, A, x, given.after(n))
     return r.done()
-
-
-def _copy(r: Routine, target: Array, source: Array, count: Value):
-    with r.each(count) as i:
-        target[i] = source[i]
 
 
 def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):

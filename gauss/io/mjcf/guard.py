@@ -4,7 +4,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError
-from gauss.io.guard import Source, read_xml, require_inside
+from gauss.io.guard import MOST_INCLUDES, Source, read_xml, require_inside
 
 ROOTS = ("mujoco", "mujocoinclude")
 FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
@@ -28,9 +28,6 @@ NUMERIC |= {"wind", "scale", "refpos", "refquat", "friction", "gravcomp", "crank
 NUMERIC |= {"settotalmass", "boundmass", "boundinertia", "inertiagrouprange", "divisor", "offset", "margin", "gap"}
 RANGES = {"range", "ctrlrange", "forcerange", "actuatorfrcrange"}  # which may be infinite
 FORBIDDEN = ("plugin", "extension")
-
-
-MOST_INCLUDES = 1000  # included files, nested ones counted: more is a mistake, or an attack
 
 
 def guarded(path: Path, root_folder: Path | None = None) -> Source:

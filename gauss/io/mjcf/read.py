@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from gauss import rotations
-from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
+from gauss.errors import FileError, NotImportedWarning, SceneError
 from gauss.io.guard import checked_root
 from gauss.io.mjcf.actuators import actuators, adheres, is_switched_off
 from gauss.io.mjcf.drives import add_actuator
@@ -27,11 +27,9 @@ from gauss.io.mjcf.switches import without_what_is_off
 from gauss.io.mjcf.tendon_path import tendon_path
 from gauss.io.mjcf.tendons import add_tendon, couple_tendons, hold_tendon
 from gauss.io.mjcf.touching import add_contacts, add_stops
-from gauss.io.numbers import bounds
+from gauss.io.numbers import LIMITS, bounds, check_option
 from gauss.scene import GROUND, Body, Scene
 from gauss.scene.profiles import Polynomial
-
-LIMITS = ("start", "stops")
 
 
 def read_mjcf(
@@ -73,8 +71,7 @@ def read_mjcf(
         equalities and actuators that are switched off.
     """
     path = Path(path)
-    if limits not in LIMITS:
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
+    check_option(path, "limits", limits, LIMITS)
     source = guarded(path, checked_root(path, root_folder))
     try:
         model = without_what_is_off(mujoco.MjModel.from_xml_path(str(path)))

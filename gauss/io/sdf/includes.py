@@ -13,12 +13,11 @@ from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError
-from gauss.io.guard import Source, read_xml, require_inside
+from gauss.io.guard import MOST_INCLUDES, Source, read_xml, require_inside
 from gauss.io.numbers import number
 from gauss.io.sdf.poses import TRUE, text
 from gauss.io.sdf.scopes import MODEL, NAMED, Scope
 
-MOST_INCLUDES = 1000  # included files of one file, nested ones counted: more is a mistake, or an attack
 MOST_FOLDERS = 100_000  # folders that are searched for a model
 SCHEME = re.compile(r"[a-z]+://")
 ON_SERVER = ("http://", "https://")

@@ -8,9 +8,9 @@ import warnings
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
+from gauss.errors import FileError, NotImportedWarning, SceneError
 from gauss.io.guard import Source, checked_root, read_xml
-from gauss.io.numbers import add_stop
+from gauss.io.numbers import LIMITS, add_stop, check_option
 from gauss.io.sdf.collisions import shape_of
 from gauss.io.sdf.elements import WARNED, check, check_link
 from gauss.io.sdf.includes import UNBOUNDED, Includes
@@ -22,7 +22,7 @@ from gauss.scene import GROUND, Scene
 from gauss.system.frames import compose, invert
 
 GRAVITY = (0.0, 0.0, -9.8)  # [m/s²] of a world without one
-ROOTS, LIMITS, MISSING = ("fixed", "free"), ("start", "stops"), ("refused", "left out")
+ROOTS, MISSING = ("fixed", "free"), ("refused", "left out")
 NOT_READ = {"population": "put its models into the file", "state": "put its poses into the models"}
 
 
@@ -70,12 +70,8 @@ def read_sdf(
     """
     if root not in (None, *ROOTS):
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
-    if limits not in LIMITS:
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
-    if missing not in MISSING:
-        raise FileError(
-            f"{path}: missing: expected {' or '.join(map(repr, MISSING))}. {did_you_mean(str(missing), MISSING)}"
-        )
+    check_option(path, "limits", limits, LIMITS)
+    check_option(path, "missing", missing, MISSING)
     folder = checked_root(path, root_folder)
     source = read_xml(path, ("sdf",), limits=UNBOUNDED, loose_comments=True)
     includes = Includes(source, folder, missing == "left out")

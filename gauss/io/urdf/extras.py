@@ -8,16 +8,15 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from gauss import rotations
-from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
+from gauss.errors import NotImportedWarning, SceneError, did_you_mean
 from gauss.io.collision_meshes import mesh_path, mesh_vertices
 from gauss.io.guard import Source
-from gauss.io.numbers import add_stop, bounds
+from gauss.io.numbers import LIMITS, add_stop, bounds, check_option
 from gauss.io.urdf.guard import guarded, placed
 from gauss.io.urdf.numbers import value, values
 from gauss.io.urdf.transmissions import add_motors
 from gauss.scene import GROUND, Box, Capsule, Collider, ConvexMesh, Cylinder, Scene, Sphere
 
-LIMITS = ("start", "stops")
 MANY = 4  # names that a warning gives before it counts
 
 
@@ -61,7 +60,8 @@ def with_extras(
         Of damping and friction that are left out, of limits that leave no motion, and of collision shapes and transmissions
         that are not modelled.
     """
-    _require_known(path, limits)
+    if limits is not None:
+        check_option(path, "limits", limits, LIMITS)
     source, left = guarded(path), []
     joints = [joint for joint in source.root.findall("joint") if joint.get("name") in scene.joints]
     if limits:
@@ -78,11 +78,6 @@ def with_extras(
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
     return scene
-
-
-def _require_known(path: Path, limits: str | None):
-    if limits not in (None, *LIMITS):
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
 
 
 def _named(text: str, names: Iterable[str | None]) -> list[str]:

@@ -6,11 +6,10 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, extra
+from gauss.io.guard import LARGEST_MAGNITUDE
 
 with extra("usd"):
     from pxr import Usd, UsdGeom, UsdPhysics
-
-LARGEST_MAGNITUDE = 1e20  # of a number, in any SI unit: above those of any mechanism
 
 
 @dataclass(frozen=True)

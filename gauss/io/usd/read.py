@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from gauss import math
-from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean, extra
+from gauss.errors import FileError, NotImportedWarning, SceneError, extra
+from gauss.io.numbers import LIMITS, check_option
 from gauss.io.usd.bodies import add_body, moving_prims, rigid_bodies
 from gauss.io.usd.guard import opened_stage
 from gauss.io.usd.joints import UsdJoint, joints_of, unread_limits
@@ -25,7 +26,6 @@ with extra("usd"):
 
 # What bindings raise where an attribute holds a value of another type than UsdPhysics gives it, or a transform is none.
 NOT_OF_SCHEMA = (Tf.ErrorException, TypeError, ValueError, KeyError)
-LIMITS = ("start", "stops")
 FITS = 1e-4  # m, rad: to which bodies stand where their joint holds them; files have single precision
 WEIGHT = 9.80665  # m/s², of a stage that says nothing
 
@@ -53,8 +53,7 @@ def read_usd(path, limits: str = "start", root_folder=None) -> Scene:
         Of colliders, and of limits of ball joints and planes, which are not read.
     """
     path = Path(path)
-    if limits not in LIMITS:
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
+    check_option(path, "limits", limits, LIMITS)
     stage = opened_stage(path, root_folder)
     try:
         scene = _scene(stage, path.stem)
