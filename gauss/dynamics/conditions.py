@@ -3,6 +3,7 @@
 A condition takes a :class:`gauss.dynamics.rules.Question` and returns its violations in words; none where it holds.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
@@ -12,7 +13,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
 from gauss.integrators import ExplicitPair, FixedStep
-from gauss.scene import Contact, Points
+from gauss.scene import Collider, Contact, Points
 from gauss.scene.contact_pairs import have_closed_form
 from gauss.scene.patch_distances import no_closed_form
 from gauss.system import System, build, phase_scene, sides
@@ -200,7 +201,8 @@ def few_contact_operations(ask: Question) -> list[str]:
     if found:
         return found
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
-    work = sum(_operations(scene.shapes[one.shape], scene.shapes[one.other]) for one in contacts)
+    pairs = Counter((_counted(scene.shapes[one.shape]), _counted(scene.shapes[one.other])) for one in contacts)
+    work = sum(number * _operations(*pair) for pair, number in pairs.items())
     return [f"its contacts would have about {work:.0e} operations"] if work > MOST_CONTACT_OPERATIONS else []
 
 
@@ -208,17 +210,23 @@ def closed_form_contacts(ask: Question) -> list[str]:
     """The distances of all shapes that may touch are closed forms."""
     shapes = ask.system.scene.shapes
     contacts = [contact for contact in ask.system.scene.contacts.values() if isinstance(contact, Contact)]
-    pairs = ((shapes[one.shape], shapes[one.other]) for one in contacts)
-    odd = next((pair for pair in pairs if not have_closed_form(*pair)), None)
+    pairs: dict[tuple[type, type], tuple[Collider, Collider]] = {}
+    for one in contacts:
+        pair = shapes[one.shape], shapes[one.other]
+        pairs.setdefault((type(pair[0]), type(pair[1])), pair)
+    odd = next((pair for pair in pairs.values() if not have_closed_form(*pair)), None)
     return [no_closed_form(*odd)] if odd else []
 
 
-def _operations(one, other) -> int:
+def _counted(shape) -> tuple[str, int]:
+    """Kind of a shape, and number of its balls."""
+    return ("Sphere", len(shape.corners)) if isinstance(shape, Points) else (type(shape).__name__, 1)
+
+
+def _operations(one: tuple[str, int], other: tuple[str, int]) -> int:
     """Operations of the gap functions of two shapes with their derivatives, roughly."""
-    names = ("Sphere" if isinstance(shape, Points) else type(shape).__name__ for shape in (one, other))
-    balls = max((len(shape.corners) for shape in (one, other) if isinstance(shape, Points)), default=1)
-    first, second = sorted(names)
-    return balls * CONTACT_OPERATIONS.get((first, second), 0)
+    first, second = sorted((one[0], other[0]))
+    return max(one[1], other[1]) * CONTACT_OPERATIONS.get((first, second), 0)
 
 
 def shapes_in_contact(ask: Question) -> bool:

@@ -11,7 +11,7 @@ from gauss.rotations import cross
 from gauss.scene import values
 from gauss.scene.box_distances import separation
 from gauss.scene.contact_distances import FeaturePair, Touch
-from gauss.scene.contact_pairs import have_edges, places
+from gauss.scene.contact_pairs import have_edges, place_count, places
 from gauss.scene.relation import Relation
 from gauss.scene.unilateral import Unilateral
 
@@ -54,7 +54,7 @@ class Contact(Unilateral):
         """Names of the gap functions: that of the contact, numbered from 1 if there are several."""
         if scene.shapes[self.shape].body == scene.shapes[self.other].body:
             raise SceneError(f"{self.what}: both shapes are on {scene.shapes[self.shape].body!r}; they never move apart.")
-        number = len(self.places(scene))
+        number = place_count(scene.shapes[self.shape], scene.shapes[self.other])
         return (self.name,) if number == 1 else tuple(f"{self.name}.{k + 1}" for k in range(number))
 
     def gaps(self, at) -> list:

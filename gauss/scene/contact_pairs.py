@@ -33,6 +33,22 @@ def places(first: Collider, second: Collider) -> list[FeaturePair]:
     raise SceneError(f"{first.what} and {second.what} have no rule of contact; use spheres in place of points.")
 
 
+def place_count(first: Collider, second: Collider) -> int:
+    """Number of pairs of features: that of the kinds, but for sets of points.
+
+    Raises
+    ------
+    SceneError
+        If there is no rule for the two kinds.
+    """
+    kinds = type(first), type(second)
+    if Points in kinds:
+        return len(places(first, second))
+    if kinds not in _COUNTS:
+        _COUNTS[kinds] = len(places(first, second))
+    return _COUNTS[kinds]
+
+
 def have_rule(first: Collider, second: Collider) -> bool:
     """Whether two shapes may touch: two half-spaces, or two sets of points without radius, do not."""
     kinds = type(first), type(second)
@@ -85,6 +101,7 @@ def _boxes(first: Box, second: Box) -> list[FeaturePair]:
 
 Rule = Callable[..., list[FeaturePair]]
 RULES: dict[tuple[type[Collider], type[Collider]], Rule] = {}
+_COUNTS: dict[tuple[type[Collider], type[Collider]], int] = {}
 RULES |= {(kind, HalfSpace): _on_half_space for kind in (Sphere, Points, Capsule, Box)}
 RULES |= {(first, second): _balls for first in (Sphere, Points) for second in (Sphere, Points)}
 RULES |= {(kind, Capsule): _on_capsule for kind in (Sphere, Points)} | {(Capsule, Capsule): _capsules}

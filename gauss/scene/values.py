@@ -4,6 +4,7 @@ import inspect
 import math
 import re
 from collections.abc import Callable
+from functools import cache
 from numbers import Real
 
 import numpy as np
@@ -26,7 +27,7 @@ def keep(element, **checked):
 def number(value, what: str, unit: str, *, positive=False, non_negative=False) -> float:
     """Finite float, or a SceneError with what was expected."""
     sign = "a positive " if positive else "a non-negative " if non_negative else "a "
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if type(value) is not float and (isinstance(value, bool) or not isinstance(value, Real)):
         raise SceneError(f"{what}: expected {sign}number in [{unit}], got {value!r} ({type(value).__name__}).")
     value = float(value)
     if not math.isfinite(value) or (positive and value <= 0) or (non_negative and value < 0):
@@ -226,7 +227,12 @@ def arguments(function) -> int:
 
 def kind(element) -> str:
     """Kind of an element, as the methods of a scene and the sections of its file are called: ``joint_spring``."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(element).__name__).lower()
+    return _kind_of_class(type(element).__name__)
+
+
+@cache
+def _kind_of_class(name: str) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
 def text(value, what: str) -> str:

@@ -33,7 +33,12 @@ def refuse_changed(system):
 
 def _with_functions(scene: Scene):
     every = [*scene.relations.values(), *scene.contacts.values(), *scene.set_valued.values()]
-    return [relation for relation in every if any(callable(getattr(relation, field.name)) for field in fields(relation))]
+    names = {kind: _fields(kind) for kind in {type(relation) for relation in every}}
+    return [relation for relation in every if any(callable(getattr(relation, name)) for name in names[type(relation)])]
+
+
+def _fields(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
 
 
 def _text(system, relation) -> str:

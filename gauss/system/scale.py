@@ -119,8 +119,13 @@ def _shapes(system, turns) -> float:
     """Largest length among shapes, springs, contacts and constraints."""
     scene = system.scene
     parts = [*scene.shapes.values(), *scene.relations.values(), *scene.contacts.values(), *scene.loads.values()]
-    given = (getattr(part, field.name) for part in parts for field in fields(part) if field.name in LENGTH_FIELDS)
+    names = {kind: _lengths(kind) for kind in {type(part) for part in parts}}
+    given = (getattr(part, name) for part in parts for name in names[type(part)])
     return max((_size(value) for value in given), default=0.0)
+
+
+def _lengths(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind) if field.name in LENGTH_FIELDS)
 
 
 def _gyration(system, turns) -> float:

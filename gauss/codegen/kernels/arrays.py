@@ -64,6 +64,10 @@ class Value:
     def __truediv__(self, other):
         return self._arithmetic("div", self.value, self._other(other))
 
+    def __floordiv__(self, other):
+        """Quotient of integers, neither of them negative."""
+        return Value(self.b, self.b.sdiv(self.value, self._other(other)))
+
     def __neg__(self):
         return self._arithmetic("sub", ir.Constant(self.value.type, 0), self.value)
 
@@ -196,6 +200,11 @@ class Routine:
     def as_double(self, x: Value) -> Value:
         """Convert an integer to a double."""
         return Value(self.b, self.b.sitofp(x.value, DOUBLE))
+
+    def floor(self, x: Value) -> Value:
+        """Largest integer that is no larger than a double, which is none of the largest and no NaN."""
+        rounded = self.b.call(intrinsic(self.module, "llvm.floor", DOUBLE, 1), [x.value])
+        return Value(self.b, self.b.fptosi(rounded, INTEGER))
 
     def maximum(self, x: Value, y: Value) -> Value:
         """Larger of two doubles; the second if the first is NaN."""

@@ -39,7 +39,7 @@ class ContactModes:
                 one, other = self._rate(t), self._rate(t + 1)
                 with r.when(r.square_root(one * one + other * other) > self.at.settings["slow"]):
                     mode[0] = SLIDING
-            self._mark(law[found[c * 2]], mode[0], self._hits(c), work[c] + work[t] + work[t + 1])
+            self._mark(law[found[c * 2]] - 1, mode[0], self._hits(c), work[c] + work[t] + work[t + 1])
         with r.each(g) as j, r.when(force[m + j] > 0.0):
             self._mark(self.laws + j, Value(r.b, INTEGER(STICKING)), self._hits(m + j), work[m + j])
         with r.each(n["s"]) as j:

@@ -7,7 +7,7 @@ Each row is in its unit, so that the laws compare forces and rates of all rows.
 
 from gauss.codegen import POINTER
 from gauss.codegen.kernels.arrays import Array, Value
-from gauss.codegen.kernels.near_pairs import ROW
+from gauss.codegen.kernels.near_pairs import BODY, ROW, parts_of
 from gauss.codegen.kernels.step_memory import StepMemory
 
 
@@ -26,14 +26,15 @@ class ContactRows:
     def write(self, m: Value):
         """Rows: normals, other gaps, tangents of all contacts, set-valued elements; in their units, and initial forces."""
         r, n, unit = self.r, self.at.n, self.at.settings["contact_unit"]
-        g, s, law, pair, found = n["g"], n["s"], self.at.table("law"), self.at.table("pair"), self.at.table("found")
+        g, s, law, found = n["g"], n["s"], self.at.table("law"), self.at.table("found")
         body, rows = self.at.table("body"), self.at.table("rows", POINTER)
         with r.each(m) as c:
             p = found[c * 2]
-            number, row = law[p], rows.after(c * ROW)
+            number, row = law[p] - 1, rows.after(c * ROW)
             self.at["mu"][c], self.at["e"][c] = self.at["friction"][number], self.at["restitution"][number]
             self.at["gap"][c] = row[0] * unit
-            bodies = body[pair[p * 3] * 2], body[pair[p * 3 + 1] * 2]
+            first, second = parts_of(p, n["parts"])
+            bodies = body[first * BODY], body[second * BODY]
             for q in range(3):
                 at = c if q == 0 else m + g + c * 2 + (q - 1)
                 self._row_of_contact(at, row.after(4 + 8 * q), row[52 + q], bodies, unit)

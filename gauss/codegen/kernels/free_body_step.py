@@ -15,7 +15,7 @@ from gauss.codegen.kernels.block_lu import write_order
 from gauss.codegen.kernels.contact_islands import ISLANDS, ContactIslands
 from gauss.codegen.kernels.contact_modes import SLIDING, STICKING, ContactModes
 from gauss.codegen.kernels.mechanism_loop import CompiledSteps
-from gauss.codegen.kernels.near_pairs import INTEGERS, ROW, write_near
+from gauss.codegen.kernels.near_pairs import BODY, INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS, ROW, parts_of, write_near
 from gauss.codegen.kernels.step_memory import (
     CHANGE,
     CHANGES_ROOM,
@@ -31,9 +31,9 @@ from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH
 
 SIZES = ("n_q", "n_v", "n", "bodies", "parts", "pairs", "capacity", "blocks", "laws", "constants")
 ADDRESSES = (
-    *("body", "pair", "kind", "feature", "found", "count"),
-    *("own", "signs", "deepest", "near_settings", "moved", "rows", "depth"),
-    *("law", "known_found", "known_count", "status", "q_start", "v_start"),
+    *NEAR_INTEGERS,
+    *NEAR_NUMBERS,
+    *("known_found", "known_count", "status", "q_start", "v_start"),
     *("touching", "ordered", "within", "ordered_count", "slot", "order", "start", "list", "degree", "needed"),
     *ISLANDS,
     *("modes", "next_modes", "closed", "fresh", "counts"),
@@ -131,7 +131,7 @@ class _PointModes(ContactModes):
             work = r.number(0.0)
             for q in range(3):
                 work = work + self.at["f"][place[c] * 3 + q] * (self.at["before"][c * 3 + q] + u[q]) * 0.5
-            self._mark(law[found[c * 2]], mode[0], hits(c), work / self.at.settings["h"])
+            self._mark(law[found[c * 2]] - 1, mode[0], hits(c), work / self.at.settings["h"])
         self._compare()
 
 
@@ -214,16 +214,16 @@ class _FreeBodyStepWriter:
 
     def _find(self):
         at, n = self.at, self.at.n
-        integers = [at.table(name) for name in ("body", "pair", "kind", "feature", "found", "count")]
-        others = [at.table(name, POINTER) for name in ("own", "signs", "deepest", "near_settings", "moved", "rows", "depth")]
+        integers = [at.table(name) for name in NEAR_INTEGERS]
+        others = [at.table(name, POINTER) for name in NEAR_NUMBERS]
         self.r.call(self.near, n["parts"], n["pairs"], n["capacity"], n["bodies"], *integers, at["bodies"], *others)
 
     def _touch(self, c: Value):
         """Bodies of a contact that move, −1 for others."""
         at = self.at
-        found, pair, touching, body = (at.table(name) for name in ("found", "pair", "touching", "body"))
-        for side in range(2):
-            column = body[pair[found[c * 2] * 3 + side] * 2]
+        found, touching, body = (at.table(name) for name in ("found", "touching", "body"))
+        for side, part in enumerate(parts_of(found[c * 2], at.n["parts"])):
+            column = body[part * BODY]
             touching[c * 2 + side] = -1
             with self.r.when(column < at.n["n"]):
                 touching[c * 2 + side] = column
@@ -234,7 +234,7 @@ class _FreeBodyStepWriter:
         row, p, place = at.table("rows", POINTER).after(c * ROW), at.table("found")[c * 2], self.islands.contact[c]
         at.copy(at["J"].after(place * CONTACT), row.after(4), CONTACT)
         first, free = self._rates(c, None), self._rates(c, "free")
-        law = at.table("law")[p]
+        law = at.table("law")[p] - 1
         at["mu"][place], e = at["friction"][law], at["restitution"][law]
         gap = row[0]
         given = gap, first[0], s["h"], s["rest"], s["share"]

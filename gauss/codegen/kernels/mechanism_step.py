@@ -19,7 +19,7 @@ from gauss.codegen.kernels.contact_rows import ContactRows
 from gauss.codegen.kernels.contact_solver import ContactSolver
 from gauss.codegen.kernels.free_motion import FreeMotion
 from gauss.codegen.kernels.mechanism_loop import CompiledSteps
-from gauss.codegen.kernels.near_pairs import INTEGERS, write_near
+from gauss.codegen.kernels.near_pairs import INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS, write_near
 from gauss.codegen.kernels.sliding_contacts import SlidingContacts
 from gauss.codegen.kernels.step_memory import FINISHED, IMPACT, LOOP_SETTINGS, REPEATED, StepMemory
 
@@ -77,10 +77,8 @@ class _StepWriter:
         return r.done()
 
     def _find(self):
-        n, names = self.at.n, ("body", "pair", "kind", "feature", "found", "count")
-        integers = [self.at.table(name) for name in names]
-        others = ("own", "signs", "deepest", "near_settings", "moved", "rows", "depth")
-        doubles = [self.at.table(name, POINTER) for name in others]
+        n, integers = self.at.n, [self.at.table(name) for name in NEAR_INTEGERS]
+        doubles = [self.at.table(name, POINTER) for name in NEAR_NUMBERS]
         sizes = n["parts"], n["pairs"], n["capacity"], n["bodies"]
         self.r.call(self.near, *sizes, *integers, self.at["flat:bodies"], *doubles)
 

@@ -1,7 +1,8 @@
 """Near contacts in machine code: poses of shapes, boxes along the axes, distances, and rows of near pairs of features.
 
 The kernels of pairs of shapes are called through their addresses, so that this code holds no shape and is made once on a
-machine. A pair whose boxes along the world axes are apart is left out first (Ericson, Real-Time Collision Detection, 2005).
+machine. A pair whose boxes along the world axes are apart is left out first (Ericson, Real-Time Collision Detection, 2005):
+few pairs are listed, many are found by :mod:`gauss.codegen.kernels.broad_phase`, in the same order.
 """
 
 import ctypes
@@ -11,6 +12,7 @@ from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function, machine
 from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value
+from gauss.codegen.kernels.broad_phase import GridWriter
 
 PART = 16  # own rotation (9), centre (3), sizes (4) of a part in its body
 MOVED = 31  # pose and velocities (24), sizes (4), centre of mass of the body (3)
@@ -19,18 +21,22 @@ ROW_INPUTS = 2 * MOVED + 4  # columns of two shapes, length of the scene, signs
 ROW = 55  # distance, point, rows of both bodies, biases
 FEATURE = 1 + 2 * MOVED  # address of its rows, places of the columns of both shapes
 KIND = 4  # address of the distances, number of features, first feature, whether overlaps may be missed
+BODY = 3  # body of a part, whether it is a plane, its kind
+KINDS = 16  # of shapes, at most
+NEAR_INTEGERS = "body", "pair", "law", "grid", "kind", "feature", "found", "count"  # arrays by name, in their order
+NEAR_NUMBERS = "own", "signs", "deepest", "near_settings", "moved", "rows", "depth"
 MOST = 128  # pairs of features of one pair of shapes, and one more
-NEAR = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 14)
+NEAR = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 16)
 
 
 class _NearPairsWriter:
     def __init__(self, place: Function, module: ir.Module):
         self.place = place
-        kinds = [INTEGER] * 4 + [INTEGERS] * 6 + [POINTER] * 8
+        kinds = [INTEGER] * 4 + [INTEGERS] * 8 + [POINTER] * 8
         r = self.r = Routine(ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), "near"))
         self.parts, self.pairs, self.capacity, self.bodies = r.integers
-        self.body, self.pair, self.kind, self.feature, self.found, self.count = r.arrays[:6]
-        self.pose, self.own, self.signs, self.deepest, self.settings, self.moved, self.rows, self.depth = r.arrays[6:]
+        self.body, self.pair, self.law, self.grid, self.kind, self.feature, self.found, self.count = r.arrays[:8]
+        self.pose, self.own, self.signs, self.deepest, self.settings, self.moved, self.rows, self.depth = r.arrays[8:]
         self.given, self.gaps = r.buffer(ROW_INPUTS), r.buffer(MOST)
         self.extents = self.moved.after(self.parts * MOVED)
         arguments = [INTEGER, POINTER, INTEGER, POINTER, INTEGER]
@@ -42,19 +48,35 @@ class _NearPairsWriter:
         with r.each(self.parts) as k:
             self._move(k)
         with r.each(self.pairs) as p:
-            first, second = self.pair[p * 3], self.pair[p * 3 + 1]
+            first, second = self.pair[p * 2], self.pair[p * 2 + 1]
             with r.when(self._is_near(first, second)):
-                number = self.pair[p * 3 + 2]
-                is_made = self.kind[number * KIND] > 0
-                with r.when(is_made):
-                    self._examine(p, first, second)
-                with r.when(~is_made):
-                    self.count[2] = number + 1
+                self._examine(first, second)
+        with r.when(self.pairs < 1):
+            self._grid().write(self._examine)
         return r.done()
+
+    def _grid(self) -> GridWriter:
+        def centre(part: Value, axis: int) -> Value:
+            return self.moved[part * MOVED + 9 + axis]
+
+        def extent(part: Value, axis: int) -> Value:
+            return self.extents[part * 3 + axis]
+
+        def is_plane(part: Value) -> Value:
+            return self.body[part * BODY + 1] > 0
+
+        def is_near(first: Value, second: Value) -> Value:
+            """Boxes first, as most are apart: the table of laws is large."""
+            near, found = self._is_near(first, second), self.r.variable(0, INTEGER)
+            with self.r.when(near):
+                found[0] = self.law[first * self.parts + second]
+            return found[0] > 0
+
+        return GridWriter(self.r, self.parts, self.grid, centre, extent, is_plane, is_near)
 
     def _move(self, k: Value):
         """Pose and velocities of a part, and the half edges of its box along the axes."""
-        r, body, own, moved = self.r, self.body[k * 2], self.own.after(k * PART), self.moved.after(k * MOVED)
+        r, body, own, moved = self.r, self.body[k * BODY], self.own.after(k * PART), self.moved.after(k * MOVED)
         given = [self.pose[self.bodies * i + body] for i in range(24)] + [own[i] for i in range(12)]
         for i, value in enumerate(r.inline(self.place, *given)):
             moved[i] = value
@@ -76,12 +98,22 @@ class _NearPairsWriter:
             normal = other[3 * i + 2]
             height, width = height + normal * between, width + r.absolute(normal) * extent
             apart = r.maximum(apart, r.absolute(between) - extent - self.extents[second * 3 + i])
-        is_plane = self.body[second * 2 + 1] > 0
+        is_plane = self.body[second * BODY + 1] > 0
         return r.choose(is_plane, height - width, apart) <= 0.0
 
-    def _examine(self, p: Value, first: Value, second: Value):
+    def _examine(self, first: Value, second: Value):
+        """Contacts of a pair, if its kernels are made."""
+        number = self.body[first * BODY + 2] * KINDS + self.body[second * BODY + 2]
+        kind = self.kind.after(number * KIND)
+        is_made = kind[0] > 0
+        with self.r.when(is_made):
+            self._measure(first * self.parts + second, first, second, kind)
+        with self.r.when(~is_made):
+            self.count[2] = number + 1
+
+    def _measure(self, p: Value, first: Value, second: Value, kind: Array):
         """Distances of all features of a pair, and rows of the near ones."""
-        r, kind, given = self.r, self.kind.after(self.pair[p * 3 + 2] * KIND), self.given
+        r, given = self.r, self.given
         for side, part in enumerate((first, second)):
             column = self.moved.after(part * MOVED)
             for i in range(12):
@@ -100,7 +132,8 @@ class _NearPairsWriter:
                 self.count[0] = self.count[0] + 1
         with r.when(kind[3] > 0):
             apart = self.gaps[features]
-            missed = (apart <= -self.deepest[p]) & (least[0] > -self.settings[2])
+            least_edge = -r.maximum(-self.deepest[first], -self.deepest[second])
+            missed = (apart <= -least_edge) & (least[0] > -self.settings[2])
             with r.when(missed):
                 self.count[1] = p + 1
                 self.depth[0] = -apart
@@ -122,6 +155,12 @@ class _NearPairsWriter:
         """Call a kernel of one state by its address."""
         b, one = self.r.b, INTEGER(1)
         b.call(b.inttoptr(address.value, self.kernel), [one, given.pointer, one, found.pointer, one])
+
+
+def parts_of(pair: Value, parts: Value) -> tuple[Value, Value]:
+    """Both parts of a pair by its number."""
+    first = pair // parts
+    return first, pair - first * parts
 
 
 def write_near(place: Function, module: ir.Module) -> ir.Function:

@@ -12,14 +12,14 @@ from llvmlite import ir
 from gauss.codegen import INTEGER, POINTER
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 from gauss.codegen.kernels.contact_solver import room_of
-from gauss.codegen.kernels.near_pairs import INTEGERS
+from gauss.codegen.kernels.near_pairs import INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS
 
 SIZES = ("n_q", "n_v", "r", "bodies", "g", "s", "entries", "flat", "parts", "pairs", "capacity", "loops", "input", "laws")
 ADDRESSES = (
     *("begin", "forces", "move", "entries"),
-    *("body", "pair", "kind", "feature", "found", "count"),
-    *("own", "signs", "deepest", "near_settings", "moved", "rows", "depth"),
-    *("law", "known_found", "known_count", "under", "status", "column"),
+    *NEAR_INTEGERS,
+    *NEAR_NUMBERS,
+    *("known_found", "known_count", "under", "status", "column"),
     *("modes", "next_modes", "closed", "fresh", "counts"),
 )
 TERMS = ("M", "tau", "power", "bodies", "J", "gap", "rate", "K", "bias")  # of the mechanism, in this order

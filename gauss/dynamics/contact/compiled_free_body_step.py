@@ -76,14 +76,11 @@ class FreeBodyMemory(CompiledStepMemory):
         at["reach"][:] = stepper.reach
         at["bodies"].reshape(24, -1)[:, n:] = stepper.fixed
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
-        first, second = self.detection.pairs
-        self.pair_keys = first * len(table.parts) + second
         one, two, islands = ("known_count", "status", "needed"), ("known_found", "touching", "ordered", "within"), n + 1
         lengths = dict.fromkeys(one, 1) | dict.fromkeys(two, 2 * capacity) | dict.fromkeys(ISLANDS, islands)
         lengths |= {"slot": n * n, "list": n * n + islands, "order": n, "degree": n, "start": n + islands}
         lengths |= {"contact_place": capacity, "ordered_count": 2}
         self.integers = {name: np.zeros(length, dtype=np.int64) for name, length in lengths.items()}
-        self.integers["law"] = (table.law[first, second] - 1).astype(np.int64)
         self.integers["q_start"], self.integers["v_start"] = stepper.q_places[0].copy(), stepper.v_places[0].copy()
         self.integers["ordered_count"][0] = -1
         length, share = system.scale.length, stepper.share[0]
@@ -109,7 +106,7 @@ class FreeBodyMemory(CompiledStepMemory):
         """Forces of the last step."""
         m = int(self.integers["known_count"][0])
         pair, feature = self.integers["known_found"][: 2 * m].reshape(m, 2).T
-        key = self.pair_keys[pair] * MOST_FEATURES + feature
+        key = pair * MOST_FEATURES + feature
         order = np.argsort(key)
         force, expected = self.at["known"][: 3 * m].reshape(m, 3)[order], self.at["expected"].reshape(-1, 6).T.copy()
         return KnownContacts(key[order], force, expected)
@@ -118,9 +115,7 @@ class FreeBodyMemory(CompiledStepMemory):
     def known(self, found: KnownContacts):
         key, force, expected = found
         m = min(key.size, self.sizes["capacity"])
-        pair, feature = np.divmod(key[:m], MOST_FEATURES)
-        place = np.searchsorted(self.pair_keys, pair)  # pairs are in order, and so are contacts of a step
-        self.integers["known_found"][: 2 * m] = np.column_stack([place, feature]).ravel()
+        self.integers["known_found"][: 2 * m] = np.column_stack(np.divmod(key[:m], MOST_FEATURES)).ravel()
         self.integers["known_count"][0] = m
         self.at["known"][: 3 * m] = force[:m].ravel()
         self.at["expected"][:] = expected.T.ravel()

@@ -86,11 +86,9 @@ class MechanismMemory(CompiledStepMemory):
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
         at["other_restitution"][:], at["other_unit"][:] = rows.other_restitution, rows.other_unit
         at["set_unit"][:], at["limit"][:], at["lossy"][:] = rows.set_unit, rows.limit, rows.lossy
-        first, second = self.detection.pairs
         room, n = FIRST_ROOM, self.sizes
         self.integers = {
             "entries": stepper.kernels.layout.entries.astype(np.int64),
-            "law": (table.law[first, second] - 1).astype(np.int64),
             "known_found": np.zeros((room, 2), dtype=np.int64),
             "known_count": np.zeros(1, dtype=np.int64),
             "under": np.zeros(6 * room + 2 * n["g"] + n["s"] + 1, dtype=np.int64),
@@ -100,7 +98,6 @@ class MechanismMemory(CompiledStepMemory):
         time = stepper.system.scale.time
         rates = time * RESTING, time * SLIDING_SPEED
         self.set_first(stepper.system, *rates, stepper.shares[0], STEP_SETTINGS, stepper.constants)
-        self.pair_keys = first * len(table.parts) + second
 
     def kernels(self) -> dict[str, int]:
         """Addresses of kernels of the scene."""
@@ -152,7 +149,7 @@ class MechanismMemory(CompiledStepMemory):
         """Forces of the last step."""
         m = int(self.integers["known_count"][0])
         pair, feature = self.integers["known_found"][:m].T
-        key = self.pair_keys[pair] * MOST_FEATURES + feature
+        key = pair * MOST_FEATURES + feature
         order = np.argsort(key)
         force, others = self.at["known"][: 3 * m].reshape(m, 3)[order], self.at["known_others"].copy()
         return KnownForces(key[order], force, others, float(self.at["before"][0]))
@@ -161,9 +158,7 @@ class MechanismMemory(CompiledStepMemory):
     def known(self, found: KnownForces):
         key, force, others, self.at["before"][0] = found
         m = min(key.size, FIRST_ROOM)
-        pair, feature = np.divmod(key[:m], MOST_FEATURES)
-        self.integers["known_found"][:m, 0] = np.searchsorted(self.pair_keys, pair)
-        self.integers["known_found"][:m, 1] = feature
+        self.integers["known_found"][:m] = np.column_stack(np.divmod(key[:m], MOST_FEATURES))
         self.integers["known_count"][0] = m
         self.at["known"][: 3 * m], self.at["known_others"][:] = force[:m].ravel(), others
 

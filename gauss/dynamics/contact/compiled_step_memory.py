@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen.kernels import CompiledSteps, MemoryLayout, address
+from gauss.codegen.kernels.near_pairs import NEAR_INTEGERS, NEAR_NUMBERS
 from gauss.codegen.kernels.step_memory import CHANGE, FINISHED, LOOP_SETTINGS, RESULTS, STEP_SETTINGS
 from gauss.dynamics.contact.contact_changes import ModeChange, ModeRecord
 from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.system import State, System
 
-DETECTED = ("body", "pair", "kind", "feature", "found", "count", "own", "signs", "deepest", "moved", "rows", "depth")
 RECORDED = ("modes", "next_modes", "closed", "fresh", "counts")
 
 
@@ -82,8 +82,7 @@ class CompiledStepMemory:
     def connect(self):
         """Take all addresses anew: a new motion may run in another tier."""
         self.version = self.detection.version
-        arrays = {**self.integers, **{name: getattr(self.detection, name) for name in DETECTED}}
-        arrays["near_settings"] = self.detection.settings
+        arrays = {**self.integers, **{name: getattr(self.detection, name) for name in (*NEAR_INTEGERS, *NEAR_NUMBERS)}}
         arrays |= {name: getattr(self.record, name) for name in RECORDED}
         found = {name: array.ctypes.data for name, array in arrays.items()} | self.kernels()
         self.addresses = np.array([found[name] for name in self.layout.addresses], dtype=np.int64)

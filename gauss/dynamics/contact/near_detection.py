@@ -6,18 +6,21 @@ import numpy as np
 
 from gauss.codegen import from_disk
 from gauss.codegen.kernels import NearPairs
-from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, PART, ROW
+from gauss.codegen.kernels.broad_phase import grid_room
+from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, NEAR_INTEGERS, NEAR_NUMBERS, PART, ROW
+from gauss.codegen.kernels.near_pairs import KINDS as MOST_KINDS
 from gauss.dynamics.contact.free_bodies import place_function
 from gauss.dynamics.contact.moreau_step import START_OVERLAP
 from gauss.dynamics.contact.near_contacts import COLUMNS, NearContacts, Overlap
 from gauss.dynamics.contact.pair_kernels import SIGNS, PairKernels, pair_kernels
 from gauss.dynamics.contact.patch_kernels import PatchKernels
 from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
-from gauss.scene import HalfSpace
+from gauss.scene import Collider, HalfSpace
 from gauss.scene.contact_pairs import RULES
 from gauss.scene.patch_distances import patch_points
 
 FIRST_ROOM = 64  # contacts that there is room for at first
+MOST_LISTED = 4000  # pairs that are tried one by one; more are found by a grid
 
 
 class NearDetection:
@@ -37,22 +40,20 @@ class NearDetection:
         self.table, self.length, self.code = table, length, near_pairs()
         self.version = 0  # changes with the addresses of the arrays
         n = len(table.parts)
-        first, second = np.nonzero(np.triu(table.law))
-        self.pairs = first, second
-        codes = table.kind[first] * len(KINDS) + table.kind[second]
-        self.codes, number = np.unique(codes, return_inverse=True)
-        self.pair = np.column_stack([first, second, number]).astype(np.int64)
-        self.body = np.column_stack([table.body, table.kind == KINDS.index(HalfSpace)]).astype(np.int64)
+        self.law = np.ascontiguousarray(table.law)
+        is_listed = 0 < np.count_nonzero(self.law) <= 2 * MOST_LISTED  # each pair stands there twice
+        self.pair = np.column_stack(np.nonzero(np.triu(self.law))) if is_listed else np.zeros((0, 2), dtype=np.int64)
+        self.grid = grid_room(0 if is_listed else n)
+        self.body = np.column_stack([table.body, table.kind == KINDS.index(HalfSpace), table.kind]).astype(np.int64)
         self.own = np.concatenate([table.own, table.centre, table.sizes]).T.copy()
         assert self.own.shape == (n, PART)
         least = table.sizes[:3].min(axis=0)
-        edges = np.where(least > 0.0, 2.0 * least, np.inf)
-        self.edges = np.minimum(edges[first], edges[second])
+        self.edges = np.where(least > 0.0, 2.0 * least, np.inf)
         self.moved, self.bodies = np.empty(n * (MOVED + 3)), np.empty((24, bodies))
-        self.deepest, self.settings = np.empty(first.size), np.array([0.0, length, START_OVERLAP * length])
+        self.deepest, self.near_settings = np.empty(n), np.array([0.0, length, START_OVERLAP * length])
         self.kinds: dict[int, PairKernels | PatchKernels] = {}
         self._make_room(FIRST_ROOM)
-        self.kind, self.feature = np.zeros((self.codes.size, KIND), dtype=np.int64), np.zeros((0, FEATURE), dtype=np.int64)
+        self.kind, self.feature = np.zeros((MOST_KINDS**2, KIND), dtype=np.int64), np.zeros((0, FEATURE), dtype=np.int64)
         self.signs, self.count, self.depth = np.zeros((0, SIGNS)), np.zeros(4, dtype=np.int64), np.zeros(1)
 
     def _make_room(self, capacity: int):
@@ -60,14 +61,17 @@ class NearDetection:
 
     def _kernels(self, code: int) -> PairKernels | PatchKernels:
         """Kernels of a pair of kinds of shapes."""
-        one, other = divmod(code, len(KINDS))
+        one, other = divmod(code, MOST_KINDS)
         kinds = KINDS[one], KINDS[other]
         if RULES[kinds] is not patch_points:
             return pair_kernels(kinds)
-        parts, (first, second), shapes = self.table.parts, self.pairs, self.table.scene.shapes
-        return PatchKernels(
-            lambda p: (shapes[parts[first[p]].shape], shapes[parts[second[p]].shape]), self.count, self.settings
-        )
+        parts, shapes = self.table.parts, self.table.scene.shapes
+
+        def shapes_of(pair: int) -> tuple[Collider, Collider]:
+            first, second = divmod(pair, len(parts))
+            return shapes[parts[first].shape], shapes[parts[second].shape]
+
+        return PatchKernels(shapes_of, self.count, self.near_settings)
 
     def connect(self):
         """Take the addresses of the kernels anew: a new motion may run in another tier."""
@@ -86,9 +90,8 @@ class NearDetection:
 
     def _take_addresses(self):
         self.version += 1
-        integers = self.body, self.pair, self.kind, self.feature, self.found, self.count
-        numbers = self.bodies, self.own, self.signs, self.deepest, self.settings, self.moved, self.rows, self.depth
-        self.addresses = [array.ctypes.data for array in (*integers, *numbers)]
+        names = *NEAR_INTEGERS, "bodies", *NEAR_NUMBERS
+        self.addresses = [getattr(self, name).ctypes.data for name in names]
 
     def find(self, bodies: np.ndarray, reach: float, unseen: float = np.inf) -> tuple[NearContacts, list[Overlap]]:
         """Contacts nearer than ``reach``, and a pair of shapes that overlap without one.
@@ -104,14 +107,14 @@ class NearDetection:
         """
         table = self.table
         self.bodies[...] = bodies
-        self.settings[0] = reach
+        self.near_settings[0] = reach
         np.multiply(unseen, self.edges, out=self.deepest)
         while True:
             counts = len(table.parts), len(self.pair), len(self.rows), self.bodies.shape[1]
             self.code(counts, self.addresses)
             m, missed, unmade, _ = self.count.tolist()
             if unmade:
-                self.kinds[unmade - 1] = self._kernels(int(self.codes[unmade - 1]))
+                self.kinds[unmade - 1] = self._kernels(unmade - 1)
                 self.connect()
             elif m > len(self.rows):
                 self._make_room(2 * m)
@@ -119,16 +122,14 @@ class NearDetection:
             else:
                 break
         pair, feature = self.found[:m].T
-        first, second = self.pairs[0][pair], self.pairs[1][pair]
+        first, second = np.divmod(pair, len(table.parts))
         rows = self.rows[:m].copy()
         J = rows[:, 4:52].reshape(m, 2, 3, 8)
-        key = (first * len(table.parts) + second) * MOST_FEATURES + feature
+        key = pair * MOST_FEATURES + feature
         touching = np.column_stack([table.body[first], table.body[second]])
         law = table.law[first, second] - 1
         near = NearContacts(key, law, touching, rows[:, 0], rows[:, 1:4], J[:, 0, :, 3:6], J, rows[:, 52:])
-        one = missed - 1
-        overlap = Overlap(int(table.law[self.pairs[0][one], self.pairs[1][one]]) - 1, float(self.depth[0]))
-        return near, [overlap] if missed else []
+        return near, [Overlap(int(self.law.flat[missed - 1]) - 1, float(self.depth[0]))] if missed else []
 
 
 @cache
