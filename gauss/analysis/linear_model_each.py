@@ -9,6 +9,8 @@ from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.dynamics.state_functions import RESIDUAL_TOLERANCE, distance_of_loops, refused_state
 from gauss.errors import StateError
 
+Matrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
 
 class LinearModelOfEach:
     """Function (q, v, load, out, t) → A, B, C, D of one system.
@@ -24,7 +26,7 @@ class LinearModelOfEach:
     def __init__(self, model: LinearModel, independent: list[str]):
         self.model, self.independent = model, independent
 
-    def __call__(self, q, v, load, out=None, t=0.0) -> tuple[np.ndarray, ...]:
+    def __call__(self, q, v, load, out=None, t=0.0) -> Matrices:
         """Matrices about a state, or about each of a batch of states.
 
         Raises
@@ -39,10 +41,13 @@ class LinearModelOfEach:
         rows = [np.broadcast_to(part, (*shape, part.shape[-1])).reshape(-1, part.shape[-1]) for part in given]
         times = np.broadcast_to(time, shape).ravel()
         found = [self._about(*one) for one in zip(*rows, times, strict=True)]
-        sizes = [getattr(self.model, name).shape for name in "ABCD"]
-        return tuple(np.array([one[k] for one in found]).reshape(*shape, *size) for k, size in enumerate(sizes))
+        A, B, C, D = (
+            np.array([one[k] for one in found]).reshape(*shape, *getattr(self.model, name).shape)
+            for k, name in enumerate("ABCD")
+        )
+        return A, B, C, D
 
-    def _about(self, q, v, load, t) -> tuple[np.ndarray, ...]:
+    def _about(self, q, v, load, t) -> Matrices:
         """Matrices about one state."""
         system, model = self.model.system, self.model
         state = system.state(q, v, t)
