@@ -24,6 +24,7 @@ from gauss.arguments import generator, named_arguments, real_array
 from gauss.errors import ArgumentError, StateError, extra
 from gauss.scene import Scene
 from gauss.system import System
+from gauss.system.coordinate_names import force_units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -130,15 +131,17 @@ class Identification:
         with extra("view"):
             from matplotlib.figure import Figure
 
-        figure = Figure(figsize=(7.0, 0.8 + 1.6 * len(self.rows)), layout="constrained")
+        figure = Figure(figsize=(7.0, 0.9 + 2.1 * len(self.rows)), layout="constrained")
+        units = force_units(self.model.system)
         for axes, row, one, other in zip(
             figure.subplots(len(self.rows), squeeze=False)[:, 0], self.rows, self.measured.T, self.predicted.T, strict=True
         ):
-            axes.plot(one, ".", markersize=2, label="measured")
-            axes.plot(other, linewidth=1.0, label="identified")
-            axes.set(ylabel=row)
+            (points,) = axes.plot(one, ".", markersize=3, zorder=3, label="measured")
+            (line,) = axes.plot(other, linewidth=0.8, label="identified")
+            axes.set(ylabel=f"{row} [{units[row]}]")
+            axes.margins(x=0.01)
         axes.set(xlabel="sample")
-        axes.legend()
+        figure.legend(handles=[points, line], loc="outside upper right", ncols=2)
         if path is not None:
             figure.savefig(path)
         return figure

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gauss.analysis.linear_model import LinearModel, linearise
+from gauss.analysis.linear_model_each import LinearModelOfEach, output_names
 from gauss.arguments import named_arguments
 from gauss.codegen import Interface, forward, write
 from gauss.dynamics import compile_scene
@@ -18,7 +19,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.linear_terms import LinearTerms
 from gauss.dynamics.outputs import measured
 from gauss.dynamics.plan import LINEAR_MODELS
-from gauss.dynamics.rules import Question
+from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.state_functions import TracedFunction, compiled, error_limits, error_measures, traced_loads
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, require
@@ -33,6 +34,8 @@ class PreparedLinearModel:
     ----------
     model : LinearModel
         Linear model about one state.
+    plan : Plan
+        Whether one function computes a model ("state"), or a loop in Python that of each state, where loops are many.
 
     Attributes
     ----------
@@ -42,15 +45,15 @@ class PreparedLinearModel:
         The system.
     """
 
-    def __init__(self, model: LinearModel):
-        self.model, self.system = model, model.system
+    def __init__(self, model: LinearModel, plan: Plan):
+        self.model, self.plan, self.system = model, plan, model.system
         self.states, self.inputs, self.outputs = model.states, model.inputs, model.outputs
         _refuse(model)
-        self._function = _compiled(model)
+        self._function = _compiled(model) if plan.driver == "state" else LinearModelOfEach(model, _independent(model))
         self._no_load = np.zeros(self.system.n_v)
 
     def __reduce__(self):
-        return PreparedLinearModel, (self.model,)
+        return PreparedLinearModel, (self.model, self.plan)
 
     def __call__(self, q, v, load=None, t=0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Matrices of δẋ = A δx + B δu, δy = C δx + D δu about a state, or about each of a batch of states.
@@ -89,7 +92,7 @@ def prepare_linear_model(
     outputs: Sequence[str] | None = None,
     independent: Sequence[str] | None = None,
 ) -> PreparedLinearModel:
-    """Prepare linear models of many states: a call takes microseconds, loops included.
+    """Prepare linear models of many states: a call takes microseconds, loops included, and milliseconds where they are many.
 
     Parameters
     ----------
@@ -113,8 +116,8 @@ def prepare_linear_model(
     StateError
         If a name is none of the scene, or the independent coordinates do not determine the others.
     SimulationError
-        If the system cannot be compiled, or has so many loop constraints that its code would be too large; if elements stick
-        and slip, by their names, or bodies roll, so that the states of the model are not the same everywhere.
+        If the system cannot be compiled; if elements stick and slip, by their names, or bodies roll, so that the states of
+        the model are not the same everywhere.
 
     Examples
     --------
@@ -127,16 +130,15 @@ def prepare_linear_model(
     """
     require(system, (System, Scene), "prepare_linear_model")
     system = compile_scene(system) if isinstance(system, Scene) else system
-    LINEAR_MODELS.plan(Question(system, Laws(system)))
+    plan = LINEAR_MODELS.plan(Question(system, Laws(system)))
     if state is None:
         start = system.initial_state()
         state = system.initial_state(start.q, np.zeros(system.n_v), start.t)
     model = linearise(system, state, inputs=inputs, outputs=outputs, independent=independent)
     positions, rates, own = _places(model)
     if not set(positions) <= set(rates) and len(positions) + own == len(rates):  # equally good coordinates, chosen twice
-        chosen = [system.coordinates[place] for place in rates]
-        model = linearise(system, state, inputs=inputs, outputs=outputs, independent=chosen)
-    return PreparedLinearModel(model)
+        model = linearise(system, state, inputs=inputs, outputs=outputs, independent=_independent(model))
+    return PreparedLinearModel(model, plan)
 
 
 def _refuse(model: LinearModel):
@@ -153,6 +155,11 @@ def _refuse(model: LinearModel):
         raise SimulationError(
             f"scene {system.scene.name!r} rolls: displacements are more than rates; call gauss.linearise in each state."
         )
+
+
+def _independent(model: LinearModel) -> list[str]:
+    """Names of the independent rates of a model."""
+    return [model.system.coordinates[place] for place in _places(model)[1]]
 
 
 def _places(model: LinearModel) -> tuple[list[int], list[int], int]:
@@ -215,7 +222,7 @@ def _forces(model: LinearModel):
 def _outputs(model: LinearModel):
     """Function of linear terms and changes (3 n_v, c) of displacements, rates, accelerations → those (p, c) of outputs."""
     system, scene, names = model.system, model.system.scene, list(model.system.coordinates)
-    labels = dict.fromkeys(label if label in names else label.partition("[")[0] for label in model.outputs)
+    labels = output_names(model)
 
     def rows(linear: LinearTerms, changes, label: str):
         if label in scene.outputs:

@@ -20,6 +20,13 @@ def export(
         typer.Option(help="Function of a state, such as mass_matrix or jacobian:hand; may be repeated.", show_default=False),
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder of the files.")] = Path("."),
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Number of the scene that stays a tunable parameter of an fmu, such as rod.mass; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the files, and prefix of the functions in C.")] = None,
     root: Root = "fixed",
     read: Read = None,
@@ -32,5 +39,5 @@ def export(
         raise FileError(f"{scene}: servos cannot be exported; name a scene.")
     from gauss.export import save_as
 
-    for path in save_as(gauss.compile_scene(found), to, output, function or None, name):
+    for path in save_as(gauss.compile_scene(found), to, output, function or None, name, parameter or ()):
         typer.echo(f"written to {path}")

@@ -42,7 +42,9 @@ class MotionStep:
     parameters : sequence of str
         Parameters of :meth:`gauss.System.parameter_derivatives`.
     absent : sequence of str
-        Those of one value that do not act in this system, as the limit of friction in one that sticks.
+        Those of one value that do not act in its accelerations, as the limit of friction in one that sticks.
+    moved_loops : ndarray, shape (m, n_p), optional
+        Derivatives of the position residual by the parameters, as by the place of a stop that bears; zero when not given.
 
     Raises
     ------
@@ -52,7 +54,16 @@ class MotionStep:
         If the system has no smooth dynamics in machine code, with the reasons.
     """
 
-    def __init__(self, system: System, integrator: str, parameters: Sequence[str] = (), absent: Sequence[str] = ()):
+    moved_loops: np.ndarray | None = None
+
+    def __init__(
+        self,
+        system: System,
+        integrator: str,
+        parameters: Sequence[str] = (),
+        absent: Sequence[str] = (),
+        moved_loops: np.ndarray | None = None,
+    ):
         if not isinstance(integrator, str) or integrator not in TABLEAUS:
             raise ArgumentError(f"sensitivities: no integrator {integrator!r}. {did_you_mean(str(integrator), TABLEAUS)}")
         self.system, self.parameters = system, name_list(parameters, "sensitivities: parameters")
@@ -62,7 +73,9 @@ class MotionStep:
         self.sizes = {name: 1 if name in self.absent else size_of(system, name) for name in self.parameters}
         self.inputs, self.given = tuple(system.scene.inputs), InputForces(system)
         self.n_x, self.n_p = system.n_q + system.n_v, sum(self.sizes.values())
-        self.key: tuple = (MotionStep, integrator, self.parameters, self.absent, self.laws.key)
+        self.moved_loops = moved_loops
+        moved = b"" if moved_loops is None else moved_loops.tobytes()
+        self.key: tuple = (MotionStep, integrator, self.parameters, self.absent, moved, self.laws.key)
 
     @cached_property
     def loads(self) -> list:
@@ -95,13 +108,15 @@ class MotionStep:
         y = chart.start(point)
         K = stages(self.tableau, chart, y, chart.rate(y, point.rates), h)
         end = chart.state(t + h, y + h * (self.tableau.b @ K))
-        return np.concatenate(self.projected(end) if self.system.closes else [end.q, end.v])
+        return np.concatenate(self.projected(end, delta) if self.system.closes else [end.q, end.v])
 
-    def projected(self, state: State) -> list[np.ndarray]:
-        """Coordinates and rates on the constraints."""
+    def projected(self, state: State, delta=()) -> list[np.ndarray]:
+        """Coordinates and rates on the constraints, which small changes δ of the parameters may move."""
         q, v, t = state.q, state.v, state.t
+        shift = 0.0 if self.moved_loops is None else self.moved_loops @ delta
         for _ in range(PROJECTIONS):
-            step = Mechanism(self.system, q, v, t).position_correction(*loop_residual(self.system, q, t))
+            phi, slack = loop_residual(self.system, q, t)
+            step = Mechanism(self.system, q, v, t).position_correction(phi + shift, slack)
             q = Chart(_Equations(self, ()), State(t, q, v)).state(t, np.concatenate([step, v])).q
         mechanism = Mechanism(self.system, q, v, t)
         return [q, mechanism.nearest(v, mechanism.velocity_rhs)]

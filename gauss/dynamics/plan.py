@@ -239,9 +239,12 @@ DERIVATIVES = RuleTable(
     (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),
     lambda ask, why: f"scene {ask.system.scene.name!r} cannot be differentiated: {why}.",
 )
-# Linear models written out as a whole.
+# Linear models of many states: written out as a whole, or that of each state by compiled derivatives.
 LINEAR_MODELS = RuleTable(
-    (Rule("state", "compiled", conditions=(compilable, traced_laws, few_loops, few_loop_rows)),),
+    (
+        Rule("state", "compiled", conditions=(compilable, traced_laws, few_loops, few_loop_rows)),
+        Rule("Python loop", "compiled", conditions=(compilable, traced_laws, few_bodies)),
+    ),
     lambda ask, why: f"linear models of {ask.system.scene.name!r} cannot be prepared: {why}; call gauss.linearise instead.",
 )
 

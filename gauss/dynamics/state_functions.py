@@ -343,7 +343,7 @@ def compiled(system: System, function: TracedFunction, columns, key: tuple) -> C
         if not all(np.isfinite(part).all() for part in (*others, t)):
             raise StateError(f"{name}: expected finite numbers, got {others[-1] if others else ''} at t = {t}.")
         if np.array_equal(state.q, q):
-            raise StateError(_refusal(system, state, name, columns))
+            raise StateError(refused_state(system, state, name, columns))
         found = run(state.q, *others, None, t)
         return np.concatenate([np.ravel(part) for part in (found if isinstance(found, tuple) else (found,))])
 
@@ -392,11 +392,16 @@ def error_measures(terms: StateTerms, given) -> list:
     return [residual, total, np.abs(N / unit[:, None]).sum(), np.abs(moved).sum()]
 
 
-def _refusal(system: System, state: State, name: str, columns) -> str:
+def distance_of_loops(system: System, state: State) -> float:
+    """Residual of the loop constraints, in shares of their scales."""
+    return float(np.abs(loop_residual(system, state.q, state.t)[0] / loop_constraint_scales(system)).sum())
+
+
+def refused_state(system: System, state: State, name: str, columns) -> str:
     """Why a state with unit quaternions and finite numbers is refused."""
     if columns is None:
         return f"{name}: no finite result in this state."
-    rows = np.abs(loop_residual(system, state.q, state.t)[0] / loop_constraint_scales(system)).sum()
+    rows = distance_of_loops(system, state)
     if rows > RESIDUAL_TOLERANCE:
         return (
             f"{name}: q does not meet the constraints, by {rows:.3g} of their scales; system.initial_state or "

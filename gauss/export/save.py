@@ -10,7 +10,12 @@ from gauss.system import System
 
 
 def save_as(
-    system: System | Scene, language: str, folder=".", names: Sequence[str] | str | None = None, name: str | None = None
+    system: System | Scene,
+    language: str,
+    folder=".",
+    names: Sequence[str] | str | None = None,
+    name: str | None = None,
+    parameters: Sequence[str] | str = (),
 ) -> list[Path]:
     """Write functions of a system as code of another language.
 
@@ -27,6 +32,8 @@ def save_as(
         Functions, see :func:`gauss.export.exported_functions`.
     name : str, optional
         Name of the files; that of the scene when not given.
+    parameters : sequence of str
+        Numbers of the scene that stay open as tunable parameters of a unit of FMI 3, see :func:`to_fmu`.
 
     Returns
     -------
@@ -36,7 +43,7 @@ def save_as(
     Raises
     ------
     ArgumentError
-        If there is no such language or function.
+        If there is no such language or function, or the language has no tunable parameters.
     MissingPackageError
         If the language needs a package that is not installed.
     SimulationError
@@ -54,7 +61,10 @@ def save_as(
     if not isinstance(language, str) or language not in WRITERS:
         raise ArgumentError(f"export: no language {language!r}. {did_you_mean(str(language), WRITERS)}")
     scene = system if isinstance(system, Scene) else system.scene
-    return WRITERS[language](system, folder_of(folder), names, identifier(scene.name if name is None else name))
+    own = identifier(scene.name if name is None else name)
+    if parameters:
+        return [_unit(system, language, folder_of(folder), names, own, parameters)]
+    return WRITERS[language](system, folder_of(folder), names, own)
 
 
 def _save_c(system, folder: Path, names, name: str) -> list[Path]:
@@ -95,11 +105,17 @@ def _latex(system, names) -> str:
 
 
 def _save_fmu(system, folder: Path, names, name: str) -> list[Path]:
+    return [_unit(system, "fmu", folder, names, name, ())]
+
+
+def _unit(system, language: str, folder: Path, names, name: str, parameters: Sequence[str] | str) -> Path:
     from gauss.export.fmu.unit import to_fmu
 
+    if language != "fmu":
+        raise ArgumentError(f"export: {language!r} has no tunable parameters; 'fmu' has, or leave parameters out.")
     if names is not None:
         raise ArgumentError("export: a unit of FMI has no functions to choose; its outputs are those of the scene.")
-    return [to_fmu(system, folder, name)]
+    return to_fmu(system, folder, name, parameters)
 
 
 WRITERS: dict[str, Callable] = {

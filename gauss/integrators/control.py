@@ -23,6 +23,9 @@ LARGEST_LATER_FACTOR = 2.5  # next step over this one after these: an error esti
 SMALLEST_DIVISOR = 1e-300  # added to divisors, and least argument of logarithms
 LARGEST_ERROR = 1e300  # larger errors, and NaN, give the smallest factor
 SHORTEST_FIRST_STEP = 1e-6  # in units of the time of the scene: initial step where the derivatives do not give one
+SHORTEST_TRIAL = (
+    1e-9  # in these units: step that estimates the second derivative where a state at rest is zero but for round-off
+)
 STATIONARY_SLOPE = 1e-15  # norm of the slope in these units below which a state is stationary
 SMALLEST_NORM = 1e-5  # norm of a state or slope, relative to its tolerance, below which it gives no initial step
 
@@ -152,9 +155,8 @@ def trial_length(system: System, size: Scalar, slope: Scalar) -> Scalar:
     T = system.scale.time  # the formula compares first and second derivatives: it needs a unit of time
     size, d1 = (np.sqrt(square / (2 * system.n_v)) for square in (size, slope))
     d1 = T * d1
-    return T * math.where(
-        math.minimum(size, d1) < SMALLEST_NORM, SHORTEST_FIRST_STEP, 0.01 * size / math.maximum(d1, SMALLEST_NORM)
-    )
+    h = math.maximum(0.01 * size / math.maximum(d1, SMALLEST_NORM), SHORTEST_TRIAL)
+    return T * math.where(math.minimum(size, d1) < SMALLEST_NORM, SHORTEST_FIRST_STEP, h)
 
 
 def first_length(system: System, order: int, h: Scalar, slope: Scalar, change: Scalar) -> Scalar:

@@ -22,6 +22,11 @@ def rate_units(system) -> dict[str, str]:
     return dict(zip(system.coordinates, units, strict=True))
 
 
+def force_units(system) -> dict[str, str]:
+    """Name → unit of the generalised force along every entry of v: "N m" or "N"."""
+    return {name: "N m" if unit == "rad/s" else "N" for name, unit in rate_units(system).items()}
+
+
 def _units(pair) -> list[str]:
     """Unit of the coordinate of each rate of a pair: rad of a rotation, also of a screw, which slides as well."""
     turning, _ = pair.subspace(np.array(pair.reference))

@@ -297,4 +297,4 @@ def test_the_figure_shows_each_coordinate():
     system = gauss.compile_scene(gauss.load("double_pendulum"))
     q, v, a = samples(system)
     figure = gauss.identify(system, q, v, a, system.inverse_dynamics(q, v, a)).plot()
-    assert [axes.get_ylabel() for axes in figure.axes] == list(system.coordinates)
+    assert [axes.get_ylabel() for axes in figure.axes] == [f"{name} [N m]" for name in system.coordinates]

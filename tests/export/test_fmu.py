@@ -10,6 +10,7 @@ from gauss import export
 from gauss.errors import ArgumentError, SceneError, SimulationError
 from gauss.scene import actuators
 from gauss.scene.named_numbers import scene_of, value_of
+from tests.support.files import call
 
 COMPILER = shutil.which("cc")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
@@ -169,3 +170,18 @@ def test_what_no_unit_can_hold_is_named(make, named, tmp_path):
         export.to_fmu(make(), tmp_path)
     with pytest.raises(ArgumentError, match="no functions to choose"):
         export.save_as(gauss.load("pendulum"), "fmu", tmp_path, ["mass_matrix"])
+
+
+def test_files_of_units_have_the_parameters_that_are_asked(tmp_path):
+    (path,) = export.save_as(gauss.load("pendulum"), "fmu", tmp_path, parameters=["rod.mass"])
+    with zipfile.ZipFile(path) as unit:
+        assert 'name="rod.mass"' in unit.read("modelDescription.xml").decode()
+    with pytest.raises(ArgumentError, match="'c' has no tunable parameters"):
+        export.save_as(gauss.load("pendulum"), "c", tmp_path, parameters=["rod.mass"])
+
+
+def test_the_command_writes_tunable_parameters(tmp_path):
+    given = ["export", "pendulum", "--to", "fmu", "--parameter", "rod.mass", "--output", str(tmp_path)]
+    assert call(*given).exit_code == 0
+    with zipfile.ZipFile(tmp_path / "pendulum.fmu") as unit:
+        assert 'name="rod.mass"' in unit.read("modelDescription.xml").decode()

@@ -9,12 +9,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gauss.dynamics import compile_scene
 from gauss.errors import ArgumentError, SimulationError, StateError, did_you_mean, require
 from gauss.scene import Scene, Slipping, Stop
+from gauss.scene.named_numbers import scene_of
 from gauss.system import System, sides
 
 RESTITUTION, LIMIT = "restitution", "limit"
 PLACES = {"lowest": 1.0, "highest": -1.0}  # of stops: their gaps are sign · (q − place)
+PLACE_STEP = 2.0**-10  # of a place [rad, m]; residuals are linear in it
 
 
 def is_of_event(scene: Scene, parameter: str) -> bool:
@@ -49,15 +52,28 @@ def absent_from(system: System, whole: System, parameters: Sequence[str]) -> tup
     return tuple(name for name in parameters if is_of_event(whole.scene, name) and name not in slipping)
 
 
-def refuse_bearing(whole: System, held: Sequence[int], parameters: Sequence[str]):
-    """Raise a SimulationError for places of stops that bear in a phase: its states lie on what moves."""
-    names = [sides(whole.scene)[i].name for i in held]
-    for parameter in parameters:
-        kind, _, name = parameter.partition(":")
-        if kind in PLACES and f"{name}.{kind}" in names:
-            raise SimulationError(
-                f"derivatives by {parameter} are available through impacts, but {name!r} bears for a while in this motion."
-            )
+def bearing_places(whole: System, held: Sequence[int], parameters: Sequence[str]) -> tuple[str, ...]:
+    """Parameters that are places of stops which bear in a phase: its states lie on what moves."""
+    names = {sides(whole.scene)[i].name for i in held}
+    split = ((parameter, *parameter.partition(":")[::2]) for parameter in parameters)
+    return tuple(parameter for parameter, kind, name in split if kind in PLACES and f"{name}.{kind}" in names)
+
+
+def refuse_bearing_start(whole: System, held: Sequence[int], parameters: Sequence[str]):
+    """Raise a SimulationError for places of stops that bear from the start, which would lie beyond a place that moves."""
+    for parameter in bearing_places(whole, held, parameters):
+        name = parameter.partition(":")[2]
+        raise SimulationError(
+            f"derivatives by {parameter} do not exist: {name!r} bears from the start, which does not move with it; start "
+            "before the impact."
+        )
+
+
+def elsewhere(whole: System, parameter: str) -> System:
+    """The system with a stop at another place, :data:`PLACE_STEP` farther out."""
+    kind, _, name = parameter.partition(":")
+    place = getattr(whole.scene.contacts[name], kind) - PLACES[kind] * PLACE_STEP
+    return compile_scene(scene_of(whole.scene, {f"{name}.{kind}": place}))
 
 
 def gap_by_parameters(whole: System, gap: int, sizes: dict[str, int]) -> np.ndarray:

@@ -5,13 +5,22 @@ from typing import Protocol
 
 import numpy as np
 
-from gauss.analysis.sensitivity.event_parameters import absent_from, is_of_event, refuse_bearing
+from gauss.analysis.sensitivity.event_parameters import (
+    PLACE_STEP,
+    PLACES,
+    absent_from,
+    bearing_places,
+    elsewhere,
+    is_of_event,
+    refuse_bearing_start,
+)
 from gauss.analysis.sensitivity.law_jumps import warn_of_jumps
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
 from gauss.analysis.sensitivity.saltation import Transition
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import name_list, real_array
 from gauss.dynamics import compile_scene
+from gauss.dynamics.mechanism import loop_residual
 from gauss.dynamics.motion_step import MotionStep
 from gauss.dynamics.parameter_terms import OF_JOINTS
 from gauss.errors import ArgumentError, SimulationError, require
@@ -144,6 +153,7 @@ class Motion:
         for name in self.parameters:
             is_of_event(self.system.scene, name)  # raises
         record, self.x = recorded_motion(self.system, self.h * self.steps, self.start, self.t, self.inputs)
+        refuse_bearing_start(self.system, record[0].phase.case[0], self.parameters)
         self.start = record[0].start
         self.pieces = [[] for _ in range(self.steps)]
         made: dict[int, MotionStep] = {}
@@ -160,10 +170,22 @@ class Motion:
         """Smooth dynamics of a phase."""
         system = one.system(self.system)
         if id(system) not in made:
-            refuse_bearing(self.system, one.phase.case[0], self.parameters)
             absent = absent_from(system, self.system, self.parameters)
-            made[id(system)] = MotionStep(system, self.integrator, self.parameters, absent)
+            step = MotionStep(system, self.integrator, self.parameters, absent)
+            moved = self._moved_loops(one, step)
+            made[id(system)] = MotionStep(system, self.integrator, self.parameters, absent, moved) if moved.any() else step
         return made[id(system)]
+
+    def _moved_loops(self, one: RecordedPhase, step: MotionStep) -> np.ndarray:
+        """Derivatives (m, n_p) of the position residual of a phase by the places of stops that bear in it."""
+        residual = lambda system: loop_residual(system, one.start.q, one.start.t)[0]  # noqa: E731
+        own = residual(step.system)
+        found, ends = np.zeros((own.size, step.n_p)), np.cumsum([0, *step.sizes.values()])
+        for parameter in bearing_places(self.system, one.phase.case[0], self.parameters):
+            moved = residual(one.system(elsewhere(self.system, parameter)))
+            outwards = -PLACES[parameter.partition(":")[0]] * PLACE_STEP
+            found[:, ends[list(step.sizes).index(parameter)]] = (moved - own) / outwards
+        return found
 
     def _append_steps(self, step: MotionStep, one: RecordedPhase, times: np.ndarray):
         """Smooth steps between the times of a phase."""
