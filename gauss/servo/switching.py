@@ -48,8 +48,14 @@ def servo_switching(servo: Servo, plan: RelationPlan, start: State, end: float, 
     if not watch:
         return loads._replace(times=times)
     own, other = watch.machine_code, loads.watch
-    both = own if other is None else lambda ends: np.minimum(own(ends), other(ends))
+    both = own if other is None else lambda ends: _joined(own(ends), other(ends))
     return loads._replace(times=times, watch=both, conditional=(*loads.conditional, *watch.names))
+
+
+def _joined(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Share, number and place of crossings of both."""
+    share, _, place = np.minimum(one, other)
+    return np.array([share, one[1] + other[1], place])
 
 
 def _relation_laws(servo: Servo, plan: RelationPlan) -> _RelationLaws:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gauss.codegen.kernels import LAST_STEP_SHARE, Due
 from gauss.dynamics.engines.engine import DistrustError, Engine
+from gauss.dynamics.laws.kink_error import kink_error, kink_factor
 from gauss.dynamics.laws.switching import Switching, endless
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT, onward
 from gauss.errors import GaussError, SimulationError
@@ -191,8 +192,11 @@ class PythonRun:
     def _resolved_share(self, method: Controlled, begin: Point, trial: TrialStep, h: float, smallest: float) -> float:
         """Share of an accepted step that resolves switching functions and opaque laws; 1 if all of it does."""
         shortest = SHORT * smallest / h
-        share, crossings = self.switching.share(begin, trial.point) if shortest < 1.0 else (1.0, 0.0)
+        share, crossings, place = self.switching.share(begin, trial.point) if shortest < 1.0 else (1.0, 0.0, 1.0)
         self.crossings += crossings
+        if share == 1.0 and place < 1.0:
+            error = kink_error(begin, trial.point, self.tolerance)
+            share = cast(float, kink_factor(error, place)) if error > 1.0 else 1.0
         if share < 1.0:
             return cast(float, onward(share, shortest))
         if not self.switching.called or h * SMALLEST_STEP <= RESOLVED_STEP * smallest:

@@ -109,7 +109,7 @@ def markdown(rows: list[dict], header: Iterable[str]) -> str:
     lines += ["", "## Warnings", "", *table(["class", "scenes"], _warned(rows).most_common())]
     refusals = Counter(_class(row["why"]) for row in rows if str(row["verdict"]).startswith("refused"))
     lines += ["", "## Refusals", "", *table(["message", "scenes"], refusals.most_common())]
-    lines += ["", "## Bad", "", *_bad(rows)]
+    lines += ["", "## Bad", "", _timed_out(rows), "", *_bad(rows)]
     return "\n".join(lines) + "\n"
 
 
@@ -125,6 +125,16 @@ def _warned(rows: list[dict]) -> Counter:
     """Warnings of gauss by class."""
     kinds = (kind for row in rows for kind in str(row["warned"]).split("+"))
     return Counter(kind for kind in kinds if kind and not kind.startswith("!"))
+
+
+def _timed_out(rows: list[dict]) -> str:
+    """How many scenes timed out, and by which limit."""
+    late = [str(row["why"]) for row in rows if row["verdict"] == "timed out"]
+    first, second = (sum(why.startswith(f"{route}:") for why in late) for route in ("first", "second"))
+    return (
+        f"{len(late)} scenes timed out, so that nothing is said of them: in {first} the first route took more than 10 s of "
+        f"processor time, in {second} the second reached no sample; the last column names the place where it was."
+    )
 
 
 def _bad(rows: list[dict]) -> list[str]:

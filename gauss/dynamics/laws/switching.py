@@ -47,13 +47,16 @@ class Switching(NamedTuple):
     jumps: Jumps = NO_JUMPS
     peaks: NarrowPeaks | None = None
 
-    def share(self, begin: Point, end: Point) -> tuple[float, float]:
-        """Share of a step without undetected crossings, and the number of crossings detected in all of it."""
+    def share(self, begin: Point, end: Point) -> tuple[float, float, float]:
+        """Share of a step without undetected crossings; number and place of those detected in all of it.
+
+        The place is that of :meth:`SwitchingFunctions.share`.
+        """
         if self.watch is None:
-            return 1.0, 0.0
+            return 1.0, 0.0, 1.0
         parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
-        share, crossings = self.watch(np.concatenate([*parts[0], *parts[1]]))
-        return float(share), float(crossings)
+        share, crossings, place = self.watch(np.concatenate([*parts[0], *parts[1]]))
+        return float(share), float(crossings), float(place)
 
 
 def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:

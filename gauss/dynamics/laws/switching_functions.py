@@ -3,7 +3,8 @@
 Within a step, coordinates and rates are cubic Hermite polynomials. On each of :data:`PARTS` subintervals the hull of the
 Bernstein coefficients encloses them, and interval arithmetic encloses the switching function g and its rate. A subinterval
 is clear if the enclosure of g, or that of its rate, excludes zero. The error estimate reacts to one sign change of one
-switching function, since the last stages lie beyond it; it may miss two, as where a narrow region is entered and left.
+switching function, since the last stages lie beyond it, but for places where it is small by chance
+(:mod:`gauss.dynamics.laws.kink_error`); it may miss two, as where a narrow region is entered and left.
 """
 
 from functools import cached_property, partial, reduce
@@ -19,12 +20,13 @@ from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.constraint_functions import residual_functions, watched_functions
 from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
 from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.kink_error import kink_error, kink_factor
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
 from gauss.dynamics.laws.products import Products
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
-from gauss.integrators import Point
+from gauss.integrators import Point, Tolerance
 from gauss.system import State, System, coordinate_rates, coordinate_units
 
 JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
@@ -81,7 +83,9 @@ class SwitchingFunctions:
     def __bool__(self):
         return bool(self.pairs or self.steps or self.peaks or self.products)
 
-    def judged(self, ends: tuple[Point, Point], error, factor, refused, smallest) -> tuple[Scalar, Scalar]:
+    def judged(
+        self, ends: tuple[Point, Point], error, factor, refused, smallest, tolerance: Tolerance
+    ) -> tuple[Scalar, Scalar]:
         """Error and step-size factor of a step, corrected for crossings that its error estimate may miss.
 
         The shortest resolvable step across one switching surface is accepted with any error.
@@ -89,10 +93,13 @@ class SwitchingFunctions:
         if not self:
             return error, factor
         begin, end = ends
-        share, crossings = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
+        share, crossings, place = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
         shortest = SHORT * smallest / (end.state.t - begin.state.t)
         short = math.where(shortest > 1.0, 1.0, 0.0)
         asked = math.where(refused < TRIES, math.where(error <= 1.0, 1.0 - short, 0.0), 0.0)
+        kinked = kink_error(begin, end, tolerance)
+        bent = math.where(place < 1.0, math.where(kinked > 1.0, asked, 0.0), 0.0)
+        share = math.where(share < 1.0, share, math.where(bent > 0.0, kink_factor(kinked, place), 1.0))
         unseen = math.where(share < 1.0, asked, 0.0)
         error, factor = math.where(unseen > 0.0, np.inf, error), math.where(unseen > 0.0, onward(share, shortest), factor)
         across = math.where(crossings > 0.5, short, 0.0)
@@ -102,7 +109,7 @@ class SwitchingFunctions:
         """1 where a step may hold undetected crossings of a switching surface, else 0."""
         if not self:
             return 0.0
-        share, _ = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
+        share, _, _ = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
         return math.where(share < 1.0, 1.0, 0.0)
 
     @property
@@ -123,8 +130,10 @@ class SwitchingFunctions:
         met = (np.array(apart) <= SIGN_ROUNDING * np.array(size) + self.noise).any()
         return bool(met) or any(abs(x - round(x)) <= SIGN_ROUNDING * abs(x) for x in steps if np.isfinite(x))
 
-    def share(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> tuple[Scalar, Scalar]:
-        """Share of a step without undetected crossings, 1 for all of it; and the number of detected crossings.
+    def share(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> tuple[Scalar, Scalar, Scalar]:
+        """Share of a step without undetected crossings, 1 for all of it; number and place of detected crossings.
+
+        The place is the middle of the subinterval of the first one beyond rounding, relative to the step, 1 without any.
 
         Parameters
         ----------
@@ -136,7 +145,7 @@ class SwitchingFunctions:
         crossings, distinct, crossed = 0.0, 0.0, 1.0
         hidden = self._without_narrow_peaks(begin, first, end, last)
         if not any(self._groups):
-            return hidden, 0.0
+            return hidden, 0.0, 1.0
         nodes, parts = enclosed_parts(self.system, begin, first, end, last)
         ends = [list(self._values(node)) for node in nodes]
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
@@ -163,7 +172,7 @@ class SwitchingFunctions:
                 crossed = math.where(heard > 0.0, math.minimum(crossed, middle), crossed)
                 unclear = straddles * turns * (1.0 - changes)
                 hidden = math.where(unclear > 0.0, math.minimum(hidden, middle), hidden)
-        return math.minimum(hidden, math.where(distinct > 1.5, crossed, 1.0)), crossings
+        return math.minimum(hidden, math.where(distinct > 1.5, crossed, 1.0)), crossings, crossed
 
     def _without_narrow_peaks(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> Scalar:
         """Share of a step before its first narrow peak of a product, 1 where there is none."""
@@ -221,7 +230,7 @@ class SwitchingFunctions:
 
     @cached_property
     def machine_code(self) -> Kernel:
-        """Machine code of :meth:`share`: (t, q, v, q̈) at both ends of a step → (share, crossings)."""
+        """Machine code of :meth:`share`: (t, q, v, q̈) at both ends of a step → (share, crossings, place)."""
         sizes = (1, self.system.n_q, self.system.n_v, self.system.n_v)
 
         def share(t, q, v, first, t_end, q_end, v_end, last):

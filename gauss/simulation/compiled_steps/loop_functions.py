@@ -117,7 +117,8 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
         counts["kept"] = np.size(found.kept)
         point, residual = _completed(program, equations, found.point)
         error = math.where(residual <= CONSISTENT, found.error, np.inf) if program.drift.partitioned else found.error
-        error, factor = program.watch.judged((layout.point(x), point), error, found.factor, refused[0], smallest[0])
+        ends = layout.point(x), point
+        error, factor = program.watch.judged(ends, error, found.factor, refused[0], smallest[0], tolerance)
         numbers = [error, factor, found.cost.evaluations, found.cost.factorisations]
         return layout.pack(point), numbers, found.kept
 

@@ -95,14 +95,14 @@ class StepControl:
         size = self.layout.size
 
         def verdict(x, h, rtol, atol, atol_rates, refused, last, smallest, reached, sigma, squares, speed):
+            tolerance = self._tolerance(rtol, atol, atol_rates)
             error = self.method.error_of_squares(list(squares), 2 * self.system.n_v, h[0])
             if not self.near_singular:
-                found = self._seen(x, reached, error, self._factor(x, error), refused, smallest)
+                found = self._seen(x, reached, error, self._factor(x, error), refused, smallest, tolerance)
                 return [*found, self.method.evaluations, 0.0]
             spoilt = h[0] * self.T * largest(self._noise(speed[0], sigma))
-            found = self._seen(x, reached, error, self._shifted(x, error, sigma), refused, smallest)
-            tolerance = self._allowed(speed[0], self._tolerance(rtol, atol, atol_rates))
-            return [*found, self.method.evaluations, 0.0, tolerance / spoilt]
+            found = self._seen(x, reached, error, self._shifted(x, error, sigma), refused, smallest, tolerance)
+            return [*found, self.method.evaluations, 0.0, self._allowed(speed[0], tolerance) / spoilt]
 
         sizes = size, *[1] * len(TRIAL_SETTINGS), size, slopes, estimates, 1
         return write(verdict, *sizes, name="verdict")
@@ -127,13 +127,16 @@ class StepControl:
         moves = math.where(shift < 1.0, math.where(refused[0] < MOST_MOVES, 1.0, 0.0), 0.0)
         moves = math.where(MOVING_NOISE * h[0] * self.T * largest(noise) > self._allowed(speed, tolerance), moves, 0.0)
         factor = math.where(moves > 0.0, shift, self._shifted(x, error, sigma))
-        error, factor = self._seen(x, reached, math.where(moves > 0.0, np.inf, error), factor, refused, smallest)
+        error = math.where(moves > 0.0, np.inf, error)
+        error, factor = self._seen(x, reached, error, factor, refused, smallest, tolerance)
         return [error, factor, self.method.evaluations, 0.0]
 
-    def _seen(self, x, reached, error: Scalar, factor: Scalar, refused, smallest) -> tuple[Scalar, Scalar]:
+    def _seen(
+        self, x, reached, error: Scalar, factor: Scalar, refused, smallest, tolerance: Tolerance
+    ) -> tuple[Scalar, Scalar]:
         """Error and factor; a step that may have passed a switching surface of a law undetected is rejected."""
         ends = self.layout.point(x), self.layout.point(reached)
-        return self.program.watch.judged(ends, error, factor, refused[0], smallest[0])
+        return self.program.watch.judged(ends, error, factor, refused[0], smallest[0], tolerance)
 
     def _shifted(self, x, error: Scalar, sigma: np.ndarray) -> Scalar:
         """Step-size factor; after an accepted step such that no stage of the next lies near a singular configuration."""
