@@ -187,6 +187,10 @@ class ConstrainedArticulatedBody:
         rates, accelerations = self.articulated.response(tau, self._with_loop_forces({}, tau))
         return self._all_rates(*self.under_multipliers(rates, accelerations, multipliers), still=True)
 
+    def unprojected(self, residual, rows) -> np.ndarray:
+        """Rates (n_v,) to which those that meet K x = rows and are :meth:`nearest` are the correction of residuals."""
+        return self.released(residual, np.zeros(len(rows)))
+
     def determined(self, multipliers) -> np.ndarray:
         """Multipliers without their part along redundant rows, which is undetermined: S (S + ν)⁻¹ y if scaled."""
         if not self.unit_forces:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss import math
 from gauss.dynamics.constrained_aba import BaumgarteFeedback, ConstrainedArticulatedBody
 from gauss.dynamics.embedded_loops import EmbeddedLoops
 from gauss.dynamics.loop_roots import hubs, loop_rows
@@ -22,15 +23,25 @@ class EmbeddedArticulatedBody(ConstrainedArticulatedBody):
     def __init__(self, subsystem: Subsystem, q, v, relations):
         super().__init__(subsystem, q, v, relations)
         rows = loop_rows(self.tree, self.constraints, self._with_loop_forces)
-        self.embedded = EmbeddedLoops(self.tree, rows, hubs(self.tree, rows))
+        self.embedded = EmbeddedLoops(self.tree, rows, self.hubs(rows))
+
+    def hubs(self, rows) -> dict[int, int]:
+        """Links that are eliminated as free bodies, with the roots of their fronts."""
+        return hubs(self.tree, rows)
 
     @property
     def pivots(self) -> list:
-        """Pivots of the fronts over the diagonal entries that they come from; small where a front is near singular."""
-        return self.embedded.relative_pivots
+        """Pivots of the scaled S in fronts without hubs, 1 for a row as on free bodies; small where K loses rank.
+
+        Fronts with hubs may be singular where K is not: there, :meth:`motion` is not finite.
+        """
+        return [self.scale[row] ** 2 * pivot for row, pivot in self.embedded.row_pivots.items()]
 
     def motion(self, tau, forces=None, feedback: BaumgarteFeedback | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Joint accelerations (n_v,) and multipliers; see :meth:`ConstrainedArticulatedBody.motion`."""
+        """Joint accelerations (n_v,), infinite where a front is near singular, and multipliers.
+
+        See :meth:`ConstrainedArticulatedBody.motion`.
+        """
         tree, wrenches = self.tree, self._external_wrenches(tau, forces)
         given = {body: gyroscopic(tree.links[body], tree.omegas[body]) for body in tree.joint_kinematics}
         biases = {body: kin.bias for body, kin in tree.joint_kinematics.items()}
@@ -39,7 +50,7 @@ class EmbeddedArticulatedBody(ConstrainedArticulatedBody):
         rhs = target - self._rows({}, still, still=False)
         pulled = {body: own - wrenches.get(body, 0.0) for body, own in given.items()}
         rates, accelerations, multipliers = self.embedded.solve(pulled, biases, tree.ground, tau, rhs)
-        found = self._all_rates(rates, accelerations, still=False)
+        found = self._all_rates(rates, accelerations, still=False) + math.where(self.embedded.is_regular, 0.0, np.inf)
         return found if feedback is None else found + feedback.rates, multipliers
 
     def response(self, tau, target) -> tuple[np.ndarray, np.ndarray]:
@@ -49,8 +60,63 @@ class EmbeddedArticulatedBody(ConstrainedArticulatedBody):
         rates, accelerations, multipliers = self.embedded.solve(forces, {}, np.zeros(6), tau, target)
         return self._all_rates(rates, accelerations, still=True), multipliers
 
+    def moving(self, v, relations) -> "EmbeddedArticulatedBody":
+        """The same subsystem in the same position at other rates."""
+        found = super().moving(v, relations)
+        moved = self.embedded.moving(found.tree)
+        assert isinstance(found, EmbeddedArticulatedBody) and isinstance(moved, EmbeddedLoops)
+        found.embedded = moved
+        return found
+
+    def eliminated(self) -> "EmbeddedArticulatedBody":
+        """The same: the fronts are factored already."""
+        return self
+
+    def nearest(self, v, target) -> np.ndarray:
+        """Rates x (n_v,) nearest to v in the mass metric with K x = target: the change is the response to what is left."""
+        carried, own = self.tree.carried(v), self._by_joint(v)
+        left = target - self._rows(own, carried, still=True)
+        change, moved, _ = self.embedded.solve({}, {}, np.zeros(6), np.zeros(self.subsystem.n_v), left)
+        rates = {joint: own[joint] + more for joint, more in change.items()}
+        links = {body: rate + moved.get(body, 0.0) for body, rate in carried.items()}
+        return self._all_rates(rates, links, still=True)
+
+    def damped(self, rows) -> np.ndarray:
+        """The same rows: they are independent where fronts are regular."""
+        return rows
+
+    def unprojected(self, residual, rows) -> np.ndarray:
+        """Their correction itself; see :meth:`ConstrainedArticulatedBody.unprojected`."""
+        return self.response(residual, rows)[0]
+
+    def position_correction(self, phi, slack) -> np.ndarray:
+        """Newton step (n_v,); see :meth:`ConstrainedArticulatedBody.position_correction`."""
+        step = self.response(np.zeros(self.subsystem.n_v), -phi)[0]
+        for loop_joint, off in zip(self.loop_joints, slack, strict=True):
+            step[loop_joint.joint.v] = step[loop_joint.joint.v] + off
+        return step
+
 
 class EmbeddedMechanism(Mechanism):
     """A system in one state whose loops are eliminated where they close; its loop constraints must be independent."""
 
     of_subsystem = EmbeddedArticulatedBody
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether all fronts are regular, in a state of numbers."""
+        return all(bool(body.embedded.is_regular) for body in self.bodies if isinstance(body, EmbeddedArticulatedBody))
+
+
+class _ByChains(EmbeddedArticulatedBody):
+    """The same without hubs."""
+
+    def hubs(self, rows) -> dict[int, int]:
+        """None."""
+        return {}
+
+
+class EmbeddedChains(EmbeddedMechanism):
+    """The same without hubs: more operations, but no chain needs to meet its own rows."""
+
+    of_subsystem = _ByChains

@@ -21,6 +21,7 @@ from gauss.dynamics.aba import ZERO, ArticulatedBody, blocks, free_axes, is_zero
 from gauss.dynamics.rnea import KinematicTree, force_to_inner
 
 GROUND = -1
+LEAST_RELATIVE_PIVOT = 1e-6  # of a front, over its diagonal entry; accelerations lose that share of their digits
 
 
 class LoopRow(NamedTuple):
@@ -54,8 +55,8 @@ class Front(NamedTuple):
         L⁻¹ B.
     carried : ndarray, shape (n, 6 + p)
         D⁻¹ G.
-    relative_pivots : list
-        Entries of D over those of the diagonal of F.
+    inverse_pivots : list
+        Entries of the diagonal of F over those of D.
     """
 
     rows: list[int]
@@ -64,7 +65,7 @@ class Front(NamedTuple):
     factor: LDLT
     G: np.ndarray
     carried: np.ndarray
-    relative_pivots: list
+    inverse_pivots: list
 
 
 class HubJoint(NamedTuple):
@@ -111,9 +112,20 @@ class EmbeddedLoops(ArticulatedBody):
         return HubJoint(T, dual, list(range(first, len(self.rows))))
 
     @property
-    def relative_pivots(self) -> list:
-        """Pivots of the fronts over the diagonal entries that they come from."""
-        return [share for front in self.fronts.values() for share in front.relative_pivots]
+    def inverse_pivots(self) -> list:
+        """Diagonal entries of the fronts over the pivots that they become; large where a front is near singular."""
+        return [share for front in self.fronts.values() for share in front.inverse_pivots]
+
+    @property
+    def is_regular(self):
+        """Whether no pivot of a front is below :data:`LEAST_RELATIVE_PIVOT`; a condition over symbols."""
+        return sum((share * share for share in self.inverse_pivots), 0.0) <= LEAST_RELATIVE_PIVOT**-2  # false for NaN
+
+    @property
+    def row_pivots(self) -> dict[int, object]:
+        """Pivots of S of the rows in fronts without hubs, by row: those that vanish only where K loses rank."""
+        plain = [front for front in self.fronts.values() if not front.hubs]
+        return {row: -1.0 / front.factor.inverse_pivots[i] for front in plain for i, row in enumerate(front.rows)}
 
     def _eliminate(self):
         inertias = {body: link.inertia for body, link in self.tree.links.items()}
@@ -164,8 +176,8 @@ class EmbeddedLoops(ArticulatedBody):
         factor = LDLT(F)
         G = np.column_stack([factor.forward(column) for column in B.T])
         inverse = np.array([factor.inverse_pivots[i] for i in range(len(F))], dtype=object)
-        carried, relative = inverse[:, None] * G, list(1.0 / (inverse * np.diag(F)))
-        self.fronts[body] = Front(rows, hubs, pending, factor, G, carried, relative)
+        carried = inverse[:, None] * G
+        self.fronts[body] = Front(rows, hubs, pending, factor, G, carried, list(inverse * np.diag(F)))
         return self._corrected(body, inertias, columns, pending, G, carried)
 
     def _pending(self, rows, hubs, columns) -> list[int]:

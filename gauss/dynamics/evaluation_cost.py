@@ -13,6 +13,7 @@ from gauss.system import System
 
 COSTS = {  # s, and s per body, of an evaluation by a driver and a kind of dynamics
     ("compiled loop", "compiled"): (2e-7, 1e-7),
+    ("compiled loop", "embedded loops"): (2e-7, 5e-8),
     ("compiled loop", "tree recursion"): (2e-7, 1e-7),
     ("compiled loop", "call graph"): (1e-6, 1e-7),
     ("compiled loop", "callbacks"): (1e-5, 1e-7),

@@ -136,6 +136,11 @@ class Mechanism:
         pairs = zip(self.bodies, self._rows_of(multipliers), strict=True)
         return self._whole([body.released(tau[body.subsystem.v], own) for body, own in pairs])
 
+    def unprojected(self, residual, rows) -> np.ndarray:
+        """Rates (n_v,) to which those that meet K x = rows and are :meth:`nearest` are the correction of residuals."""
+        pairs = zip(self.bodies, self._rows_of(rows), strict=True)
+        return self._whole([body.unprojected(residual[body.subsystem.v], own) for body, own in pairs])
+
     def determined(self, multipliers) -> np.ndarray:
         """Multipliers without their part along redundant rows, which is undetermined."""
         pairs = zip(self.bodies, self._rows_of(multipliers), strict=True)

@@ -13,6 +13,7 @@ time stepping       certified       the same, where the dynamics cannot be compi
 events              compiled        unilateral constraints, joint friction, limited forces, losses
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
+compiled loop       embedded loops  smooth scenes with independent loop constraints, by explicit integrators
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
 compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
@@ -74,6 +75,11 @@ _KEYS: dict[int, IdentityKey] = {}  # of built-in methods, by their address
 def is_time_stepping(ask) -> bool:
     """Whether the integrator of a question, or of a problem, is Moreau–Jean time stepping."""
     return isinstance(ask.method, FixedStep) and ask.method.nonsmooth
+
+
+def _no_time_stepping(ask: Question) -> bool:
+    """Other integrators than time stepping."""
+    return not is_time_stepping(ask)
 
 
 def _is_nonsmooth(ask: Question) -> bool:
@@ -164,6 +170,9 @@ MOTIONS = RuleTable(
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, closed_form_contacts)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, closed_form_contacts)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
+        Rule(
+            "compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, independent_fronts)
+        ),
         Rule("compiled loop", "compiled", "refined", _both(_smooth, _without_feedback), _LOOP),
         Rule("compiled loop", "compiled", "certified", _both(_smooth, _with_feedback), _LOOP),
         Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
@@ -178,12 +187,16 @@ MOTIONS = RuleTable(
     ),
     _refused,
 )
+_WHOLE_BATCH = compilable, few_bodies, traced_laws
 TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 # Batches (ensembles) of motions of one system.
 BATCHES = RuleTable(
     (
         Rule("batch", "compiled", "simulate", is_time_stepping, (*_STEP, closed_form_contacts)),
-        Rule("batch", "compiled", "simulate", lambda ask: not is_time_stepping(ask), (compilable, few_bodies, traced_laws)),
+        Rule(
+            "batch", "embedded loops", "simulate", _both(_no_time_stepping, has_loops), (*_WHOLE_BATCH, independent_fronts)
+        ),
+        Rule("batch", "compiled", "simulate", _no_time_stepping, _WHOLE_BATCH),
     ),
     lambda ask, why: (
         f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gauss.codegen import entered, staged, write
+from gauss.codegen import as_number, entered, staged, write
 from gauss.dynamics.mechanism import Mechanism, loop_residual
 from gauss.system import State
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gauss.dynamics.traced_system import Program
 
 MOST_INLINED_OPERATIONS = 500  # of a function: its code is hardly longer than the code of a call
-MOST_PLACE_OPERATIONS = 4_000  # of ``place``, up to which what every step runs is inlined: results stay in registers
+MOST_PLACE_OPERATIONS = 2_500  # of ``place``, up to which what every step runs is inlined: results stay in registers
 
 
 class SharedElimination:
@@ -52,6 +52,11 @@ class SharedElimination:
         short = short or (often and self._operations["place"] <= MOST_PLACE_OPERATIONS)
         return (self._functions[name].inlined if short else self._functions[name])(*given)
 
+    @property
+    def monitors(self) -> bool:
+        """Whether the singularity of S depends on the state."""
+        return as_number(self._functions["motion"].outputs[-1]) is None
+
     def place(self, t, q, often: bool = False) -> np.ndarray:
         """Quantities of (t, q) alone that the other functions share."""
         return self._found("place", t, q, often=often)
@@ -74,12 +79,15 @@ class SharedElimination:
         return self._found("newton_step", place, residual)
 
     def defect(self, place, v, tau, acceleration, multipliers) -> list[np.ndarray]:
-        """Residual of the equations of motion as accelerations M⁻¹ r (n_v,), of the constraints (m,), and that damped."""
+        """Change (n_v,) of accelerations, residual of the constraints (m,), and that damped.
+
+        The nearest change that meets the damped residual is the error of the accelerations.
+        """
         n, m = self.system.n_v, self.program.shares.size
         return np.split(self._found("defect", place, v, tau, acceleration, multipliers), np.cumsum([n, m]))
 
     def _eliminated(self, t, q) -> Mechanism:
-        return Mechanism(self.system, q, np.zeros(self.system.n_v), t[0]).eliminated()
+        return self.program.elimination(self.system, q, np.zeros(self.system.n_v), t[0]).eliminated()
 
     def _motion(self, known: Mechanism, v, tau):
         mechanism = known.moving(v)
@@ -103,7 +111,8 @@ class SharedElimination:
         mechanism = known.moving(v)
         own, forces, _ = self._loads(known, v, tau)
         left, rows = mechanism.residual(acceleration, multipliers, own, forces, self.program.feedback(mechanism))
-        return mechanism.released(left, np.zeros(rows.size)), rows, mechanism.damped(rows)
+        damped = mechanism.damped(rows)
+        return mechanism.unprojected(left, damped), rows, damped
 
     def _loads(self, known: Mechanism, v, tau):
         """Generalised forces, forces on bodies and power of the loads, in the later stage: laws may depend on all."""

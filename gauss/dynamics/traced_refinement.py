@@ -10,6 +10,7 @@ from gauss import math
 from gauss.backends.estimate import SHARE_AT_REST
 from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK
 from gauss.dynamics.embedded_aba import EmbeddedMechanism
+from gauss.dynamics.front_rank import embedded_elimination
 from gauss.dynamics.mechanism import Mechanism, refined_forward_dynamics
 from gauss.dynamics.traced_system import Program, applied_loads, largest
 from gauss.system import State
@@ -36,7 +37,7 @@ def refined_once(program: Program, q, v, tau, t, elimination: type[Mechanism] = 
 
 def embedded_once(program: Program, q, v, tau, t):
     """The same with loops eliminated where they close."""
-    return refined_once(program, q, v, tau, t, EmbeddedMechanism)
+    return refined_once(program, q, v, tau, t, embedded_elimination(program.pattern) or EmbeddedMechanism)
 
 
 def refined(program: Program, q, v, tau, t):

@@ -99,6 +99,11 @@ class Program:
         self.pattern = system if family is None else family.pattern  # a system of numbers alone
         self.layout = PointLayout(system.n_q, system.n_v, memory, self.inputs if family is None else family.parameters)
 
+    @property
+    def elimination(self) -> type[Mechanism]:
+        """Elimination of the trees and loop constraints in one state."""
+        return Mechanism
+
     @cached_property
     def watch(self) -> SwitchingFunctions:
         """Switching functions of its laws and constraints."""
@@ -283,7 +288,7 @@ class Program:
         self.order_inputs(t)
         state = State(t[0], q, v)
         own, forces, power = self.applied(state)
-        mechanism = Mechanism(self.system, q, v, state.t)
+        mechanism = self.elimination(self.system, q, v, state.t)
         tau = own if tau is None else own + tau
         acceleration, multipliers = mechanism.motion(tau, forces, self.feedback(mechanism))
         return mechanism, acceleration, power + np.array([mechanism.power(multipliers), 0.0, 0.0])

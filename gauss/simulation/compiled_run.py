@@ -58,10 +58,10 @@ class CompiledRun:
         self.rows: list[np.ndarray] = []
         self.held = problem.held
         self.certified = CertifiedEngine("auto", self.drift.gains)
-        self.key: tuple[Hashable, ...] = (self.drift, problem.laws.key, self.held is not None)
+        self.key: tuple[Hashable, ...] = (program.__name__, self.drift, problem.laws.key, self.held is not None)
         self.method_state, size = self._initial_method_state()
         make = lambda: program(self.system, problem.laws, self.drift, size, inputs=self.held is not None)  # noqa: E731
-        self.program = self._on_demand((program, size), make)
+        self.program = self._on_demand((Program, size), make)
         self.layout = self.program.layout
         self.inputs = np.zeros(len(self.layout.parameters))
         self.input_forces = InputForces(self.system) if self.held else None

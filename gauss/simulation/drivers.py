@@ -4,6 +4,7 @@ Each imports what it runs: one motion needs one of them.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from gauss.dynamics import engines
@@ -11,6 +12,7 @@ from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.plan import plan_of
+from gauss.dynamics.programs import program_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
@@ -52,7 +54,7 @@ def _constant(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
-    run = _compiled_run(problem, _program(plan))
+    run = _compiled_run(problem, program_of(plan.dynamics))
     run.run()
     return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
@@ -67,23 +69,6 @@ def _samples(problem: Problem, plan: Plan) -> Trajectory:
         return DRIVERS[chosen[0].driver](alone, chosen[0])
 
     return held_motion(problem, drive)
-
-
-def _program(plan: Plan) -> type[Program]:
-    """Class of the functions of the compiled loop of a plan."""
-    if plan.dynamics == "tree recursion":
-        from gauss.dynamics.tree_program import TreeProgram
-
-        return TreeProgram
-    if plan.dynamics == "call graph":
-        from gauss.dynamics.call_graph_program import CallGraphProgram
-
-        return CallGraphProgram
-    if plan.dynamics == "callbacks":
-        from gauss.dynamics.called_program import CalledProgram
-
-        return CalledProgram
-    return Program
 
 
 def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledAdaptiveRun | CompiledFixedRun":
@@ -101,7 +86,9 @@ def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledAdaptive
 
 
 def _fallback(problem: Problem, plan: Plan) -> Trajectory:
-    """Motion by the fallback dynamics, which give accelerations only."""
+    """Motion by the fallback dynamics, which give accelerations only if they are not compiled."""
+    if plan.fallback == "compiled":
+        return _compiled_loop(problem, plan_of(problem.question, replace(plan, dynamics=plan.fallback)))
     if problem.method.mechanical:
         raise SimulationError(
             f"Integrator {problem.method.name!r} needs the equations of motion in machine code; use 'dop853' here."

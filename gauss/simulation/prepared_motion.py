@@ -12,6 +12,7 @@ from gauss.codegen import one_tier
 from gauss.codegen.kernels import Control, LoopStatus, address
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.plan import plan_of
+from gauss.dynamics.programs import program_of
 from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import FixedStep
@@ -61,7 +62,7 @@ class PreparedMotion:
                 return
             if problem.switching.times or problem.switching.conditional:
                 raise SimulationError(f"a motion of {name!r} cannot be prepared: laws switch; use gauss.simulate.")
-            run = CompiledAdaptiveRun(problem)
+            run = CompiledAdaptiveRun(problem, program_of(plan.dynamics))
             loop = run.prepared()
             simulate(self.system, duration, times=end, progress=False, **options)  # confirms the accelerations of the loop
         self._first, self._begins = loop.function("start"), bool(samples[0] == problem.start.t)

@@ -20,6 +20,7 @@ from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.plan import plan_of
+from gauss.dynamics.programs import program_of
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep
@@ -44,7 +45,7 @@ FAILURES = {
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
 }
 MOST_STEPS = 10**8  # of one call: their times fill the memory
-STEPS = {("compiled loop", code) for code in ("compiled", "callbacks")}
+STEPS = {("compiled loop", code) for code in ("embedded loops", "compiled", "callbacks")}
 STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
 
 
@@ -361,7 +362,7 @@ def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSte
     laws = smooth_question(problem.question).laws if problem.method.nonsmooth else problem.laws
     if dynamics == "callbacks":
         return CalledMoreauRun(problem, laws) if problem.method.nonsmooth else CalledFixedRun(problem)
-    return CompiledMoreauRun(problem, laws) if problem.method.nonsmooth else CompiledFixedRun(problem)
+    return CompiledMoreauRun(problem, laws) if problem.method.nonsmooth else CompiledFixedRun(problem, program_of(dynamics))
 
 
 def _unchecked(n: int) -> np.ndarray:

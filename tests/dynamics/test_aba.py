@@ -118,7 +118,7 @@ def test_loops_agree_with_the_recursion(name):
 @pytest.mark.parametrize("name", ["four-bar", "Cardan shaft", "slider-crank"])
 def test_compiled_loops_move_like_certified_ones(name):
     fast, slow = (gauss.simulate(LOOPS[name](), 0.3, rtol=1e-11, atol=1e-13, backend=b) for b in ("auto", "recursion"))
-    assert fast.stats.plan.dynamics == "compiled" and fast.stats.handed_over is None
+    assert fast.stats.plan.dynamics in ("compiled", "embedded loops") and fast.stats.handed_over is None
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-9
 
 

@@ -255,7 +255,7 @@ def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
 def test_explain_says_which_way_is_taken():
     assert "gauss.mobility" in mechanisms.ladder().explain()
     plans = [motion_plan(mechanisms.ladder(n)) for n in (50, 5)]
-    assert [plan.dynamics for plan in plans] == ["call graph", "compiled"]
+    assert [plan.dynamics for plan in plans] == ["call graph", "embedded loops"]
     assert has_large_loops(gauss.compile_scene(gauss.load("hung_chain", n=200)))
 
 

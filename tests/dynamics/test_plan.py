@@ -89,6 +89,7 @@ def _driven_mesh() -> Scene:
 CASES = {
     "nothing moves": (_still, {}, ("constant", "none"), []),
     "smooth": (lambda: mechanisms.rods(2), {}, ("compiled loop", "compiled"), []),
+    "loops": (mechanisms.four_bar, {}, ("compiled loop", "embedded loops"), []),
     "a fixed step": (lambda: mechanisms.rods(2), RUN, ("compiled loop", "compiled"), []),
     "a backend": (
         lambda: mechanisms.rods(2),
@@ -144,7 +145,13 @@ CASES = {
         ("time stepping", "pair kernels"),
         ["time stepping"],
     ),
-    "Baumgarte": (mechanisms.four_bar, {"stabilisation": "baumgarte"}, ("compiled loop", "compiled"), []),
+    "Baumgarte": (mechanisms.four_bar, {"stabilisation": "baumgarte"}, ("compiled loop", "embedded loops"), []),
+    "Baumgarte, an implicit method": (
+        mechanisms.four_bar,
+        {"stabilisation": "baumgarte", **IMPLICIT},
+        ("compiled loop", "compiled"),
+        ["compiled loop"],
+    ),
 }
 
 

@@ -9,6 +9,7 @@ from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.laws.constraint_modes import constraint_modes, refuse_surfaces
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import BATCHES, is_time_stepping, method_key, plan_of
+from gauss.dynamics.programs import program_of
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
@@ -63,12 +64,23 @@ def fixed_step_code(
 
     def make(laws: Laws) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
         if not method.nonsmooth:
-            return fixed_batch(Program(system, laws, inputs=held), method, device)
+            return fixed_batch(batch_program(system, laws, method)(system, laws, inputs=held), method, device)
         stepper, smooth = moreau_stepper(system), smooth_question(Question(system, laws)).laws
         program = Program(stepper.smooth, smooth, memory=method_state_size(stepper), inputs=held)
         return compiled_batch(stepper, program, device)
 
     return machine_code(system, method, (held, device), make)
+
+
+def batch_program(system: System, laws: Laws, method: Integrator) -> type[Program]:
+    """Class of the functions of a system for a batch.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled.
+    """
+    return program_of(BATCHES.plan(Question(system, laws, method=method)).dynamics)
 
 
 def machine_code(system: System, method: Integrator, kind: tuple, make: Callable[[Laws], T]) -> T:
@@ -80,5 +92,5 @@ def machine_code(system: System, method: Integrator, kind: tuple, make: Callable
         If the system cannot be compiled.
     """
     laws = Laws(system)
-    BATCHES.plan(Question(system, laws, method=method))
+    batch_program(system, laws, method)
     return cached_on_disk(system, (machine_code, method_key(method), kind, laws.key), lambda: make(laws))

@@ -15,7 +15,6 @@ from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.initial_states import constraint_residual
 from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
@@ -24,7 +23,7 @@ from gauss.simulation.batch.batch_result import Rollout
 from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
-from gauss.simulation.batch.machine_code import STEPPED, fixed_step_code, machine_code, one_by_one
+from gauss.simulation.batch.machine_code import STEPPED, batch_program, fixed_step_code, machine_code, one_by_one
 from gauss.simulation.batch.repeated_motions import repeat
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
@@ -269,7 +268,7 @@ def _adaptive(
         return _singly(system, starts, run, settings)
     allowed = tolerance(system, rtol, atol)
     make = lambda laws: AdaptiveBatchCode(  # noqa: E731
-        Program(system, laws, memory=method_state_size(system)), method, allowed.shares, device
+        batch_program(system, laws, method)(system, laws, memory=method_state_size(system)), method, allowed.shares, device
     )
     batch = AdaptiveBatch(machine_code(system, method, (allowed.key, device), make), starts, allowed)
     refuse_inconsistent(system, starts, batch.residual)

@@ -16,13 +16,12 @@ from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.rules import Question
 from gauss.dynamics.scene_compilation import compile_scene
-from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
-from gauss.simulation.batch.machine_code import STEPPED, contact_state_size, fixed_step_code, one_by_one
+from gauss.simulation.batch.machine_code import STEPPED, batch_program, contact_state_size, fixed_step_code, one_by_one
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.integrators import usual_fixed_step
@@ -119,7 +118,7 @@ class SimulatorBatch:
             return partial(SimulatorsInTurn, alone), output_kernel(alone.program, system, method.nonsmooth, batch=True)
         ask = smooth_question(Question(system, Laws(system))) if method.nonsmooth else Question(system, Laws(system))
         memory = contact_state_size(system) if method.nonsmooth else 0
-        program = Program(ask.system, ask.laws, memory=memory, inputs=held)
+        program = batch_program(system, Laws(system), method)(ask.system, ask.laws, memory=memory, inputs=held)
         loop = fixed_step_code(system, method, held)
         return partial(FixedStepBatch, loop), output_kernel(program, system, method.nonsmooth, batch=True)
 
