@@ -67,6 +67,10 @@ class ConstrainedTerms(StateTerms):
         """N ÿ + b (n_v,), with ÿ the accelerations of the independent coordinates."""
         return self.null_space @ acceleration[self.independent] + self.null_space_bias
 
+    def along(self, tau) -> np.ndarray:
+        """Nᵀ τ (k,): forces of the constraints drop out."""
+        return self.null_space.T @ tau
+
     @cached_property
     def bias_forces(self) -> np.ndarray:
         """Nᵀ (h + M b) (k,)."""

@@ -85,7 +85,8 @@ class Request(NamedTuple):
 def _inverse_dynamics(terms: StateTerms, _, acceleration):
     loads = traced_loads(terms.system).traced
     own, on_bodies, _ = applied_loads(terms.system, loads, State(terms.t, terms.q, terms.v))
-    return inverse_dynamics(terms.system, terms.q, terms.v, acceleration, own, on_bodies, terms.t)
+    allowed = terms.allowed_acceleration(acceleration)
+    return terms.along(inverse_dynamics(terms.system, terms.q, terms.v, allowed, own, on_bodies, terms.t))
 
 
 def _slopes(function: Callable) -> Callable:
@@ -120,7 +121,7 @@ TERMS = {
     "potential_energy": Term("q", ("",), lambda terms, *_: terms.potential_energy),
     "inertial_regressor": Term("qva", ("vi",), lambda terms, _, given: inertial_regressor(terms, given)),
     "null_space": Term("q", ("Vv",), lambda terms, *_: terms.null_space),
-    "inverse_dynamics": Term("qva", ("V",), _inverse_dynamics, is_reduced=False, has_loads=True),
+    "inverse_dynamics": Term("qva", ("v",), _inverse_dynamics, has_loads=True),
     "inverse_dynamics_derivatives": Term(
         "qva", ("VV", "VV"), _slopes(inverse_dynamics_derivatives), is_reduced=False, has_loads=True
     ),

@@ -126,6 +126,10 @@ class StateTerms:
         """Accelerations (n_v,) of all joints that the constraints allow."""
         return acceleration
 
+    def along(self, tau) -> np.ndarray:
+        """Generalised forces along the coordinates of these terms, of such forces (n_v,) along all."""
+        return tau
+
     def jacobian(self, frame: str, reference: str) -> np.ndarray:
         """Jacobian J (6, n_v): angular and linear velocity of a frame, J v; see ``REFERENCES``."""
         R, point = self.frame_pose(frame)

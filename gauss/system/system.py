@@ -386,8 +386,9 @@ class System(StateFunctions):
         """Compiled function ``f(q, v, acceleration, out=None, t=0.0)``: generalised forces (n_v,) [N m, N].
 
         These are what joint accelerations (n_v,) take besides the loads of the scene, M q̈ + h. Where joints close loops,
-        the loops are cut there: forces of the constraints are counted in. :func:`gauss.inverse_dynamics` finds forces of
-        drives in loops. Arguments are checked as those of :attr:`forward_dynamics`.
+        the loops are cut there: forces of the constraints are counted in; ``function("inverse_dynamics", independent=…)``
+        gives what independent joints take, without these. :func:`gauss.inverse_dynamics` finds forces of drives in loops.
+        Arguments are checked as those of :attr:`forward_dynamics`.
 
         Raises
         ------
