@@ -19,7 +19,7 @@ from gauss.codegen.object_code import linked, optimised_objects, packed, unpacke
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, VARIABLE, MachineCode, Run, reset_after_fork, wanted
 
 REST = 0.1  # pause after code was made [s]: the next module of the same motion may follow
-LONGEST_STOP = 30.0  # wait for the end of a unit [s]: one takes some 0.2 s, on a busy machine a multiple; LLVM must not be cut off
+LONGEST_STOP = 30.0  # wait for the end of a unit [s]: one takes some 0.2 s, many times more on a busy machine
 MOST_FAILURES = 5  # number of failures that are kept
 
 
