@@ -114,6 +114,19 @@ def test_a_short_late_force_is_not_stepped_over():
     assert abs(motion.v[-1, 0]) < AT_REST
 
 
+def test_a_force_in_a_narrow_place_is_not_flown_through():
+    """A mass at 3 m/s, with a stop far away, gains F w = 0.5 J from a force of 500 N between x = 5 m and 5.001 m."""
+    scene = gauss.Scene("narrow", gravity=(0.0, 0.0, 0.0))
+    scene.body("mass", 1.0, (0.1, 0.1, 0.1))
+    scene.prismatic("x", "ground", scene.bodies["mass"], axis=(1.0, 0.0, 0.0))
+    scene.stop("x", highest=100.0)
+    inside = lambda x: (x > 5.0) & (x < 5.001)  # noqa: E731
+    scene.drive("x", force=lambda t, at: gauss.math.where(inside(at.coordinate("x")), 500.0, 0.0))
+    scene.start("x", 0.0, 3.0)
+    motion = gauss.simulate(scene, 3.0, integrator="time_stepping", rtol=1e-5, times=[3.0])
+    assert motion.v[-1, 0] == pytest.approx(np.sqrt(9.0 + 2.0 * 0.5), rel=1e-3)
+
+
 @pytest.mark.parametrize("others", [0, 9])
 def test_fast_bodies_do_not_pass_through_thin_ones(others):
     """A ball without gravity meets a plate of 1 mm after 1.8 m of free flight; with other balls it moves by pair kernels."""
