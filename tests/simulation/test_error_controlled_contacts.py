@@ -65,6 +65,7 @@ MOTIONS = {  # scene, coordinate of interest, its closed form, duration [s]
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-3, 1e-5])
 @pytest.mark.parametrize("name", MOTIONS)
 def test_the_tolerance_is_honoured(name, rtol):
@@ -90,6 +91,7 @@ def test_impacts_are_events_at_their_times(rtol):
     assert lost[0] == pytest.approx((1.0 - e**2) * g, rel=10.0 * rtol)
 
 
+@pytest.mark.slow
 def test_a_mechanism_agrees_with_located_events():
     scene = gauss.load("double_pendulum_stops")
     times = np.linspace(0.0, 1.0, 11)
@@ -127,6 +129,7 @@ def test_a_force_in_a_narrow_place_is_not_flown_through():
     assert motion.v[-1, 0] == pytest.approx(np.sqrt(9.0 + 2.0 * 0.5), rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("others", [0, 9])
 def test_fast_bodies_do_not_pass_through_thin_ones(others):
     """A ball without gravity meets a plate of 1 mm after 1.8 m of free flight; with other balls it moves by pair kernels."""

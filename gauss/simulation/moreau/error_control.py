@@ -33,6 +33,7 @@ from gauss.system import State, System
 FIRST = 1e-3  # of the scale of times of the scene: first step
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.1, 4.0  # of the change of the step
 LEAST = 1e-9  # of the scale of times: shorter steps are taken whatever their error, for gaps are rounded
+ROUNDED = 1.01  # of the least length: the difference of two times is rounded
 HIDING = 8.0  # what counts as the error of a step in which a law may have switched unseen
 MOST_UNMET = 1000  # steps of the least length in a row
 TO_END = 1e-9  # of a step: a remainder up to the next stop that is added to it
@@ -90,11 +91,10 @@ class ControlledMotion:
             h = min(h, longest)
             end = stop if stop - t < h * (1.0 + TO_END) else t + h
             h = end - t
-            found, error = self._doubled(here, end)
-            hides, error = self._switched(here, found, error)
+            found, error, hides = self._tried(here, end)
             error = max(error, HIDING) if hides and refused < TRIES else error
             change = SAFETY * max(error, 1e-12) ** (-1.0 / (self.order + 1))
-            if error > 1.0 and h > self.least:
+            if error > 1.0 and h > ROUNDED * self.least:
                 self.record.rejected, refused = self.record.rejected + 1, refused + 1
                 h = max(h * min(max(change, SMALLEST_FACTOR), 0.5), self.least)
                 continue
@@ -107,6 +107,17 @@ class ControlledMotion:
             here, t, h = found, end, h * min(max(change, SMALLEST_FACTOR), LARGEST_FACTOR)
             bar.update(t - self.problem.start.t)
         return h, here
+
+    def _tried(self, here: ReachedPoint, end: float) -> tuple[ReachedPoint, float, bool]:
+        """Point at a time [s], its error, and whether laws may have switched unseen; a step that fails may be too long."""
+        try:
+            found, error = self._doubled(here, end)
+            hides, error = self._switched(here, found, error)
+        except GaussError:
+            if end - here.row[0] <= ROUNDED * self.least:
+                raise
+            return here, np.inf, False
+        return found, error, hides
 
     def _doubled(self, begin: ReachedPoint, t: float) -> tuple[ReachedPoint, float]:
         """Point at a time [s], and its error over the tolerance."""
