@@ -181,8 +181,20 @@ def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
     """Trajectory of a problem by the driver of a plan, in pieces where constraints jump between modes."""
+
+    def drive(piece: Problem) -> Trajectory:
+        return _beside_jumps(plan if piece.system is problem.system else _plan_of_mode(piece, plan), piece)
+
     with judged_later():
-        return across_surfaces(problem, partial(_beside_jumps, plan))
+        return across_surfaces(problem, drive)
+
+
+def _plan_of_mode(piece: Problem, whole: Plan) -> Plan:
+    """Plan of a mode: that of the whole motion where its conditions hold, else the first whose do."""
+    try:
+        return plan_of(piece.question, whole)
+    except SimulationError:
+        return plan_of(piece.question)
 
 
 def _beside_jumps(plan: Plan, problem: Problem) -> Trajectory:
