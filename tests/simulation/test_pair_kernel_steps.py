@@ -14,9 +14,6 @@ CLEARANCE = 1e-6  # of the length of the scene: overlap that counts as none
 RATE = 130.0  # Hz: samples of the control law beside the ends of steps
 
 
-ROUNDING = 1e-12  # of quick code, and of optimised code of the same operations
-
-
 def with_motor(make=driven) -> gauss.Scene:
     """The arm of two links with a motor in its outer hinge, and a box beside a wall far away: many contact operations."""
     scene = make() if make is driven else make("arm")
@@ -196,4 +193,4 @@ def test_a_law_without_numbers_leaves_the_state_before():
         simulator.step(n=200)
     assert simulator.t == pytest.approx(0.1)
     for found, expected in zip(simulator.coordinates, reached, strict=True):
-        np.testing.assert_allclose(found, expected, rtol=ROUNDING, atol=ROUNDING)  # the code may be optimised meanwhile
+        np.testing.assert_allclose(found, expected, rtol=TIERS, atol=TIERS)  # the code may be optimised meanwhile
