@@ -10,6 +10,7 @@ g = 9.81
 WITHIN = 1.0  # of rtol: global error over the size of the motion; extrapolation leaves a margin of about ten
 CLAIM = 0.1  # least share of the true error that verify claims
 AT_REST = 1e-12  # m/s
+GROWN = 10.0  # of rtol: errors of steps with closed gaps, which are not extrapolated, add up, and impacts amplify them
 BY_EVENTS = 1e-10  # rtol of the event-driven motion that is compared with
 
 
@@ -92,15 +93,18 @@ def test_impacts_are_events_at_their_times(rtol):
 
 
 @pytest.mark.slow
-def test_a_mechanism_agrees_with_located_events():
-    scene = gauss.load("double_pendulum_stops")
-    times = np.linspace(0.0, 1.0, 11)
-    exact = gauss.simulate(scene, 1.0, rtol=BY_EVENTS, times=times)
-    errors = []
-    for rtol in (1e-3, 1e-5):
-        motion = gauss.simulate(scene, 1.0, integrator="time_stepping", rtol=rtol, times=times)
-        errors.append(np.abs(motion.q - exact.q).max())
-    assert errors[1] <= 1e-1 * errors[0] and errors[1] <= 100.0 * 1e-5  # impacts amplify errors between them
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("model", ["double_pendulum_stops", "slack_rope", "newtons_cradle", "box_on_plane_4"])
+def test_motions_agree_with_located_events_or_are_refused(model, rtol):
+    """A box that tilts over its edge penetrates a little and lifts off; where no step meets the tolerance, it is said."""
+    system, times = gauss.compile_scene(gauss.load(model)), np.array([0.25, 0.5])
+    exact = gauss.simulate(system, 0.5, rtol=BY_EVENTS, times=times)
+    try:
+        motion = gauss.simulate(system, 0.5, integrator="time_stepping", rtol=rtol, times=times)
+    except SimulationError as error:
+        assert model == "box_on_plane_4" and len(error.trajectory)
+        return
+    assert np.abs(motion.q - exact.q).max() <= GROWN * rtol
 
 
 def test_a_short_late_force_is_not_stepped_over():

@@ -23,11 +23,14 @@ class ReachedPoint(NamedTuple):
         What steps continue from beside it.
     events : list of Event
         Changes of the contact mode in the step before.
+    closed : bool
+        Whether a gap is closed, by its force in the step before.
     """
 
     row: np.ndarray
     kept: Any
     events: list[Event]
+    closed: bool
 
 
 class SingleSteps(Protocol):
@@ -76,7 +79,9 @@ class CompiledSingleSteps:
         self.grid, self.note = np.array([[0.0, Due.STEP]]), np.empty(1 + modes.codes + len(modes.elements))
         self.steps = run.prepared_steps()
         self.given = run.arrays(self.point, self.confirmed, self.grid, self.note)
-        self.largest, self.law_at = 0.0, self.layout.row + self.layout.n_v + 3 + run.forces + 1
+        first = self.layout.row + self.layout.n_v + 3
+        self.largest, self.law_at = 0.0, first + run.forces + 1
+        self.normal = slice(first, first + run.stepper.laws.normal.size)
 
     @property
     def law_error(self) -> float:
@@ -116,13 +121,14 @@ class CompiledSingleSteps:
         return self._reached(self.point.copy(), events)
 
     def _reached(self, point: np.ndarray, events: list[Event]) -> ReachedPoint:
-        return ReachedPoint(point[: self.layout.row], (point, self.run.contacts.modes), events)
+        closed = bool(point[self.normal].any())
+        return ReachedPoint(point[: self.layout.row], (point, self.run.contacts.modes), events, closed)
 
     def with_row(self, reached: ReachedPoint, row: np.ndarray) -> ReachedPoint:
         """The same point with another row."""
         point, modes = reached.kept
         moved = np.concatenate([row, point[self.layout.row :]])
-        return ReachedPoint(moved[: self.layout.row], (moved, modes), reached.events)
+        return reached._replace(row=moved[: self.layout.row], kept=(moved, modes))
 
 
 class PairKernelSingleSteps:
@@ -157,17 +163,19 @@ class PairKernelSingleSteps:
         self.motion.begin(start)
         self.motion.stepper.refuse_penetration(start)
         self.motion.stepper.check(start)
-        return ReachedPoint(np.concatenate([[start.t], start.q, start.v, np.zeros(3)]), self.motion.kept(), [])
+        return ReachedPoint(np.concatenate([[start.t], start.q, start.v, np.zeros(3)]), self.motion.kept(), [], False)
 
     def after(self, begin: ReachedPoint, t: float) -> ReachedPoint:
         """Point after one step to a time [s]."""
         self.motion.take(begin.kept)
         self.motion.events = []
         row = self.motion.advance(np.array([t]))[0]
-        return ReachedPoint(row, self.motion.kept(), self.motion.events)
+        kept = self.motion.kept()
+        closed = bool(kept.modes[: self.motion.stepper.first_set_valued].any())
+        return ReachedPoint(row, kept, self.motion.events, closed)
 
     def with_row(self, reached: ReachedPoint, row: np.ndarray) -> ReachedPoint:
         """The same point with another row."""
         end = 1 + self.motion.system.n_q
         state = State(float(row[0]), row[1:end], row[end:-3])
-        return ReachedPoint(row, reached.kept._replace(state=state, work=row[-3:]), reached.events)
+        return reached._replace(row=row, kept=reached.kept._replace(state=state, work=row[-3:]))
