@@ -83,7 +83,7 @@ class FreeBodyMemory(CompiledStepMemory):
         self.integers = {name: np.zeros(length, dtype=np.int64) for name, length in lengths.items()}
         self.integers["q_start"], self.integers["v_start"] = stepper.q_places[0].copy(), stepper.v_places[0].copy()
         self.integers["ordered_count"][0] = -1
-        length, share = system.scale.length, stepper.share[0]
+        length, share = system.scale.length, stepper.shares[0]
         self.set_first(system, length * RESTING, length * SLIDING_SPEED, share, SETTINGS, constants)
 
     def fitting(self) -> "FreeBodyMemory":

@@ -124,7 +124,7 @@ class FreeBodyStepper:
         self._index_bodies()
         self.detection = NearDetection(self.table, self.n + self.fixed.shape[1], system.scale.length)
         self.reach = self._reaches()
-        self.share = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
+        self.shares = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
         self.coefficients = np.unique(self.table.restitution)
         self.elements = [contact.name for contact in self.table.contacts]
         self.first_set_valued, self.record = len(self.elements), ModeRecord(len(self.elements))
@@ -200,12 +200,12 @@ class FreeBodyStepper:
         SimulationError
             If shapes overlap unseen by their gap functions, or no forces are found.
         """
-        for share in self.share:
+        for share in self.shares:
             begun = self._begin(state, h, share)
             speed = max(self._speed(begun.both[..., k]) for k in range(2))
             near = self._near(state, begun, speed, h, share)
             known = rates(near, begun.both)
-            if share == self.share[-1] or not self._impacts(near, begun, known, h, share).any():
+            if share == self.shares[-1] or not self._impacts(near, begun, known, h, share).any():
                 break
         for _ in range(ATTEMPTS):
             force, added, error = self._solve(near, begun, known, h, share)

@@ -53,8 +53,7 @@ class ControlledMotion:
         system = problem.system
         self.problem, self.steps, self.rate_of = problem, steps, _rate_of_each_coordinate(system)
         self.closes = bool(smooth_system(system).closes)
-        restores = any(one.restitution for one in system.scene.contacts.values())
-        self.order = 1 if self.closes or restores else 2  # see MoreauStepper.shares
+        self.order = 2 if steps.shares[0] else 1  # the midpoint rule is of order 2
         self.least, self.limit = LEAST * system.scale.time, StepLimit(system)
         self.record = StepRecord(problem, steps)
 
@@ -85,9 +84,10 @@ class ControlledMotion:
 
     def _to(self, here: ReachedPoint, t: float, stop: float, h: float, bar: Progress) -> tuple[float, ReachedPoint]:
         """Steps from one stop to the next; the step to go on with, and the point there."""
-        longest, refused = (stop - t) / COARSE, 0
+        coarse, refused = (stop - t) / COARSE, 0
+        longest = self.limit.step(self._state(here))
         while t < stop:
-            h = min(h, longest)
+            h = min(h, coarse, longest)
             end = stop if stop - t < h * (1.0 + TO_END) else t + h
             h = end - t
             found, error, hides = self._tried(here, end)
@@ -102,6 +102,7 @@ class ControlledMotion:
             samples = self.record.due(end)
             self.record.keep(here, found, [found.row if at == end else self._doubled(here, at)[0].row for at in samples])
             self.record.unseen, refused = self.record.unseen + hides, 0
+            longest = self.limit.step(self._state(found))
             here, t, h = found, end, h * min(max(change, SMALLEST_FACTOR), LARGEST_FACTOR)
             bar.update(t - self.problem.start.t)
         return h, here
@@ -110,7 +111,7 @@ class ControlledMotion:
         """Point at a time [s], its error, and whether laws may have switched unseen; a step that fails may be too long."""
         try:
             found, error = self._doubled(here, end)
-            hides, error = self._switched(here, found, error)
+            hides, error = self._switched(here, found, max(error, self._unseen(here, found)))
         except GaussError:
             if end - here.row[0] <= ROUNDED * self.least:
                 raise
@@ -123,7 +124,6 @@ class ControlledMotion:
         found, whole = self.steps.after(half, t), self.steps.after(begin, t)
         events = half.events + found.events
         error = self._error(begin, whole, found, any(event.kind == "impact" for event in events + whole.events))
-        error = max(error, self._unseen(begin, found))
         smooth = not (events or whole.events or half.closed or found.closed or whole.closed)
         if smooth and not self.closes:
             found = self.steps.with_row(found, self._extrapolated(whole.row, found.row))
@@ -155,8 +155,7 @@ class ControlledMotion:
 
     def _unseen(self, begin: ReachedPoint, found: ReachedPoint) -> float:
         """Above 1 for steps in which a shape may pass through another one, and as steep as an error."""
-        longest = min(self.limit.step(self._state(reached)) for reached in (begin, found))
-        return float((found.row[0] - begin.row[0]) / longest) ** (self.order + 1)
+        return float((found.row[0] - begin.row[0]) / self.limit.step(self._state(found))) ** (self.order + 1)
 
     def _state(self, reached: ReachedPoint) -> State:
         n_q = 1 + self.problem.system.n_q

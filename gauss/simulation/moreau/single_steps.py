@@ -37,6 +37,10 @@ class SingleSteps(Protocol):
     """Steps of one motion."""
 
     @property
+    def shares(self) -> tuple[float, ...]:
+        """Candidates of the share of the old rates, see :attr:`MoreauStepper.shares`."""
+
+    @property
     def law_error(self) -> float:
         """Largest residual of the laws of contact and friction so far, relative."""
 
@@ -82,6 +86,11 @@ class CompiledSingleSteps:
         first = self.layout.row + self.layout.n_v + 3
         self.largest, self.law_at = 0.0, first + run.forces + 1
         self.normal = slice(first, first + run.stepper.laws.normal.size)
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Candidates of the share of the old rates."""
+        return self.run.stepper.shares
 
     @property
     def law_error(self) -> float:
@@ -142,6 +151,11 @@ class PairKernelSingleSteps:
 
     def __init__(self, system: System):
         self.motion = ContactMotion(system, own=True)
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Candidates of the share of the old rates."""
+        return self.motion.stepper.shares
 
     @property
     def law_error(self) -> float:
