@@ -148,7 +148,7 @@ def real_array(name: str, given, size: int) -> np.ndarray:
         return given.copy()
     try:
         found = np.asarray(given)
-    except Exception as error:
+    except Exception as error:  # of an object that a backend returns, whatever it is
         raise BackendError(f"failed: {name} is no array: {raised(error)}.") from error
     if found.dtype.kind not in REAL_KINDS or found.shape != (size,):
         what = f"{found.dtype} of shape {found.shape}" if found.ndim else _kind(given)
