@@ -5,26 +5,21 @@ Each imports what it runs: one motion needs one of them.
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from gauss.dynamics import engines
-from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.plan import plan_of
-from gauss.dynamics.programs import program_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
+from gauss.simulation.compiled_runs import adaptive_run, fixed_run, moreau_run
 from gauss.simulation.handover import finished
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
-    from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
 T = TypeVar("T")
 
@@ -54,7 +49,7 @@ def _constant(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
-    run = _compiled_run(problem, program_of(plan.dynamics))
+    run = (fixed_run if isinstance(problem.method, FixedStep) else adaptive_run)(problem, plan.dynamics)
     run.run()
     return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
@@ -69,20 +64,6 @@ def _samples(problem: Problem, plan: Plan) -> Trajectory:
         return DRIVERS[chosen[0].driver](alone, chosen[0])
 
     return held_motion(problem, drive)
-
-
-def _compiled_run(problem: Problem, program: type[Program]) -> "CompiledAdaptiveRun | CompiledFixedRun":
-    if problem.laws.called:
-        from gauss.simulation.called_runs import CalledAdaptiveRun, CalledFixedRun
-
-        return (CalledFixedRun if isinstance(problem.method, FixedStep) else CalledAdaptiveRun)(problem, program)
-    if isinstance(problem.method, FixedStep):
-        from gauss.simulation.compiled_fixed_run import CompiledFixedRun
-
-        return CompiledFixedRun(problem, program)
-    from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
-
-    return CompiledAdaptiveRun(problem, program)
 
 
 def _fallback(problem: Problem, plan: Plan) -> Trajectory:
@@ -122,14 +103,8 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
         from gauss.simulation.moreau.error_control import controlled_motion
 
         return controlled_motion(problem, plan)
-    if plan.dynamics == "compiled":
-        from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
-
-        return CompiledMoreauRun(problem, smooth_question(problem.question).laws).collect()
-    if plan.dynamics == "callbacks":
-        from gauss.simulation.moreau.called_run import CalledMoreauRun
-
-        return CalledMoreauRun(problem, smooth_question(problem.question).laws).collect()
+    if plan.dynamics in ("compiled", "callbacks"):
+        return moreau_run(problem).collect()
     if plan.dynamics == "pair kernels":
         from gauss.simulation.moreau.pair_kernel_run import PairKernelRun
 

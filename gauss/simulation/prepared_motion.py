@@ -12,13 +12,12 @@ from gauss.codegen import one_tier
 from gauss.codegen.kernels import Control, LoopStatus, address
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.plan import plan_of
-from gauss.dynamics.programs import program_of
 from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
-from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+from gauss.simulation.compiled_runs import adaptive_run
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.problem import Problem
 from gauss.simulation.simulate import simulate
@@ -62,7 +61,7 @@ class PreparedMotion:
                 return
             if problem.switching.times or problem.switching.conditional:
                 raise SimulationError(f"a motion of {name!r} cannot be prepared: laws switch; use gauss.simulate.")
-            run = CompiledAdaptiveRun(problem, program_of(plan.dynamics))
+            run = adaptive_run(problem, plan.dynamics)
             loop = run.prepared()
             simulate(self.system, duration, times=end, progress=False, **options)  # confirms the accelerations of the loop
         self._first, self._begins = loop.function("start"), bool(samples[0] == problem.start.t)

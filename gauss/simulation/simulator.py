@@ -15,25 +15,21 @@ import numpy as np
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
 from gauss.codegen.kernels import Due, LoopStatus
-from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.plan import plan_of
-from gauss.dynamics.programs import program_of
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
-from gauss.simulation.called_runs import CalledFixedRun
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
+from gauss.simulation.compiled_runs import fixed_run
 from gauss.simulation.held_inputs import HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
-from gauss.simulation.moreau.called_run import CalledMoreauRun
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
-from gauss.simulation.problem import Problem
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import refuse_jumps, warn_of_short_features, warn_of_undetected
@@ -139,7 +135,9 @@ class Simulator:
             refuse_jumps(self.system, problem.start, self.step_size)
             warn_of_short_features(whole.name, problem.laws, self.step_size)
             problem = problem._replace(switching=Switching())
-            self._run = run = _run_of(problem, plan.dynamics)
+            run: CompiledFixedRun | PairKernelSteps
+            run = PairKernelSteps(problem) if plan.dynamics == "pair kernels" else fixed_run(problem, plan.dynamics)
+            self._run = run
             self._loop: Any = run.prepared_steps()  # machine code, or steps that are called as it is
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
@@ -352,17 +350,6 @@ def _again(given: tuple, snapshot: SimulatorState) -> Simulator:
     simulator = Simulator(*given)
     simulator.restore(snapshot)
     return simulator
-
-
-def _run_of(problem: Problem, dynamics: str) -> CompiledFixedRun | PairKernelSteps:
-    """Machine code of the steps of a problem, and the functions beside it."""
-    assert isinstance(problem.method, FixedStep)
-    if dynamics == "pair kernels":
-        return PairKernelSteps(problem)
-    laws = smooth_question(problem.question).laws if problem.method.nonsmooth else problem.laws
-    if dynamics == "callbacks":
-        return CalledMoreauRun(problem, laws) if problem.method.nonsmooth else CalledFixedRun(problem)
-    return CompiledMoreauRun(problem, laws) if problem.method.nonsmooth else CompiledFixedRun(problem, program_of(dynamics))
 
 
 def _unchecked(n: int) -> np.ndarray:

@@ -7,19 +7,17 @@ wherever in the step it is: such steps become as short as the tolerance asks for
 moves farther in a step than a share of its thickness: none passes through another one unseen.
 """
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
-from gauss.dynamics.conditions import smooth_question, smooth_system
+from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.laws.switching_functions import TRIES
 from gauss.dynamics.laws.switching_times import COARSE
 from gauss.dynamics.rules import Plan
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, Rates
-from gauss.simulation.moreau.called_run import CalledMoreauRun
-from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
+from gauss.simulation.compiled_runs import moreau_run
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.single_steps import CompiledSingleSteps, PairKernelSingleSteps, ReachedPoint, SingleSteps
 from gauss.simulation.moreau.step_record import StepRecord
@@ -197,10 +195,8 @@ def controlled_motion(problem: Problem, plan: Plan) -> Trajectory:
         raise SimulationError(f"error control of time stepping does not take {what}; give a fixed step=.")
     if plan.dynamics == "pair kernels":
         return ControlledMotion(problem, PairKernelSingleSteps(problem.system)).collect()
-    make: Callable = CalledMoreauRun if plan.dynamics == "callbacks" else CompiledMoreauRun
     whole = problem._replace(step=problem.end - problem.start.t)  # steps that Python repeats have lengths of their own
-    run = make(whole, smooth_question(problem.question).laws)
-    return ControlledMotion(problem, CompiledSingleSteps(run)).collect()
+    return ControlledMotion(problem, CompiledSingleSteps(moreau_run(whole))).collect()
 
 
 def _rate_of_each_coordinate(system: System) -> np.ndarray:
