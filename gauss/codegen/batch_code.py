@@ -1,26 +1,29 @@
 """A function over rows of arrays: states (n, …) in, results (n, …) out, a SIMD vector of states at a time.
 
 Rows of any stride are transposed to structures of arrays in a buffer, the body runs once for as many states as the vector
-register holds, and its results are transposed back. The last vector repeats the last row, so no scalar code is needed.
+register holds, or for a block of vectors, and its results are transposed back. The last vector repeats the last row, so no
+scalar code is needed.
 """
 
 import ctypes
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import machine, processor
+from gauss.codegen.blocks import SHORTEST_OF_ROWS, STATES, StateBlocks, has_blocks, vectors_of
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
-from gauss.codegen.ir_blocks import counted_loop
+from gauss.codegen.ir_blocks import POINTER, Buffers, counted_loop
 from gauss.codegen.lanes import DOUBLE, INTEGER, kind, lane_indices
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p)
-POINTER, LANE = DOUBLE.as_pointer(), ir.IntType(32)
+LANE = ir.IntType(32)
 
 
 class BatchCode(NamedTuple):
@@ -78,21 +81,22 @@ def batch_code(function: Function | NativeFunction, interface: Interface) -> Bat
     interface : Interface
         Arguments, results and limits.
     """
-    writer = Writer()
+    writer, width = Writer(), processor.width()
     try:
-        width, body = processor.width(), writer.body(function, processor.width())
+        called = writer.block(function, width) if has_blocks(function, SHORTEST_OF_ROWS) else writer.body(function, width)
     except TypeError:  # it holds a function for one state at a time
-        writer = Writer()
-        width, body = 1, writer.body(function, 1)
-    _BatchWriter(writer, body, width).write(interface.sizes, interface.result_sizes(len(function.outputs)))
+        writer, width = Writer(), 1
+        called = writer.body(function, width)
+    _BatchWriter(writer, called, width).write(interface.sizes, interface.result_sizes(len(function.outputs)))
     return BatchCode(machine.load(str(writer.module)))
 
 
 class _BatchWriter:
     """Emitter of ``batch(i64 count, i64* table)``: the table holds address, row stride and entry stride of the arrays."""
 
-    def __init__(self, writer: Writer, body: ir.Function, width: int):
-        self.width, self.body = width, body
+    def __init__(self, writer: Writer, called: ir.Function | StateBlocks, width: int):
+        self.width, self.called = width, called
+        self.states = STATES if isinstance(called, StateBlocks) else width  # side by side in a buffer
         self.function = ir.Function(writer.module, ir.FunctionType(ir.VoidType(), [INTEGER, INTEGER.as_pointer()]), "batch")
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
         self.read = 0  # entries of the table that were read
@@ -102,23 +106,41 @@ class _BatchWriter:
         b, width, (count, _) = self.b, self.width, self.function.args
         sources = [self._entries(3) for _ in sizes] + [self._entries(2)]
         targets = [self._entries(2) for _ in result_sizes]
-        given, found = (b.alloca(DOUBLE, n * width) for n in (sum(sizes) + 1, max(sum(result_sizes), 1)))
-        for room in (given, found):
-            room.align = 64
-        with counted_loop(b, INTEGER(0), count, width) as first:
-            last = b.sub(count, INTEGER(1))
-            steps = [b.add(first, INTEGER(lane)) for lane in range(width)]
-            rows = [b.select(b.icmp_signed("<", step, count), step, last) for step in steps]
-            place = 0
-            for (data, row, *entry), size in zip(sources, [*sizes, 1], strict=True):
-                self._gather(self._rows(data, row, rows), entry[0] if entry else INTEGER(0), size, given, place)
-                place += size
-            b.call(self.body, [given, INTEGER(width), found, INTEGER(width)])
-            place = 0
-            for (data, row), size in zip(targets, result_sizes, strict=True):
-                self._scatter(self._rows(data, row, rows), size, found, place)
-                place += size
+        buffers, called = Buffers(b), self.called
+        given, found = (
+            b.bitcast(buffers.room(DOUBLE, n * self.states, align=64), POINTER)
+            for n in (sum(sizes) + 1, max(sum(result_sizes), 1))
+        )
+        frame = called.frame(buffers) if isinstance(called, StateBlocks) else None
+        apart, last = INTEGER(self.states), b.sub(count, INTEGER(1))
+        with counted_loop(b, INTEGER(0), count, self.states) as first:
+            vectors = vectors_of(b, b.sub(count, first), width) if frame else INTEGER(1)
+            with self._vectors(first, vectors, last) as (rows, lane):
+                place = 0
+                for (data, row, *entry), size in zip(sources, [*sizes, 1], strict=True):
+                    stride, target = entry[0] if entry else INTEGER(0), b.gep(given, [lane])
+                    self._gather(self._rows(data, row, rows), stride, size, target, place)
+                    place += size
+            if isinstance(called, StateBlocks):
+                b.call(called.code, [given, apart, found, apart, frame, vectors])
+            else:
+                b.call(called, [given, apart, found, apart])
+            with self._vectors(first, vectors, last) as (rows, lane):
+                place = 0
+                for (data, row), size in zip(targets, result_sizes, strict=True):
+                    self._scatter(self._rows(data, row, rows), size, b.gep(found, [lane]), place)
+                    place += size
+        buffers.free()
         b.ret_void()
+
+    @contextmanager
+    def _vectors(self, first, vectors, last) -> Iterator[tuple[list, ir.Value]]:
+        """Loop over vectors of states; the context is its body, and gives the rows of its lanes, and its first lane."""
+        b, width = self.b, self.width
+        with counted_loop(b, INTEGER(0), vectors) as k:
+            lane = b.mul(k, INTEGER(width))
+            steps = [b.add(b.add(first, lane), INTEGER(i)) for i in range(width)]
+            yield [b.select(b.icmp_signed("<", step, last), step, last) for step in steps], lane
 
     def _entries(self, count: int) -> list:
         """Load the next entries of the table; the first is an address."""
@@ -176,8 +198,8 @@ class _BatchWriter:
             yield INTEGER(size - width)
 
     def _offset(self, k, place: int):
-        """Place of the lanes of an entry in a buffer."""
-        return self.b.mul(self.b.add(k, INTEGER(place)), INTEGER(self.width))
+        """Place of the states of an entry in a buffer."""
+        return self.b.mul(self.b.add(k, INTEGER(place)), INTEGER(self.states))
 
     def _transposed(self, block: list) -> list:
         """Transpose a square block: in step s entries whose places differ in bit s change sides."""

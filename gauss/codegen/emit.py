@@ -7,8 +7,19 @@ structures of arrays; it calls other functions with its own width. A long functi
 
 from llvmlite import ir
 
+from gauss.codegen.blocks import STATES, StateBlocks, has_blocks, vectors_of, write_block
 from gauss.codegen.function import Function
-from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides, strip_mined_loop
+from gauss.codegen.ir_blocks import (
+    BODY,
+    POINTER,
+    Buffers,
+    begin_function,
+    counted_loop,
+    input_reader,
+    output_writer,
+    strides,
+    strip_mined_loop,
+)
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.outlined_pieces import lengths, write_pieces
@@ -29,6 +40,7 @@ class Writer:
         self.module = ir.Module(name="gauss") if module is None else module
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
+        self._blocks: dict[tuple, StateBlocks] = {}
 
     def body(self, function: Function | NativeFunction, width: int = 1, strided: bool = False) -> ir.Function:
         """Code of a function for one vector width, emitted at the first request.
@@ -53,15 +65,38 @@ class Writer:
         """Write ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, input j of state i being
         ``in[j * in_stride + i]``: vectors of the widest width as long as they fit, then single states.
         """  # noqa: D205
-        bodies = {width: self.body(function, width, strided=True) for width in sorted({1, *widths}, reverse=True)}
         run = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [INTEGER, *BODY.args]), name="run")
         count, source, in_stride, target, out_stride = run.args
         b = ir.IRBuilder(run.append_basic_block("entry"))
         start = ir.Constant(INTEGER, 0)
-        for width, body in bodies.items():
+        for width in sorted({1, *widths}, reverse=True):
+            if width > 1 and has_blocks(function):
+                start = self._in_blocks(b, function, width, run.args)
+                continue
+            body = self.body(function, width, strided=True)
             call = lambda i, body=body: b.call(body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride])  # noqa: E731
             start = strip_mined_loop(b, start, count, width, call)
         b.ret_void()
+
+    def _in_blocks(self, b: ir.IRBuilder, function: Function, width: int, arguments) -> ir.Value:
+        """Write the calls for as many states as fill whole vectors; their number."""
+        count, source, in_stride, target, out_stride = arguments
+        buffers, block = Buffers(b), self.block(function, width)
+        frame, end = block.frame(buffers), b.sub(count, b.srem(count, INTEGER(width)))
+        with counted_loop(b, INTEGER(0), end, STATES) as first:
+            vectors = vectors_of(b, b.sub(end, first), width)
+            given, found = b.gep(source, [first]), b.gep(target, [first])
+            b.call(block.code, [given, in_stride, found, out_stride, frame, vectors])
+        buffers.free()
+        return end
+
+    def block(self, function: Function, width: int) -> StateBlocks:
+        """Code of a function for blocks of states, emitted at the first request; it must have blocks."""
+        key = function, width
+        if key not in self._blocks:
+            name = f"{function.name}_block_{len(self._blocks)}_{width}"
+            self._blocks[key] = write_block(self.module, name, self._scheduled(function), width)
+        return self._blocks[key]
 
     def export(self, function: Function | NativeFunction, name: str):
         """Write ``name(double* in, double* out)``, one state."""
@@ -73,16 +108,17 @@ class Writer:
     def _scheduled(self, function: Function) -> Schedule:
         """Schedule of the operations, the same for all widths."""
         if function not in self._schedules:
+            inputs = set(function.inputs)
+            foreign = [n.value for n in function.nodes if n.op == "symbol" and n not in inputs]
+            if foreign:
+                raise TypeError(
+                    f"the outputs of {function.name!r} depend on {', '.join(foreign[:5])}, which is none of its inputs."
+                )
             self._schedules[function] = schedule(function)
         return self._schedules[function]
 
     def _write(self, function: Function, width: int, strided: bool) -> ir.Function:
-        nodes, inputs = function.nodes, set(function.inputs)
-        foreign = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
-        if foreign:
-            raise TypeError(
-                f"the outputs of {function.name!r} depend on {', '.join(foreign[:5])}, which is none of its inputs."
-            )
+        nodes = function.nodes
         callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
         name = f"{function.name}_{len(self._bodies)}_{width}"
         scheduled = self._scheduled(function)

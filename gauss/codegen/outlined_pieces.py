@@ -5,9 +5,11 @@ Poletto and Sarkar, ACM TOPLAS 21, 1999).
 """
 
 from collections import defaultdict
+from contextlib import contextmanager
 from heapq import heappop, heappush
 from itertools import accumulate, pairwise
 from math import inf
+from typing import NamedTuple
 
 from llvmlite import ir
 
@@ -50,62 +52,95 @@ def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: 
     strided : bool
         Whether its inputs and outputs may be apart.
     """
-    pieces = cut(whole, lengths(module)[1])
-    place, size = _frame(whole, pieces)
-    codes = [
-        _piece_code(module, f"{name}_{k}", whole, piece, place, callees, width, strided) for k, piece in enumerate(pieces)
-    ]
+    pieces = pieces_of(module, name, whole, callees, width, strided, lengths(module)[1])
     body, lanes = begin_function(module, name, width)
-    source, in_stride, target, out_stride = strides(body, width, strided)
-    frame = lanes.b.bitcast(lanes.b.alloca(lanes.kind, max(size, 1)), POINTER)
-    for code in codes:
+    frame = lanes.b.bitcast(lanes.b.alloca(lanes.kind, max(pieces.slots, 1)), POINTER)
+    for code in pieces.codes:
         lanes.b.call(code, [*body.args, frame])
-    rest = [k for k, x in enumerate(whole.outputs) if not isinstance(x, Expression) or x.op in ("symbol", "constant")]
-    given, write = [whole.outputs[k] for k in rest], output_writer(lanes, target, out_stride)
-    constants = list({x.index: x for x in given if isinstance(x, Expression) and x.is_constant}.values())
-    unchanged = Schedule(constants, whole.inputs, given)
-    straight_line(
-        lanes, unchanged, input_reader(lanes, source, in_stride), lambda k, value: write(rest[k], value), vectorise=False
-    )
     lanes.b.ret_void()
     return body
 
 
-def _piece_code(module, name: str, whole: Schedule, piece: Schedule, place, callees, width: int, strided) -> ir.Function:
-    """Code of a piece: (in, in_stride, out, out_stride, frame)."""
-    body, lanes = begin_function(module, name, width, ir.FunctionType(ir.VoidType(), [*BODY.args, POINTER]))
-    body.attributes.add("noinline")
-    (source, in_stride, target, out_stride), frame = strides(body, width, strided), body.args[-1]
-    read, write = input_reader(lanes, source, in_stride), output_writer(lanes, target, out_stride)
-    inputs, outputs = {x.index: k for k, x in enumerate(whole.inputs)}, defaultdict(list)
-    for k, x in enumerate(whole.outputs):
-        if isinstance(x, Expression):
-            outputs[x.index].append(k)
+class Pieces(NamedTuple):
+    """Code of the pieces of a function, (in, in_stride, out, out_stride, frame) each, and the slots of their frame."""
 
-    at = lambda index: INTEGER(place[index] * width)  # noqa: E731
-    passed = [node for node in (*piece.nodes, *piece.inputs) if node.op == "call" and node.index in place]
-    results = {node.index: Results(lanes, lanes.b.gep(frame, [at(node.index)]), node.value) for node in passed}
+    codes: list[ir.Function]
+    slots: int
 
-    def fetch(k):
-        index = piece.inputs[k].index
-        if index in results:
-            return results[index]
-        if index in inputs:
-            return read(inputs[index])
-        return lanes.load(frame, at(index)) if index in place else input_reader(lanes, target, out_stride)(outputs[index][0])
 
-    def keep(k, value):
-        index = piece.outputs[k].index
-        if index in place:
-            lanes.store(value, frame, at(index))
-        for output in outputs[index]:
-            write(output, value)
+def pieces_of(module: ir.Module, name: str, whole: Schedule, callees, width: int, strided: bool, length: int) -> Pieces:
+    """Pieces of about ``length`` operations, to be called in order; other arguments as of :func:`write_pieces`."""
+    pieces = cut(whole, length)
+    place, slots = _frame(whole, pieces)
+    writer = _PieceWriter(module, whole, place, callees, width, strided)
+    codes = [writer.code(f"{name}_{k}", piece) for k, piece in enumerate(pieces)]
+    unchanged = writer.unchanged(f"{name}_{len(pieces)}")
+    return Pieces(codes + unchanged, slots)
 
-    called = {node.value for node in piece.nodes if node.op == "call"}
-    calls = calling(lanes, {callee: code for callee, code in callees.items() if callee in called})
-    straight_line(lanes, piece, fetch, keep, calls, vectorise=False, results=results)
-    lanes.b.ret_void()
-    return body
+
+class _PieceWriter(NamedTuple):
+    """Writer of the pieces of a function."""
+
+    module: ir.Module
+    whole: Schedule
+    place: dict[int, int]
+    callees: dict
+    width: int
+    strided: bool
+
+    @contextmanager
+    def piece(self, name: str):
+        """Function of a piece; the context is its code: emitter, readers of inputs and outputs, writer of outputs, frame."""
+        body, lanes = begin_function(self.module, name, self.width, ir.FunctionType(ir.VoidType(), [*BODY.args, POINTER]))
+        body.attributes.add("noinline")
+        source, in_stride, target, out_stride = strides(body, self.width, self.strided)
+        written, write = input_reader(lanes, target, out_stride), output_writer(lanes, target, out_stride)
+        yield lanes, input_reader(lanes, source, in_stride), written, write, body.args[-1]
+        lanes.b.ret_void()
+
+    def code(self, name: str, piece: Schedule) -> ir.Function:
+        """Code of a piece."""
+        place, inputs, outputs = self.place, {x.index: k for k, x in enumerate(self.whole.inputs)}, defaultdict(list)
+        for k, x in enumerate(self.whole.outputs):
+            if isinstance(x, Expression):
+                outputs[x.index].append(k)
+        at = lambda index: INTEGER(place[index] * self.width)  # noqa: E731
+        called = {node.value for node in piece.nodes if node.op == "call"}
+        with self.piece(name) as (lanes, read, written, write, frame):
+            passed = [node for node in (*piece.nodes, *piece.inputs) if node.op == "call" and node.index in place]
+            results = {node.index: Results(lanes, lanes.b.gep(frame, [at(node.index)]), node.value) for node in passed}
+
+            def fetch(k):
+                index = piece.inputs[k].index
+                if index in results:
+                    return results[index]
+                if index in inputs:
+                    return read(inputs[index])
+                return lanes.load(frame, at(index)) if index in place else written(outputs[index][0])
+
+            def keep(k, value):
+                index = piece.outputs[k].index
+                if index in place:
+                    lanes.store(value, frame, at(index))
+                for output in outputs[index]:
+                    write(output, value)
+
+            calls = calling(lanes, {callee: code for callee, code in self.callees.items() if callee in called})
+            straight_line(lanes, piece, fetch, keep, calls, vectorise=False, results=results)
+        return lanes.b.function
+
+    def unchanged(self, name: str) -> list[ir.Function]:
+        """Code that writes the outputs that are inputs or constants; none if there are none."""
+        outputs = self.whole.outputs
+        rest = [k for k, x in enumerate(outputs) if not isinstance(x, Expression) or x.op in ("symbol", "constant")]
+        if not rest:
+            return []
+        given = [outputs[k] for k in rest]
+        constants = list({x.index: x for x in given if isinstance(x, Expression) and x.is_constant}.values())
+        with self.piece(name) as (lanes, read, _, write, _):
+            scheduled = Schedule(constants, self.whole.inputs, given)
+            straight_line(lanes, scheduled, read, lambda k, value: write(rest[k], value), vectorise=False)
+        return [lanes.b.function]
 
 
 def cut(scheduled: Schedule, length: int) -> list[Schedule]:
