@@ -3,11 +3,13 @@
 The import is ``gauss``; the distribution has another name, for ``gauss`` on the package index is a project of somebody else.
 """
 
+import re
 from warnings import warn
 
 VERSION = "0.2.0"
 REMOVAL = "0.3.0"  # in which the former names of this version go: they work for one minor version
 DISTRIBUTION = "gauss-dynamics"
+REQUIREMENT = re.compile(r"[\w.-]+")  # name of the distribution in a line of requirements
 
 
 def version_of(package: str) -> str | None:
@@ -18,6 +20,18 @@ def version_of(package: str) -> str | None:
         return VERSION if package == "gauss" else version(package)
     except PackageNotFoundError:
         return None
+
+
+def absent_packages(extra: str) -> list[str]:
+    """Distributions of an extra of this package that are not installed; none where it runs uninstalled itself."""
+    from importlib.metadata import PackageNotFoundError, requires
+
+    try:
+        wanted = requires(DISTRIBUTION) or []
+    except PackageNotFoundError:
+        return []
+    names = [REQUIREMENT.match(line) for line in wanted if re.search(rf"""extra == ['"]{extra}['"]""", line)]
+    return [name[0] for name in names if name and version_of(name[0]) is None]
 
 
 def warn_of_former_name(former: str, current: str, stacklevel: int = 2) -> None:
