@@ -11,11 +11,10 @@ Planar linkages are also solved by Assur groups, a whole cycle in one call: :cla
 
 from importlib import import_module
 from importlib.util import find_spec
-from warnings import warn
 
 from gauss.lazy import attach
 from gauss.versions import VERSION as __version__  # noqa: F401
-from gauss.versions import current_name
+from gauss.versions import current_name, warn_of_former_name
 
 # Imported when they are first asked for: the time from nothing to a first result counts.
 __all__, later, _ = attach(__name__, __file__)
@@ -32,7 +31,7 @@ NEEDS = {"show": ("matplotlib", "viser"), "view": ("matplotlib",)}  # packages w
 def __getattr__(name: str):
     """Return a public name or a module of this package, or what goes by another name now."""
     if name == "sweeps":
-        warn("gauss.sweeps is called gauss.simulation.sweeps now.", DeprecationWarning, stacklevel=2)
+        warn_of_former_name("gauss.sweeps", "gauss.simulation.sweeps")
         return import_module("gauss.simulation.sweeps")
     return later(current_name(__name__, RENAMED, name) if name in RENAMED else name)
 

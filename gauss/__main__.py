@@ -1,7 +1,19 @@
-"""`python -m gauss` is the command line."""
+"""`python -m gauss` is the command line, and so is the installed command."""
 
 import sys
 
-from gauss.cli import main
+INTERRUPTED = 130  # exit code of what Ctrl-C has ended
 
-sys.exit(main())
+
+def main():
+    """Entry point: the command line is imported here, so that Ctrl-C ends the import without a traceback, too."""
+    try:
+        from gauss.cli import main as command
+
+        return command()
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -8,6 +8,8 @@ from functools import cache
 from pickle import PicklingError
 from typing import TYPE_CHECKING
 
+from gauss.versions import absent_packages
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -168,13 +170,15 @@ def extra(name: str = ""):
     Raises
     ------
     MissingPackageError
-        If one of them is not installed; the message says how to get it.
+        If one of them is not installed; the message says how to get it, and all else that the extra lacks.
     """
     try:
         yield
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
-        remedy = f"pip install {DISTRIBUTIONS.get(package, package)}"
+        distribution = DISTRIBUTIONS.get(package, package)
+        others = [other for other in (absent_packages(name) if name else []) if other != distribution]
+        remedy = f"pip install {' '.join([distribution, *others])}"
         source = f"extra {name!r}" if name else "part of the default installation, needed for this alone"
         raise MissingPackageError(f"{package} is not installed: {remedy} ({source}).", name=package) from error
 

@@ -32,7 +32,11 @@ SIMULATE = "import gauss; gauss.simulate(gauss.load('four_bar'), 0.01, progress=
 STEPPED = (  # by machine code that calls LAPACK
     "import gauss; gauss.simulate(gauss.load('rolling_ball'), 0.01, integrator='time_stepping', step=1e-3, progress=False)"
 )
-HELP = "import sys, runpy; sys.argv = ['gauss', {}'--help']\ntry: runpy.run_module('gauss')\nexcept SystemExit: pass"
+HELP = (
+    "import sys, runpy; sys.argv = ['gauss', {}'--help']\n"
+    "try: runpy.run_module('gauss', run_name='__main__')\n"
+    "except SystemExit: pass"
+)
 
 
 def _imported(code: str, names: tuple[str, ...]) -> set[str]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss.errors import GaussError, MissingPackageError, SceneError, extra
-from gauss.versions import DISTRIBUTION
+from gauss.versions import DISTRIBUTION, absent_packages
 from tests.support import mechanisms
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.just("1 kg") | st.none() | st.booleans()
@@ -257,6 +257,18 @@ def test_a_missing_package_is_named_as_it_is_installed(module, package, monkeypa
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(MissingPackageError, match=f"pip install {package}"), extra("film"):
         import_module(module)
+
+
+def test_all_that_an_extra_lacks_is_named_at_once(monkeypatch):
+    lines = ["numpy>=1.26", "no-such.thing>=1 ; extra == 'docs'", "numpy>=1.26; extra == 'docs'", "no_other; extra == 'doc'"]
+    monkeypatch.setattr("importlib.metadata.requires", lambda name: lines if name == DISTRIBUTION else None)
+    assert absent_packages("docs") == ["no-such.thing"] and absent_packages("view") == []
+    with (
+        pytest.raises(MissingPackageError, match=r"pip install furo no-such\.thing \(extra 'docs'\)") as caught,
+        extra("docs"),
+    ):
+        raise ModuleNotFoundError("No module named 'furo.sub'", name="furo.sub")
+    assert caught.value.name == "furo"
 
 
 BLOCKED = """

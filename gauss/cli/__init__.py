@@ -1,6 +1,7 @@
 """Command line: each command parses arguments and calls a few functions; one file for each group of commands."""
 
 import warnings
+from errno import EDQUOT, EFBIG, ENOSPC
 from typing import Annotated
 
 import typer
@@ -9,6 +10,8 @@ from gauss.cli import bench, docs, doctor, export, linkage, rotors, run, scenes,
 from gauss.cli.common import group
 from gauss.errors import GaussError
 from gauss.versions import VERSION
+
+FULL = (ENOSPC, EDQUOT, EFBIG)  # the disk, the quota, or the file is full
 
 app = group(pretty_exceptions_enable=False)
 
@@ -53,4 +56,9 @@ def main():
         app()
     except GaussError as error:
         typer.secho(f"error: {error}", fg="red", err=True)
+        raise SystemExit(2) from None
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        typer.secho(f"error: the output cannot be written: {error.strerror}.", fg="red", err=True)
         raise SystemExit(2) from None

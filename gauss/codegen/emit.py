@@ -25,6 +25,7 @@ from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.outlined_pieces import lengths, write_pieces
 from gauss.codegen.schedule import Schedule, schedule
 from gauss.codegen.straight_line import calling, result_rooms, straight_line
+from gauss.codegen.terminal_line import function_written
 
 
 class Writer:
@@ -59,6 +60,7 @@ class Writer:
                 self._bodies[key] = function.write(self, width)
             else:
                 self._bodies[key] = self._write(function, width, strided)
+            function_written()
         return self._bodies[key]
 
     def over_states(self, function: Function | NativeFunction, widths):

@@ -18,6 +18,7 @@ import llvmlite.binding as llvm
 from gauss.codegen.library_symbols import register_symbols_of
 from gauss.codegen.module_units import ModuleUnits
 from gauss.codegen.processor import features
+from gauss.codegen.terminal_line import units_in_progress
 
 OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
 PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
@@ -49,8 +50,8 @@ def quick_objects(ir_text: str) -> list[bytes]:
     quick, chosen = (
         ModuleUnits(ir_text).apart(lambda function: CONTRACTED in function) if CONTRACTED in ir_text else (ir_text, "")
     )
-    objects = [target(0).emit_object(_parsed(quick))] if quick else []
-    return objects + [_optimised(chosen)] if chosen else objects
+    units = units_in_progress([unit for unit in (quick, chosen) if unit])
+    return [_optimised(unit) if unit is chosen else target(0).emit_object(_parsed(unit)) for unit in units]
 
 
 def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
@@ -65,10 +66,10 @@ def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
     """
     if optimise == 1:
         short = len(ir_text) <= UNIT_LENGTH
-        for unit in [ir_text] if short else ModuleUnits(ir_text).short(UNIT_LENGTH):
-            yield _optimised(unit)
+        yield from map(_optimised, units_in_progress([ir_text] if short else ModuleUnits(ir_text).short(UNIT_LENGTH)))
     else:
-        module, builder = _parsed(ir_text), _builder()
+        (unit,) = units_in_progress([ir_text])
+        module, builder = _parsed(unit), _builder()
         module.verify()
         builder.getModulePassManager().run(module, builder)
         yield target(OPTIMISED).emit_object(module)

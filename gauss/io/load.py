@@ -64,8 +64,6 @@ def load(source, **options):
     read = READERS.get(path.suffix.lower())
     if read is not None:
         return read(path, options, name)
-    if path.suffix or path.exists():
-        raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READERS)}.")
     files = shipped() | servo_files()
     if name in files:
         return _without_options(name, options, _read_toml, files[name])
@@ -74,8 +72,15 @@ def load(source, **options):
             return families()[name](**options)
         except TypeError as error:
             raise FileError(f"family {name!r}: {error}.") from error
-    everything = [*files, *families(), "robot:panda", "robot:talos", "robot:ur5"]
-    raise FileError(f"{name!r} is neither a file nor a model. {did_you_mean(name, everything)}")
+    raise FileError(_neither(name, path, [*files, *families(), "robot:panda", "robot:talos", "robot:ur5"]))
+
+
+def _neither(name: str, path: Path, everything: list[str]) -> str:
+    """Message about what is neither a file that can be read nor a model."""
+    if path.suffix or path.exists():
+        what = "it is a folder" if path.is_dir() else f"cannot read a file of type {path.suffix or 'unknown'!r}"
+        return f"{name or repr(name)}: {what}; expected {' or '.join(READERS)}."
+    return f"{name!r} is neither a file nor a model. {did_you_mean(name, everything)}"
 
 
 def writer(path: Path, kind: str) -> Callable:

@@ -9,7 +9,7 @@ from gauss.rotors.laws import ROLES
 from gauss.rotors.links import GearPair
 from gauss.rotors.phase import NetworkPhase
 
-STEP = 1e-6  # relative to an angle, at least 1 rad, and to a speed, at least the slow one of the network
+STEP = 1e-6  # relative to an angle, at least 1 rad, and to a speed, at least v_0: near rest a slip changes within it
 
 
 class Jacobian:
@@ -33,7 +33,7 @@ class Jacobian:
     def __call__(self, rates: Callable, t: float, y: np.ndarray) -> csc_matrix:
         """Matrix by central differences."""
         rows, columns, entries = list(range(self.n_g)), list(range(self.n_g, 2 * self.n_g)), [1.0] * self.n_g
-        for offset, unit in ((0, 1.0), (self.n_g, self.phase.reduced.slow)):
+        for offset, unit in ((0, 1.0), (self.n_g, self.phase.reduced.v_0)):
             for groups in self.colours:
                 step = np.zeros(y.size)
                 moved = np.array(groups) + offset
@@ -55,7 +55,7 @@ class Jacobian:
         for term, gate in zip(reduced.terms, self.phase.mode.gate, strict=True):
             j = place[term.shaft]
             g, k = int(reduced.group[j]), float(reduced.K[j])
-            for column, unit in ((g, 1.0), (self.n_g + g, reduced.slow)) if gate else ():
+            for column, unit in ((g, 1.0), (self.n_g + g, reduced.v_0)) if gate else ():
                 step = STEP * max(abs(y[column]), unit)
                 powers = []
                 for change in (step, -step):

@@ -1,7 +1,6 @@
 """Motion under servos: trajectory, efforts, work and residuals."""
 
 from dataclasses import dataclass
-from warnings import warn
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from gauss.servo.servo import Servo
 from gauss.servo.verdict import Verdict
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.versions import FormerAttribute
+from gauss.versions import FormerAttribute, warn_of_former_name
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class Tracking:
 
     def gap(self, name: str) -> np.ndarray:
         """Former name of :meth:`residual`."""
-        warn("Tracking.gap is called Tracking.residual now.", DeprecationWarning, stacklevel=2)
+        warn_of_former_name("Tracking.gap", "Tracking.residual")
         return self.residual(name)
 
     gaps = FormerAttribute("residuals")

@@ -4,10 +4,13 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 
+import gauss
+import gauss.__main__
 from gauss.cli.common import tolerances
 from gauss.errors import FileError
 from tests.support.files import call
@@ -176,3 +179,36 @@ def test_output_of_another_kind_is_refused_at_once(command, ending, remedy, tmp_
     result = call(*command, "--run" if command[0] == "linkage" else "--duration", 1e9, "--output", path)
     assert isinstance(result.exception, FileError) and remedy in str(result.exception)
     assert not path.exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the device that is full is one of Linux")
+def test_a_full_disk_is_one_line():
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "gauss", "models"]
+        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert result.returncode == 2
+    assert result.stderr.splitlines() == ["error: the output cannot be written: No space left on device."]
+
+
+def test_an_interrupt_while_the_command_line_is_imported_leaves_no_traceback(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gauss.cli", Interrupted("gauss.cli"))
+    assert gauss.__main__.main() == gauss.__main__.INTERRUPTED
+
+
+class Interrupted(ModuleType):
+    """Module that is interrupted when something is imported from it."""
+
+    def __getattr__(self, name: str):
+        if name == "main":
+            raise KeyboardInterrupt
+        raise AttributeError(name)
+
+
+def test_a_folder_of_the_name_of_a_model_hides_nothing(tmp_path, monkeypatch):
+    (tmp_path / "four_bar").mkdir()
+    (tmp_path / "mine").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert call("explain", "four_bar").exit_code == 0
+    for name in ("mine", "."):
+        with pytest.raises(FileError, match="it is a folder; expected .toml"):
+            gauss.load(name)

@@ -235,18 +235,27 @@ def test_a_line_appears_on_a_terminal_while_code_is_made_for_long(is_terminal, s
     stream = io.StringIO()
     stream.isatty = lambda: is_terminal
     monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(object_code, "UNIT_LENGTH", 1)  # a unit for each function
     notices = terminal_line
     monkeypatch.setattr(notices, "SLOW", 0.0)
+    inner = write(lambda x: x * x, 1, name="inner")
+    outer = write(lambda x: inner(x) + 3.0, 1, name="outer")
     with one_tier(shown=shown), notices.compile_notice(), notices.compile_notice():
         limit = time.monotonic() + (PATIENCE if lines else 0.05)
         while time.monotonic() < limit and notices.TEXT not in stream.getvalue():
             time.sleep(0.01)
-    counted = notices.CLEARED + notices.TEXT + notices.COUNTED.format(1)
-    assert stream.getvalue() == (notices.TEXT + counted + notices.CLEARED) * lines
+        writer = Writer()
+        writer.export(outer, "run")
+        objects = list(object_code.optimised_objects(str(writer.module), 1))
+    functions = str(writer.module).count("define ")
+    assert len(objects) == functions == 3  # the entry, beside the two
+    said = [notices.TEXT, notices.WRITTEN.format(1), notices.WRITTEN.format(2), notices.COMPILING.format(functions)]
+    said += [notices.PARTLY_COMPILED.format(done, functions) for done in (1, 2)]
+    assert stream.getvalue() == (notices.CLEARED.join([*said, ""])) * lines
     monkeypatch.setattr(notices, "SLOW", PATIENCE)
     with notices.compile_notice():
-        pass
-    assert stream.getvalue().count(notices.TEXT) == 2 * lines
+        object_code.quick_objects(str(writer.module))
+    assert stream.getvalue().count(notices.TEXT) == 3 * lines  # those above: nothing is written before its time
 
 
 SETTINGS = {"dop853": {"rtol": 1e-8}, "taylor": {"rtol": 1e-8}, "time_stepping": {"step": 1e-3}}
