@@ -5,6 +5,8 @@ differences: that is smooth, and costs no motion.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from scipy import stats
@@ -12,8 +14,10 @@ from scipy.optimize import least_squares
 
 from gauss.analysis.fitted_motion import MotionFit
 from gauss.analysis.sensitivity.parametrised_step import ParametrisedStep
+from gauss.analysis.sensitivity.timed_steps import timed_steps
 from gauss.arguments import name_list, real_array, table
 from gauss.dynamics import compile_scene
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
 from gauss.dynamics.parametrised_system import parametrised
 from gauss.errors import ArgumentError, GaussError, SceneError, StateError, did_you_mean
@@ -50,7 +54,18 @@ class FitProblem:
         """Compile the steps of the motion, for all values of the parameters."""
         self.kind = numbers(self.system)[1]
         self.step = ParametrisedStep(parametrised(self.system, self._around()), integrator)
-        self.substeps = np.maximum(1, np.ceil(np.diff(self.t) / step - 1e-9)).astype(int)
+        self.groups = self._groups(np.maximum(1, np.ceil(np.diff(self.t) / step - 1e-9)).astype(int))
+
+    def _groups(self, counts: np.ndarray) -> list[list[tuple[float, float]]]:
+        """Begin and length of the steps between samples, of which there are so many but for switching times [s]."""
+        lengths = np.diff(self.t) / counts
+        nodes = [t + h * np.arange(m) for t, h, m in zip(self.t[:-1], lengths, counts, strict=True)]
+        start, every = replace(self.system.initial_state(), t=float(self.t[0])), np.append(np.concatenate(nodes), self.t[-1])
+        found, ends = (
+            timed_steps(self.system, Laws(self.system), start, every, np.repeat(lengths, counts)),
+            np.cumsum(counts),
+        )
+        return [list(chain(*found[end - m : end])) for end, m in zip(ends, counts, strict=True)]
 
     def _measured(self, measured) -> np.ndarray:
         """Columns (k, n) of numbers."""
@@ -173,10 +188,8 @@ class FitProblem:
             held = np.concatenate([np.zeros((n_u, p.size)), directions[n_x:]])
             X = directions[:n_x]
             changes.append(X[self.places])
-        for k, u in enumerate(self.inputs):
-            h = (self.t[k + 1] - self.t[k]) / self.substeps[k]
-            for i in range(self.substeps[k]):
-                t = self.t[k] + i * h
+        for group, u in zip(self.groups, self.inputs, strict=True):
+            for t, h in group:
                 if directions is not None:
                     X = step.changes(t, h, x, u, varied, np.concatenate([X, held]))
                 x = step.moved_to(t, h, x, u, varied)

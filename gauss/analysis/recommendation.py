@@ -8,6 +8,7 @@ import numpy as np
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.conditions import refuse_motionless
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mobility import mobility
@@ -103,8 +104,11 @@ def advise(system: System, state: State | None = None) -> Recommendation:
     ------
     AssemblyError
         If the scene has no consistent start.
+    SimulationError
+        If nothing in it can move.
     """
     require(system, (System,), "advise")
+    refuse_motionless(system, "advise")
     state = system.initial_state() if state is None else state
     motion = kinematics(system, state)
     factor = Factor(assemble_motion(motion, Applied(motion)))

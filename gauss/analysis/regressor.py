@@ -16,6 +16,7 @@ import numpy as np
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import name_list, named_arguments, real_array
 from gauss.dynamics import compile_scene
+from gauss.dynamics.conditions import refuse_motionless
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.projection import fixed_columns
 from gauss.errors import StateError, require
@@ -114,6 +115,7 @@ class RegressorModel:
     def __init__(self, system: System | Scene, independent: Sequence[str] | None = None, friction: Sequence[str] = ()):
         require(system, (System, Scene), "regressor")
         self.system = system = compile_scene(system) if isinstance(system, Scene) else system
+        refuse_motionless(system, "regressor")
         _refuse_prescribed(system.scene)
         given = None if independent is None else name_list(independent, "independent", "names of joints")
         if given is not None:

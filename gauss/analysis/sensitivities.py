@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.analysis.sensitivity.motion import Motion
+from gauss.analysis.user_functions import numbers_of
 from gauss.arguments import named_arguments
 from gauss.codegen import Graph, reverse, substitute
 from gauss.errors import ArgumentError
@@ -211,10 +212,7 @@ def _loss(loss: Callable, system: System, end: np.ndarray) -> tuple[float, np.nd
     """Value of a function of (q, v), and its gradient (n_q + n_v,)."""
     symbols = Graph().symbols("x", system.n_q + system.n_v)
     q, v = np.split(symbols, [system.n_q])
-    try:
-        found = symbols[0].graph.lift(loss(q, v))
-    except TypeError as error:
-        raise ArgumentError(f"motion_gradient: loss cannot be traced: {error}") from None
+    found = symbols[0].graph.lift(numbers_of(loss, (q, v), "motion_gradient: loss", 1)[0])
     try:
         value, *gradient = (one.value for one in substitute([found, *reverse(found, symbols)], symbols, end))
     except (ValueError, ArithmeticError) as error:

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from gauss.codegen import Kernel, forward, write
+from gauss.dynamics.conditions import refuse_motionless
 from gauss.dynamics.mechanism import Mechanism, loop_residual
 from gauss.dynamics.store import cached
 from gauss.system import State, System, coordinate_rates, whole
@@ -37,11 +38,20 @@ class Tangents:
         The state.
     held : tuple of int
         Places of rates that are kept at their values.
+
+    Raises
+    ------
+    SimulationError
+        If nothing in the system can move.
     """
 
     system: System
     state: State
     held: tuple[int, ...] = ()
+
+    def __post_init__(self):
+        """Refuse systems without tangents."""
+        refuse_motionless(self.system, "independent coordinates")
 
     @cached_property
     def position(self) -> np.ndarray:

@@ -12,6 +12,7 @@ from gauss.codegen import callbacks_are_available
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
+from gauss.errors import SimulationError
 from gauss.integrators import ExplicitPair, FixedStep
 from gauss.scene import Collider, Contact, Points
 from gauss.scene.contact_pairs import have_closed_form
@@ -47,6 +48,20 @@ WIDEST_MECHANISM = 128  # rates up to which the mass matrix of a mechanism is de
 MOST_ROWS = (
     10  # loop constraints of a linear model in straight-line code: 15, of a Stewart platform, take minutes to compile
 )
+
+
+def refuse_motionless(system: System, what: str):
+    """Raise a SimulationError for a system in which nothing can move, which leaves nothing to do.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    what : str
+        Function that was called.
+    """
+    if not system.n_v:
+        raise SimulationError(f"{what}: nothing in scene {system.scene.name!r} can move; give a joint that moves.")
 
 
 def is_large(system) -> bool:

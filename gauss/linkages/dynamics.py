@@ -17,6 +17,7 @@ from gauss.linkages.elements import CrankMotor
 from gauss.linkages.kernels import reduced_kernel
 from gauss.linkages.motion import move
 from gauss.linkages.reduced import inertia_terms
+from gauss.scene.values import evaluated
 from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 DEFAULT_ATOL = 1e-12  # rad, and relative to the speed of the drive
@@ -152,6 +153,8 @@ def run(
 
     Raises
     ------
+    SceneError
+        If the law of the motor raises, or returns no finite number; the message has the time.
     SimulationError
         If the crank reaches an angle at which the linkage does not close, or the integrator fails.
     KeyboardInterrupt
@@ -179,8 +182,11 @@ def run(
     fastest = max(abs(float(speed)), abs(chain.driver.speed)) or 1.0 / duration
     absolute = [DEFAULT_ATOL, DEFAULT_ATOL * fastest] if atol is None else atol
 
+    def torque(t, angle, speed):
+        return float(evaluated(motor, (t, angle, speed), f"{chain.name}: motor", 1)[0])
+
     def rates(t, y):
-        return [y[1], equation.acceleration(y[0], y[1], motor(t, y[0], y[1]))]
+        return [y[1], equation.acceleration(y[0], y[1], torque(t, y[0], y[1]))]
 
     options = {"rtol": rtol, "atol": absolute, "largest": np.inf if step is None else float(step)}
     switches = NO_TIMES if isinstance(motor, CrankMotor) else motor_times(motor, start, duration, breaks)
@@ -191,7 +197,7 @@ def run(
     if not isinstance(motor, CrankMotor):
         _warn_of_motor(chain, switches, found, duration)
     angles, speeds = found.y.T.copy()
-    torques = np.array([motor(*state) for state in zip(found.t, angles, speeds, strict=True)], dtype=float)
+    torques = np.array([torque(*state) for state in zip(found.t, angles, speeds, strict=True)], dtype=float)
     accelerations = [equation.acceleration(*state) for state in zip(angles, speeds, torques, strict=True)]
     made = CrankRun(found.t, angles, speeds, np.array(accelerations), torques)
     if found.interruption is not None:

@@ -21,6 +21,7 @@ from gauss.simulation.step_limits import (
     LEAST_RESTART_STEP,
     PROGRESS_TRIALS,
     SLIDING_CROSSINGS,
+    lasting,
     steps_per_check,
 )
 
@@ -86,7 +87,7 @@ class CompiledAdaptiveRun(CompiledRun):
         if self.held is not None:
             self.inputs = self.held.at(0, self.start.t, self.start.q.copy(), self.start.v.copy())
         begun = self._started(self.start.t, self.start.q, self.start.v)
-        control.h = float(begun[-1])
+        control.h = lasting(float(begun[-1]), control.smallest)
         self._begin(begun[:size], begun[size:-1])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size

@@ -75,7 +75,7 @@ class _Pieces:
 
     def __init__(self, problem: Problem, drive: Drive, modes: ConstraintModes):
         self.problem, self.drive, self.modes = problem, drive, modes
-        self.watch: Kernel | None = constraint_watch(problem.system)
+        self.watch: Kernel | None = constraint_watch(modes.system)
         self.parts: list[ModeMotion] = []
         self.events: list[Event] = []
         self.shortest = SHORTEST * (problem.end - problem.start.t)

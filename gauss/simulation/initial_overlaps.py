@@ -1,6 +1,7 @@
 """Initial states without overlaps of shapes."""
 
 from gauss.arguments import named_arguments
+from gauss.dynamics.conditions import refuse_motionless
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.overlap_resolution import resolved
 from gauss.errors import require
@@ -27,7 +28,10 @@ def resolve_overlaps(system: System, state: State | None = None) -> State:
     ------
     StateError
         If none is found: joints, or other shapes, keep some shapes in each other.
+    SimulationError
+        If nothing can move.
     """
     require(system, (System,), "resolve_overlaps")
+    refuse_motionless(system, "resolve_overlaps")
     stepper = new_contact_stepper(system, True)
     return resolved(stepper, system.initial_state() if state is None else system.projected(state))

@@ -21,7 +21,7 @@ from gauss.simulation.compiled_runs import adaptive_run
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.problem import Problem
 from gauss.simulation.simulate import simulate
-from gauss.simulation.step_limits import BUDGET
+from gauss.simulation.step_limits import BUDGET, lasting
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
 
@@ -140,7 +140,8 @@ class PreparedMotion:
         self._first.call(*self._start_arguments)
         self._confirmed[:], self._numbers[:] = self._point, self._settings
         error, _, control.kinetic, potential, control.initial, control.magnitude, control.h = checked.tolist()
-        control.lowest = control.highest = potential
+        control.lowest, control.h = potential, lasting(control.h, control.smallest)
+        control.highest = potential
         if not error <= ACCELERATION_TOLERANCE:
             return False
         if self._begins:

@@ -35,6 +35,7 @@ from gauss.simulation.step_limits import (
     PROGRESS_TRIALS,
     SLIDING_CROSSINGS,
     SMALLEST_STEP,
+    lasting,
     smallest_step,
     too_small,
 )
@@ -104,7 +105,8 @@ class PythonRun:
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted points of adaptive steps and of switching times, with dense output."""
-        h, duration = self._first_step(method, point), self.end - point.state.t
+        duration = self.end - point.state.t
+        h = lasting(self._first_step(method, point), smallest_step(duration, self.end))
         for before, after in self.switching.times.stops(point.state.t, self.end):
             for reached, following, dense in self._until(method, point, h, before, duration):
                 point, h = reached, following

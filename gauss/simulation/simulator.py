@@ -30,9 +30,10 @@ from gauss.simulation.held_inputs import HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
+from gauss.simulation.passed_switching import StepsAhead
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.tolerances import check_tolerances, checked_count
-from gauss.simulation.undetected_switching import refuse_jumps, warn_of_short_features, warn_of_undetected
+from gauss.simulation.undetected_switching import warn_of_undetected
 from gauss.system import State, System, retract
 
 FAILURES = {
@@ -70,7 +71,8 @@ class SimulatorState(NamedTuple):
 class Simulator:
     """Motion of a scene in fixed steps, one call after the other.
 
-    Steps do not end where laws switch, and say so where they may have passed over it; prescribed velocities must not jump.
+    Steps do not end where laws switch: a warning names the first feature of a law of time that is shorter than the steps, or
+    the first jump, and laws of the state that may have switched undetected; prescribed velocities must not jump.
     Opaque laws are called by the machine code of the steps; nothing is known of them between its calls.
 
     Parameters
@@ -97,8 +99,8 @@ class Simulator:
     Raises
     ------
     SimulationError
-        If the method has no fixed step, if the steps are not compiled, with the reasons, or if a prescribed motion jumps
-        within the first ten thousand steps.
+        If the method has no fixed step, if the steps are not compiled, with the reasons, or if a prescribed motion jumps;
+        after ten thousand steps, the step that comes near such a jump says it.
 
     Examples
     --------
@@ -132,8 +134,8 @@ class Simulator:
             if (plan.driver, plan.dynamics) not in STEPS:
                 why = "; ".join(map(str, plan.rejected)) or "nothing in it can move"
                 raise SimulationError(f"steps of {whole.name!r} are not compiled: {why}.")
-            refuse_jumps(self.system, problem.start, self.step_size)
-            warn_of_short_features(whole.name, problem.laws, self.step_size)
+            self._ahead = StepsAhead(self.system, problem.laws, self.step_size)
+            self._ahead.look(problem.start, problem.start.t + self.step_size)
             problem = problem._replace(switching=Switching())
             run: CompiledFixedRun | PairKernelSteps
             run = PairKernelSteps(problem) if plan.dynamics == "pair kernels" else fixed_run(problem, plan.dynamics)
@@ -201,6 +203,7 @@ class Simulator:
         self._point[:] = run.begun(start)
         self._confirmed[:] = self._point
         self._begun, self._steps = float(self._point[0]), 0
+        self._seen = self._ahead.seen_from(self._begun)
         run.control.steps = run.control.status = run.control.unseen = 0.0
         self._warned = False
         return self.state
@@ -219,13 +222,14 @@ class Simulator:
         Warns
         -----
         SwitchingWarning
-            Once for each motion, if a law of the state may have switched undetected within a step.
+            Once for each motion, if a law of the state may have switched undetected within a step; every ten thousand
+            steps, if a law of time jumps, or has a feature shorter than the step, in the next ones.
 
         Raises
         ------
         SimulationError
-            If a value is not finite, or a step fails; the message says why. After a failed step the state is that before
-            it.
+            If a value is not finite, a prescribed motion jumps, or a step fails; the message says why. After a failed step
+            the state is that before it.
         """
         if u is not None:
             self._set(u)
@@ -235,6 +239,8 @@ class Simulator:
         else:
             self._plan_steps(n)
         try:
+            if self._steps > self._seen:
+                self._look_ahead()
             self._loop.call(*self._given, n)
         except BaseException:  # of an opaque law: the point is that before
             self._steps -= n
@@ -243,6 +249,11 @@ class Simulator:
             self._recover(n)
         if self._switches and self._run.control.unseen:
             self._warn_of_switching()
+
+    def _look_ahead(self):
+        """Look for switching of laws of time in steps that are to be made, and beyond them."""
+        self._ahead.look(self.state, self._begun + self._steps * self.step_size)
+        self._seen = self._ahead.seen_from(self._begun)
 
     def _warn_of_switching(self):
         """Warn of a law of the state that may have switched undetected within a step, once for each motion."""
@@ -342,6 +353,7 @@ class Simulator:
         self._point[:] = point
         ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
         self._begun, self._steps = snapshot.begun, snapshot.steps
+        self._seen = self._ahead.seen_from(self._begun)
         self._run.take(snapshot.contacts)
 
 

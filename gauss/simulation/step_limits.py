@@ -3,6 +3,7 @@
 from math import ulp
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it rounding of time dominates
+FIRST_STEPS = 10.0  # smallest steps in a first one: error control may reduce it
 LEAST_RESTART_STEP = 1e-6  # relative to the duration: least first step after a switching time; error control reduces it
 PROGRESS_TRIALS = 500  # trial steps over which progress is measured
 CHATTERING_PROGRESS = 1e-7  # relative to the duration, per PROGRESS_TRIALS, below which a law chatters
@@ -14,6 +15,11 @@ EVALUATIONS_PER_CHECK = 48  # a check costs as much as two and a half evaluation
 def smallest_step(duration: float, end: float) -> float:
     """Smallest step of a motion [s]: large enough to change the time."""
     return max(SMALLEST_STEP * duration, ulp(max(abs(end - duration), abs(end))))
+
+
+def lasting(h: float, smallest: float) -> float:
+    """First step of a length, or a longer one [s]: at rest it follows from the scene alone, whatever the duration."""
+    return max(h, FIRST_STEPS * smallest)
 
 
 def too_small(t: float, rtol: float, laws: tuple[str, ...]) -> str:

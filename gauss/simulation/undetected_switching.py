@@ -10,12 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.dynamics.laws.constraint_modes import refuse_surfaces
-from gauss.dynamics.laws.prescribed_jumps import prescribed_jumps
-from gauss.dynamics.laws.switching import prescribed_times
-from gauss.dynamics.laws.switching_times import Timetable, timetable
-from gauss.dynamics.laws.traced_laws import Laws
-from gauss.errors import SimulationError, SwitchingWarning, user_level
+from gauss.dynamics.laws.switching_times import Timetable
+from gauss.errors import SwitchingWarning, user_level
 from gauss.integrators import FixedStep, Integrator, Library, Rates
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
@@ -25,8 +21,6 @@ SHIFTS = -1e-4, 0.0, 1e-4  # of the samples of a difference for y', relative to 
 LARGEST_DEFECT = 1e5  # over the tolerance
 REJECTED_SHARE = 0.5  # of a step with a larger defect that is tried next
 RESOLVED_STEP = 1e-6  # relative to the duration: the defect of shorter steps is not sampled
-HORIZON = 10_000  # steps of a stepping object, which has no end, in which features of laws of time are looked for
-RESOLVING_STEPS = 2.0  # steps that a feature of a law of time must last
 SPARSE_STEP = 0.01  # relative to the duration: longer steps with opaque laws may miss short features
 
 
@@ -129,55 +123,6 @@ def warn_of_times(system: System, times: Timetable):
     """
     for text in times.limitations:
         warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
-
-
-def warn_of_short_features(scene: str, laws: Laws, step: float):
-    """Warn of laws of time with features shorter than the steps of a stepping object, whose steps do not end at them.
-
-    Parameters
-    ----------
-    scene : str
-        Name of the scene.
-    laws : Laws
-        Its loads.
-    step : float
-        Step [s].
-
-    Warns
-    -----
-    SwitchingWarning
-        With the scene, the time of the first such feature, and a remedy.
-    """
-    if laws.motion is None or not laws.outputs:
-        return
-    end = HORIZON * step
-    times = timetable(laws.outputs, laws.motion.state.t, 0.0, end)
-    short = times.switches[:-1][np.diff(times.switches) < RESOLVING_STEPS * step]
-    if short.size or times.unresolved(0.0, end, step):
-        first = f" at t = {short[0]:.6g} s" if short.size else ""
-        text = f"steps of {step:g} s pass over a feature of a law of time{first}"
-        warnings.warn(
-            f"{scene!r}: {text}; shorten the step, or use gauss.simulate.", SwitchingWarning, stacklevel=user_level()
-        )
-
-
-def refuse_jumps(system: System, start: State, step: float):
-    """Refuse prescribed motions that jump within the first steps of a stepping object, whose steps do not end there.
-
-    Raises
-    ------
-    SimulationError
-        If a prescribed position or velocity jumps, or a constraint does at a condition on the state.
-    """
-    refuse_surfaces(system, "a motion in fixed steps of one call each")
-    end = HORIZON * step
-    prescribed = prescribed_times(system.relations, start.t, end)
-    last = prescribed.last_end(start.t, end)
-    jumps = prescribed_jumps(system, start, end, [*prescribed.stops(start.t, end), (last, end)])
-    if jumps:
-        raise SimulationError(
-            f"prescribed velocities of {system.scene.name!r} jump at t = {jumps.times[0]:.6g} s; use gauss.simulate."
-        )
 
 
 def warn_of_passages(system: System, unseen: np.ndarray, method: str):

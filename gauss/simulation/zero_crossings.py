@@ -6,7 +6,7 @@ from numbers import Real
 import numpy as np
 
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.errors import SimulationError
+from gauss.errors import GaussError, SimulationError
 from gauss.simulation.brent import brent
 from gauss.simulation.simulate import simulate
 from gauss.simulation.tolerances import shares_of_scale
@@ -39,7 +39,7 @@ def crossings(trajectory: Trajectory, function: Callable[[Kinematics], float], *
     Raises
     ------
     SimulationError
-        If ``direction`` is none of these, or a value of the function is not finite.
+        If ``direction`` is none of these, or the function raises or gives no finite number.
     """
     if direction not in (-1, 0, 1):
         raise SimulationError(f"direction: expected -1, 0 or 1, got {direction!r}.")
@@ -77,7 +77,14 @@ def _between(system, function, begin: State, end: State) -> State:
 
 
 def _value(function, motion: Kinematics) -> float:
-    value = function(motion)
+    try:
+        value = function(motion)
+    except GaussError:
+        raise
+    except Exception as error:  # whatever a function of the user raises
+        t = motion.state.t
+        text = f"crossings: at t = {t:.6g} s its function raised {type(error).__name__}: {error}"
+        raise SimulationError(text) from error
     if not isinstance(value, Real) or not np.isfinite(float(value)):
         raise SimulationError(f"crossings: at t = {motion.state.t:.6g} s its function gave {value!r}; expected a number.")
     return float(value)

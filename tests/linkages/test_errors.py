@@ -302,3 +302,20 @@ def test_any_link_and_joint_is_sound_or_refused(mass, inertia, com, at, angle):
     except GaussError:
         return
     assert np.isfinite([link.mass, link.inertia, *link.com, *joint.at, joint.angle]).all()
+
+
+WRONG_MOTORS = {
+    "raises": lambda t, angle, speed: {}[t],
+    "None": lambda t, angle, speed: None,
+    "text": lambda t, angle, speed: "x",
+    "two": lambda t, angle, speed: [1.0, 2.0],
+    "not finite later": lambda t, angle, speed: np.nan if t > 0.05 else 1.0,
+    "None later": lambda t, angle, speed: None if t > 0.05 else 1.0,
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_MOTORS)
+def test_a_motor_without_a_torque_is_named(wrong):
+    chain = gauss.load_linkage("four_bar").chain
+    with pytest.raises(gauss.GaussError, match=r"four-bar: motor: at t = .* s its law"):
+        gauss.linkages.run(chain, WRONG_MOTORS[wrong], 0.1)

@@ -193,6 +193,16 @@ def test_a_start_where_a_law_raises_is_refused():
         simulator.reset(gauss.State(0.0, np.array([0.5, 0.0]), np.zeros(2)))
 
 
+@pytest.mark.parametrize("method", [{"integrator": "time_stepping", "step": STEP}, {"integrator": "rk4", "step": STEP}, {}])
+@pytest.mark.parametrize("failed", [lambda t: [][0], lambda t: None, lambda t: "x", lambda t: 1j])
+def test_a_law_that_fails_at_the_start_is_named(failed, method):
+    scene = gauss.load("pendulum")
+    scene.drive("A", torque=failed, name="broken")
+    with pytest.raises(SimulationError, match=r"drive 'broken': at t = 0 s its law") as caught:
+        gauss.simulate(scene, DURATION, progress=False, **method)
+    assert len(caught.value.trajectory.t) == 1
+
+
 def test_forces_of_joints_beside_opaque_laws_come_from_reactions():
     opaque, _ = systems("four_bar")
     opaque.scene.output("pull", "joint_force", next(iter(opaque.scene.joints)))

@@ -174,3 +174,59 @@ def test_rows_that_vanish_in_a_mode_are_dropped_there():
     scene.start("Z", rate=0.5 * SPEED)
     found = gauss.simulate(scene, 1.0, times=[1.0])
     np.testing.assert_allclose(found.q[-1], [SPEED, 0.5 * SPEED], atol=ROUNDING)
+
+
+def _two_wheels(residual, rate=1.0):
+    """Wheels on the ground, the second one bound to the first by a residual of both angles."""
+    scene = gauss.Scene("wheels", gravity=(0, 0, 0))
+    for name, speed in (("A", 1.0), ("B", rate)):
+        scene.body(name, 1.0, (0.1, 0.1, 0.1))
+        scene.revolute(name, "ground", name, axis=(0, 0, 1))
+        scene.start(name, rate=speed)
+    scene.constrain("bound", position=lambda at: residual(at.coordinate("A"), at.coordinate("B")))
+    return scene
+
+
+def _wrapped(angle):
+    return gm.atan2(gm.sin(angle), gm.cos(angle))
+
+
+# residuals that jump by 2π where an angle does, with the rate of the second wheel
+CUT = {
+    "one angle": (lambda a, b: b - _wrapped(a), 1.0),
+    "half of it": (lambda a, b: b - 0.5 * _wrapped(a), 0.5),
+    "of numpy": (lambda a, b: b - np.arctan2(np.sin(a), np.cos(a)), 1.0),
+    "within a function": (lambda a, b: gm.sin(0.25 * _wrapped(a)) - gm.sin(0.25 * b), 1.0),
+    "one within another": (lambda a, b: b - _wrapped(_wrapped(a)), 1.0),
+}
+# residuals whose cuts no state on the constraint meets
+UNCUT = {
+    "difference": (lambda a, b: _wrapped(b - a), 1.0),
+    "half plane": (lambda a, b: b - a + gm.atan2(gm.sin(a), 2.0 + gm.cos(a)) - gm.atan2(gm.sin(b), 2.0 + gm.cos(b)), 1.0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", [{}, {"integrator": "rk4", "step": 0.01}, {"integrator": "time_stepping", "step": 0.01}])
+@pytest.mark.parametrize("name", CUT)
+def test_a_branch_cut_that_the_motion_meets_is_refused(name, method):
+    with pytest.raises(SimulationError, match=r"'bound': what it prescribes jumps by .* at t = 3\.14159") as caught:
+        gauss.simulate(_two_wheels(*CUT[name]), 8.0, progress=False, **method)
+    assert caught.value.trajectory.q[-1, 0] == pytest.approx(np.pi, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CUT)
+def test_a_branch_cut_is_refused_where_it_is_not_located(name):
+    with pytest.raises(SimulationError, match="'bound' jumps by"):
+        gauss.Simulator(_two_wheels(*CUT[name]), 0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", UNCUT)
+def test_a_branch_cut_away_from_the_constraint_is_none(name):
+    scene = _two_wheels(*UNCUT[name])
+    assert gauss.simulate(scene, 8.0, progress=False).q[-1] == pytest.approx([8.0, 8.0], abs=ROUNDING)
+    simulator = gauss.Simulator(scene, 0.01)
+    simulator.step(n=800)
+    assert simulator.coordinates[0] == pytest.approx([8.0, 8.0], abs=ROUNDING)

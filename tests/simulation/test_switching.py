@@ -151,3 +151,19 @@ def test_profiles_from_the_command_line(tmp_path, name):
         result = CliRunner().invoke(cli.app, [str(argument) for argument in called])
         assert result.exit_code == 0, result.output
         assert np.load(motion)["v"][-1, 0] == pytest.approx(expected, rel=1e-6, abs=1e-9)  # rk4 is of order 4
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-3, 1.0, 1e5, 1e9])
+@pytest.mark.parametrize("method", [{}, {"integrator": "radau5", "rtol": 1e-9}, {"integrator": "rk4", "step": 0.01}])
+def test_times_may_have_any_unit(method, unit):
+    """Nothing acts at the start, so that the scene has no time of its own: in units of the duration the motion is one."""
+    force = 10.0 / unit**2
+    options = method | {"step": 0.01 * unit} if "step" in method else method
+    for law in (
+        lambda t: force if 0.5 * unit <= t < 0.6 * unit else 0.0,
+        lambda t: gm.where(float(t) > 0.5 * unit, force, 0.0),
+    ):
+        system = slider(law)
+        place, rate = moved(system, unit, **options)
+        expected = (0.45, 1.0) if law(0.7 * unit) == 0.0 else (1.25, 5.0)
+        assert (place, rate * unit) == pytest.approx(expected, rel=1e-8)

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.analysis.user_functions import numbers_of
 from gauss.codegen import Graph, Kernel, forward, reverse, write
-from gauss.errors import ArgumentError
 
 
 class CostDerivatives:
@@ -28,12 +28,7 @@ class CostDerivatives:
 
     def __init__(self, function: Callable, sizes: tuple[int, ...], what: str):
         def values(*given):
-            try:
-                found = np.ravel(np.asarray(function(*given), dtype=object))
-            except TypeError as error:
-                raise ArgumentError(f"{what} cannot be traced: {error}") from None
-            if found.size != 1:
-                raise ArgumentError(f"{what}: expected a function to a number, got {found!r}.")
+            found = numbers_of(function, given, what, 1)
             by = np.concatenate(given[1:])
             graph: Graph = by[0].graph
             total = graph.lift(found[0])

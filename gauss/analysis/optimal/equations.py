@@ -14,13 +14,14 @@ import numpy as np
 from scipy.linalg import qr
 
 from gauss.analysis.tangents import RANK_TOLERANCE, constraint_residuals
+from gauss.analysis.user_functions import numbers_of
 from gauss.codegen import write
 from gauss.dynamics import compile_scene
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
-from gauss.errors import ArgumentError, SimulationError, extra
+from gauss.errors import SimulationError, extra
 from gauss.export.casadi_function import casadi_function
 from gauss.export.exported_function import ExportedFunction, Shape, without_calls
 from gauss.system import BoundLoad, State, System, coordinate_rates
@@ -111,13 +112,7 @@ class OptimalEquations:
         """(t, x, u) → cost per time, of a function of (t, q, v, u)."""
 
         def values(t, q, v, u):
-            try:
-                found = np.ravel(np.asarray(cost(t[0], q, v, u), dtype=object))
-            except TypeError as error:
-                raise ArgumentError(f"optimal motion: cost cannot be traced: {error}") from None
-            if found.size != 1:
-                raise ArgumentError(f"optimal motion: cost: expected a function of (t, q, v, u) to a number, got {found!r}.")
-            return found
+            return numbers_of(cost, (t[0], q, v, u), "optimal motion: cost", 1)
 
         return self._in_units(values, "cost")
 
@@ -137,14 +132,7 @@ class OptimalEquations:
         """
 
         def values(t, q, v, u):
-            try:
-                given = function(q, v)
-                found = np.hstack(list(given) if isinstance(given, tuple | list) else [given])
-            except (TypeError, ValueError) as error:
-                raise ArgumentError(f"optimal motion: {what} cannot be traced: {error}") from None
-            if size is not None and found.size != size:
-                raise ArgumentError(f"optimal motion: {what}: expected {size} numbers of (q, v), got {found.size}.")
-            return found
+            return numbers_of(function, (q, v), f"optimal motion: {what}", size)
 
         return self._in_units(values, what, units)
 

@@ -20,6 +20,7 @@ from gauss.dynamics import compile_scene
 from gauss.dynamics.motion_step import MotionStep
 from gauss.errors import ArgumentError, SimulationError, judged_later, require
 from gauss.scene import Scene
+from gauss.simulation.passed_switching import examine_steps
 from gauss.simulation.tolerances import check_tolerances
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
@@ -139,13 +140,18 @@ def ilqr(
     FeedbackMotion
         States, inputs, gains and cost. It is a local optimum, near the guess.
 
+    Warns
+    -----
+    SwitchingWarning
+        If a law of time jumps, or has a feature shorter than the steps.
+
     Raises
     ------
     ArgumentError
         If an argument does not fit, or a cost cannot be traced.
     SimulationError
-        If the scene has no inputs or no smooth dynamics, if the first motion is not finite, if the cost is not convex in the
-        inputs, or if the iterations do not suffice.
+        If the scene has no inputs or no smooth dynamics, if a prescribed motion jumps, if the first motion is not finite,
+        if the cost is not convex in the inputs, or if the iterations do not suffice.
 
     Examples
     --------
@@ -191,6 +197,7 @@ class _Ilqr:
         require(self.start, (State,), "ilqr: start")
         self.step, self.second_order = CurvedStep(unlimited(system), integrator), second_order
         self.t = self.start.t + step * np.arange(self.count + 1)
+        examine_steps(system, self.step.laws, self.start, float(self.t[-1]), step, "let laws of time be smooth")
         bounds = np.array([given.bounds for given in system.scene.inputs.values()])
         self.low, self.high, self.n_u, self.n_x = bounds[:, 0], bounds[:, 1], len(bounds), system.n_q + system.n_v
         for name, one in (("cost", cost), ("final", final)):

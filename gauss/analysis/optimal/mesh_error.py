@@ -10,11 +10,13 @@ import numpy as np
 
 from gauss.analysis.optimal.equations import OptimalEquations
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.dynamics.laws.switching_times import APART
 from gauss.dynamics.motion_step import MotionStep
 from gauss.integrators import Rates
 from gauss.system import State
 
 SUBSTEPS = 16  # of an interval: the error of order 4 is 65 000 times smaller than with one step
+MARGIN = 4.0 * APART  # relative to the times: no evaluation falls upon a switching time at an end of the interval
 
 
 class LinearInputStep(MotionStep):
@@ -40,9 +42,10 @@ class LinearInputStep(MotionStep):
 
     def interval(self, t: float, h: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """(q, v) at the end of an interval, from inputs u (2, n_u) at its ends."""
-        given, step = np.concatenate([[t], u[0], (u[1] - u[0]) / h]), h / SUBSTEPS
+        given, margin = np.concatenate([[t], u[0], (u[1] - u[0]) / h]), MARGIN * max(abs(t), abs(t + h))
+        begin, step = t + margin, (h - 2.0 * margin) / SUBSTEPS
         for k in range(SUBSTEPS):
-            x = self.move(np.concatenate([[t + k * step, step], x, given]))
+            x = self.move(np.concatenate([[begin + k * step, step], x, given]))
         return x
 
 

@@ -16,6 +16,7 @@ from gauss.analysis.optimal.conditions import (
 from gauss.analysis.optimal.equations import OptimalEquations
 from gauss.analysis.optimal.guess import first_guess
 from gauss.analysis.optimal.infeasible import refuse
+from gauss.analysis.optimal.law_mesh import law_mesh, warn_of_passed
 from gauss.analysis.optimal.mesh_error import MeshError, refined
 from gauss.analysis.optimal.result import OptimalMotion
 from gauss.analysis.optimal.transcription import MotionProblem, Solved, Transcription
@@ -96,6 +97,11 @@ def optimal_motion(
     OptimalMotion
         States, inputs, cost, and errors. It is a local optimum, near the guess.
 
+    Warns
+    -----
+    SwitchingWarning
+        If a law of time has a feature that passes between the points of the mesh.
+
     Raises
     ------
     MissingPackageError
@@ -103,8 +109,8 @@ def optimal_motion(
     ArgumentError, StateError
         If a name or a value does not fit, or is beyond its limits.
     SimulationError
-        If the scene has no inputs or is not smooth; if no motion meets the conditions, with those that are missed; or if the
-        iterations or refinements do not suffice.
+        If the scene has no inputs or is not smooth; if a prescribed motion jumps; if no motion meets the conditions, with
+        those that are missed; or if the iterations or refinements do not suffice.
 
     Examples
     --------
@@ -132,7 +138,7 @@ def optimal_motion(
     ends = first.conditions, last.conditions, shift
     impact = after, meets, meeting
     problem = MotionProblem(equations, law, first.guess.t, span, *ends, bounds, order // 2, iterations, *impact)
-    mesh = np.linspace(0.0, 1.0, intervals + 1)
+    mesh = law_mesh(system, first.guess, span, intervals)
     turning = {entry for place in system.quaternions.values() for entry in range(place.start, place.stop)}
     fixed = [one.place for one in (*last.conditions, *shift) if one.is_fixed]
     led = [place for place in fixed if place < system.n_q and place not in turning]
@@ -166,6 +172,7 @@ def _on_refined_meshes(system: System, problem: MotionProblem, guess, tolerance:
         errors = error.of_intervals(t, x, u)
         meshes.append((len(u), float(errors.max())))
         if errors.max() <= tolerance:
+            warn_of_passed(system, State(float(t[0]), *np.split(x[0], [system.n_q])), t)
             simulated = np.abs((error.simulated(t, x[0], u) - x) / equations.units).max()
             q, v = np.split(x, [system.n_q], axis=1)
             accuracy = solved.kkt, solved.residual, float(errors.max()), float(simulated), iterations, tuple(meshes)

@@ -69,8 +69,9 @@ class DifferentiableMotion:
         self.system = compile_scene(system) if isinstance(system, Scene) else system
         self.settings = {"duration": duration, "step": step, "parameters": (), "integrator": integrator}
         first = Motion(self.system, state=None, inputs=None, **self.settings)
-        self.steps, self.n_u, self.t, self.h = first.steps, first.inputs.shape[1], first.t, step
+        self.steps, self.n_u = first.steps, first.inputs.shape[1]
         self.smooth: MotionStep | None = None if self.system.scene.nonsmooth else first.step
+        self.groups = [] if self.smooth is None else first.groups
 
     def run(self, q: np.ndarray, v: np.ndarray, inputs: np.ndarray) -> tuple[np.ndarray, list[list]]:
         """States (steps + 1, n_q + n_v) of a motion, and its linear maps by step."""
@@ -80,7 +81,7 @@ class DifferentiableMotion:
             state = replace(self.system.initial_state(), q=q, v=v)
             motion = Motion(self.system, state=state, inputs=inputs, **self.settings)
             return motion.x, motion.pieces
-        return smooth_motion(self.smooth, self.t, self.h, np.concatenate([q, v]), inputs)
+        return smooth_motion(self.smooth, self.groups, np.concatenate([q, v]), inputs)
 
     def value(self, q: np.ndarray, v: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """States (steps + 1, n_q + n_v) of a motion."""

@@ -17,9 +17,12 @@ from gauss.analysis.sensitivity.event_parameters import (
 from gauss.analysis.sensitivity.law_jumps import warn_of_jumps
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
 from gauss.analysis.sensitivity.saltation import Transition
+from gauss.analysis.sensitivity.timed_steps import SHORTEST, timed_steps
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import name_list, real_array
 from gauss.dynamics import compile_scene
+from gauss.dynamics.laws.switching import timed_switching
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import loop_residual
 from gauss.dynamics.motion_step import MotionStep
 from gauss.dynamics.parameter_terms import OF_JOINTS
@@ -29,7 +32,6 @@ from gauss.simulation.tolerances import check_tolerances
 from gauss.system import State, System, coordinate_rates
 
 WHOLE = 1e-9  # share of a step by which the duration may differ from a whole number of steps
-SHORTEST = 1e-13  # of a step: what is left between an event and a node is rounding
 
 
 class Piece(Protocol):
@@ -71,13 +73,17 @@ class SmoothStep:
         return self.step.gradient(self.t, self.h, self.x, self.u, weights)
 
 
-def smooth_motion(step: MotionStep, t, h: float, start: np.ndarray, inputs) -> tuple[np.ndarray, list[list[Piece]]]:
-    """States (k, n_x) of equal steps h [s] from the times t (k,), and their linear maps."""
-    x = np.empty((len(inputs) + 1, start.size))
-    x[0] = start
-    for k, u in enumerate(inputs):
-        x[k + 1] = step.after(t[k], h, x[k], u)
-    return x, [[SmoothStep(step, t[k], h, x[k], u)] for k, u in enumerate(inputs)]
+def smooth_motion(step: MotionStep, steps, start: np.ndarray, inputs) -> tuple[np.ndarray, list[list[Piece]]]:
+    """States (k + 1, n_x) after k groups of steps (begin, length) [s], and their linear maps."""
+    x, pieces = [start], list[list[Piece]]()
+    for group, u in zip(steps, inputs, strict=True):
+        made, now = list[Piece](), x[-1]
+        for t, h in group:
+            made.append(SmoothStep(step, t, h, now, u))
+            now = step.after(t, h, now, u)
+        x.append(now)
+        pieces.append(made)
+    return np.array(x), pieces
 
 
 class Motion:
@@ -94,7 +100,11 @@ class Motion:
         Its times and states.
     pieces : list of list of Piece
         Linear maps of each step, in order.
+    groups : list of list of (float, float)
+        Begin and length of the parts of each step, of a smooth motion [s].
     """
+
+    groups: list[list[tuple[float, float]]]
 
     def __init__(self, system, duration, step, state, inputs, parameters, integrator):
         require(system, (System, Scene), "sensitivities")
@@ -145,7 +155,8 @@ class Motion:
         """Equal steps of one smooth system."""
         self.step = MotionStep(self.system, self.integrator, self.parameters)
         self.pieces: list[list[Piece]]
-        self.x, self.pieces = smooth_motion(self.step, self.t, self.h, packed(self.start), self.inputs)
+        self.groups = timed_steps(self.system, self.step.laws, self.start, self.t, np.full(self.steps, self.h))
+        self.x, self.pieces = smooth_motion(self.step, self.groups, packed(self.start), self.inputs)
 
     def _through_events(self):
         """Steps that end at the nodes and at the events of the motion of :func:`gauss.simulate`."""
@@ -159,7 +170,9 @@ class Motion:
         made: dict[int, MotionStep] = {}
         steps = [self._step_of(one, made) for one in record]
         self.step = steps[0]
-        for k, (one, times) in enumerate(zip(record, phase_times(record, self.t), strict=True)):
+        timed = timed_switching(self.system, Laws(self.system), self.start, float(self.t[-1]))[0]
+        ends = np.unique([*self.t, *np.ravel(timed.stops(float(self.t[0]), float(self.t[-1])))])
+        for k, (one, times) in enumerate(zip(record, phase_times(record, ends), strict=True)):
             if k:
                 row = self._row(one.start.t)
                 between = Transition(self.system, record[k - 1], one, (steps[k - 1], steps[k]), self.inputs[row])
@@ -191,11 +204,11 @@ class Motion:
         """Smooth steps between the times of a phase."""
         x = packed(one.start)
         for begin, end in zip(times[:-1], times[1:], strict=True):
-            row = self._row(0.5 * (begin + end))
+            row, node = self._row(0.5 * (begin + end)), np.flatnonzero(self.t == end)
+            given = begin, end - begin, x, self.inputs[row]
             if end - begin > SHORTEST * self.h:
-                self.pieces[row].append(SmoothStep(step, begin, end - begin, x, self.inputs[row]))
-            node = np.flatnonzero(self.t == end)
-            x = self.x[node[0]] if node.size else x  # the end of a phase is no start of a step
+                self.pieces[row].append(SmoothStep(step, *given))
+            x = self.x[node[0]] if node.size else step.after(*given)
 
     def _row(self, t: float) -> int:
         """Number of the step in which a time lies."""

@@ -17,6 +17,7 @@ import numpy as np
 from gauss.codegen import Expression, Function, Graph, reachable, substitute
 from gauss.dynamics.gap_functions import stacked_rows
 from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.laws.branch_cuts import ON_CUT, TRIED, inlined, met_from, residuals, symbols_of, unfolded_system
 from gauss.dynamics.laws.switching_times import CONDITIONS, of_time
 from gauss.dynamics.projection import scalar_coordinates
 from gauss.dynamics.store import cached
@@ -63,14 +64,11 @@ class OneMode(Relation):
         return self._smooth(at, 1)
 
     def _smooth(self, at, part: int) -> list:
-        view = Symbols(at.system, Graph())  # of its own: the order of the conditions depends on nothing else
-        traced = _residuals(self.whole, view)
-        nodes = _conditions(traced, view)
-        smooth = substitute(traced[part], nodes, _values(nodes, self.mode))
-        bodies = [entry for b in view.bodies for entry in (*np.ravel(at.R[b]), *at.x[b], *at.W[b], *at.u[b])]
-        placed = [at.system.joints[j] for j in view.joints]
-        joints = [entry for joint in placed for entry in (*at.coordinates_of(joint), *at.rates_of(joint))]
-        return list(Function("mode", _symbols(view), list(smooth)).inlined(np.array([*bodies, *joints, at.t], dtype=object)))
+        def smooth(traced, view: Symbols):
+            nodes = _conditions(traced, view)
+            return substitute(traced[part], nodes, _values(nodes, self.mode))
+
+        return inlined(self.whole, at, smooth)
 
 
 class Step(NamedTuple):
@@ -107,7 +105,7 @@ class ConstraintModes:
         self.system, self.counts, self.ops, self.about = system, dict[str, int](), list[str](), list[str]()
         for name, relation in system.scene.relations.items():
             own = Symbols(system, Graph())
-            nodes = _conditions(_residuals(relation, own), own)
+            nodes = _conditions(residuals(relation, own), own)
             if not nodes or relation.loses:
                 continue
             self.counts[name] = len(nodes)
@@ -128,11 +126,11 @@ class ConstraintModes:
         view, sides = Symbols(self.system, Graph()), list[Expression | float]()
         for name, values in self._parts(mode).items():
             own = Symbols(self.system, Graph())
-            nodes = _conditions(_residuals(self.system.scene.relations[name], own), own)
+            nodes = _conditions(residuals(self.system.scene.relations[name], own), own)
             found = [node.operands[0] if node.op == "floor" else node.operands[0] - node.operands[1] for node in nodes]
             if mode is not None:
                 found = list(substitute(found, nodes, _values(nodes, values)))
-            sides += list(Function("sides", _symbols(own), found).inlined(np.array(_same(own, view), dtype=object)))
+            sides += list(Function("sides", symbols_of(own), found).inlined(np.array(_same(own, view), dtype=object)))
         return bound_relations(view.graph, [], view.bodies, view.joints, sides)
 
     def _parts(self, mode: Mode | None) -> dict[str, Mode]:
@@ -214,6 +212,30 @@ class ConstraintModes:
                 steps[k] = step
         return steps, len(seen) < len(self.ops)
 
+    @cached_property
+    def meets_a_jump(self) -> bool:
+        """Whether a state that meets the constraints of one mode lies on a surface across which residuals jump."""
+        found = ((state, k, mode) for state, k, mode, _ in self._crossed() if k in self.steps)
+        return any(self._is_met(*one) for one in islice(found, TRIED))
+
+    def _is_met(self, state: State, k: int, mode: Mode) -> bool:
+        """Whether Newton's method finds a state on a surface that meets the constraints of a mode, from one near it."""
+        system = self.system_of(mode)
+
+        def residual(at: State) -> np.ndarray:
+            gap, _, size, _ = _terms(kinematics(system, at))
+            shares = np.divide(gap, size, out=np.zeros_like(gap), where=size > 0.0)
+            return np.append(shares, self.sides(at, mode)[k] / self.sizes[k])
+
+        try:
+            met = met_from(system, state, residual)
+            if met is None or (np.delete(self.margins(met, mode) + ON_CUT * self.sizes, k) < 0.0).any():
+                return False
+            step = self.step(met, mode, self.beyond(met, mode, (k,)))
+        except GaussError:
+            return False
+        return bool(step.position or step.velocity)
+
     def _lines(self) -> Iterator[Callable[[float], State]]:
         """Random lines through the configuration space: functions of a number in [−1, 1]."""
         system, rng = self.system, np.random.default_rng(0)
@@ -248,10 +270,13 @@ class ConstraintModes:
 
 def constraint_modes(system: System) -> ConstraintModes | None:
     """Modes of the constraints of a system that jump between them, or may; None where there are none."""
-    if not _has_conditions(system.relations):
-        return None
-    modes = cached(system, (ConstraintModes,), lambda: ConstraintModes(system))
-    return modes if modes and (modes.unknown or modes.steps) else None
+    own = _has_any(system.relations, CONDITIONS) and cached(system, (ConstraintModes,), lambda: ConstraintModes(system))
+    found = own if own and (own.unknown or own.steps) else None
+    unfolded = unfolded_system(system) if _has_any(system.relations, ("atan2",)) else None
+    if unfolded is None:
+        return found
+    modes = cached(unfolded, (ConstraintModes,), lambda: ConstraintModes(unfolded))
+    return modes if modes.steps and (found is not None and found.steps or modes.meets_a_jump) else found
 
 
 def refuse_surfaces(system: System, what: str):
@@ -267,14 +292,8 @@ def refuse_surfaces(system: System, what: str):
         )
 
 
-def _has_conditions(relations: Relations) -> bool:
-    return any(node.op in CONDITIONS for node in reachable(relations.function.outputs))
-
-
-def _residuals(relation: Relation, view: Symbols) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity residuals in symbols."""
-    parts = relation.positions(view), relation.velocities(view)
-    return tuple(np.array([*part, None], dtype=object)[:-1] for part in parts)  # type: ignore[return-value]
+def _has_any(relations: Relations, ops: tuple[str, ...]) -> bool:
+    return any(node.op in ops for node in reachable(relations.function.outputs))
 
 
 def _conditions(traced: tuple[np.ndarray, np.ndarray], view: Symbols) -> list[Expression]:
@@ -282,11 +301,6 @@ def _conditions(traced: tuple[np.ndarray, np.ndarray], view: Symbols) -> list[Ex
     outputs = [entry for part in traced for entry in part]
     timed = {node.index for node in of_time(outputs, view.t)}
     return [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
-
-
-def _symbols(view: Symbols) -> list[Expression]:
-    bodies = [symbol for parts in view.bodies.values() for part in parts for symbol in np.ravel(part)]
-    return [*bodies, *(symbol for parts in view.joints.values() for part in parts for symbol in part), view.t]
 
 
 def _same(own: Symbols, view: Symbols) -> list:

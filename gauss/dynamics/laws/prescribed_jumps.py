@@ -157,7 +157,7 @@ def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
     if not system.relations.asks_time:
         return NO_JUMPS
     here = kinematics(system, start)
-    somewhere = kinematics(system, _elsewhere(system, start))  # a generic state: rows may vanish at the start
+    somewhere = kinematics(system, generic_state(system, start))  # a generic state: rows may vanish at the start
     begun = start.t + APART * max(abs(start.t), abs(end))
     switching = [(start.t, begun), *((before, after) for before, after in stops if before < after)]
     sizes = _prescribed(here, [*np.linspace(start.t, end, LOOKS), *np.ravel(switching)])
@@ -226,7 +226,7 @@ def _prescribed(motion: Kinematics, times) -> np.ndarray:
     return np.array([np.ptp(found[:, 1], axis=0), np.abs(found[:, 0]).max(axis=0)])
 
 
-def _elsewhere(system: System, start: State) -> State:
+def generic_state(system: System, start: State) -> State:
     """Generic state, at which no row vanishes."""
     rng = np.random.default_rng(0)
     away, rates = rng.uniform(0.1, 0.2, system.n_v), rng.uniform(0.5, 1.0, system.n_v)

@@ -76,15 +76,9 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
         Further switching times [s].
     """
     begin, monotone = start.t, bool(system.scene.nonsmooth)  # release of contacts is checked at few times of a step
-    times = _given_times(system, breaks, begin, end)
-    if laws.motion is not None and laws.outputs:
-        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
-    prescribed = prescribed_times(system.relations, begin, end, monotone)
+    times, jumps = timed_switching(system, laws, start, end, breaks, monotone)
     timed = (system.contacts, system.set_valued) if has_own_gaps(system.scene) else (system.set_valued,)
-    unilateral = [prescribed_times(found, begin, end, monotone) for found in timed]
-    times = times.join(prescribed, *unilateral)
-    last = prescribed.last_end(begin, end)
-    jumps = prescribed_jumps(system, start, end, [*prescribed.stops(begin, end), (last, end)])
+    times = times.join(*(prescribed_times(found, begin, end, monotone) for found in timed))
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(_sampled(bound, laws, motion, begin, end) for bound in laws.called))
     times = times.join(*_limits(system, start, end))
@@ -94,6 +88,24 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
         return found
     peaks = watch.narrow if watch.may_be_narrow else None
     return found._replace(watch=watch.machine_code, conditional=watch.names, peaks=peaks)
+
+
+def timed_switching(
+    system: System, laws: Laws, start: State, end: float, breaks=(), monotone: bool = False
+) -> tuple[Timetable, Jumps]:
+    """Switching times and mesh of traced loads and of prescribed motions up to a time [s]; jumps of prescribed velocities.
+
+    Raises
+    ------
+    SimulationError
+        If a prescribed position jumps.
+    """
+    begin, prescribed = start.t, prescribed_times(system.relations, start.t, end, monotone)
+    times = _given_times(system, breaks, begin, end).join(prescribed)
+    if laws.motion is not None and laws.outputs:
+        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
+    last = prescribed.last_end(begin, end)
+    return times, prescribed_jumps(system, start, end, [*prescribed.stops(begin, end), (last, end)])
 
 
 def _sampled(bound: BoundLoad, laws: Laws, motion, begin: float, end: float) -> Timetable:

@@ -25,9 +25,10 @@ from gauss.simulation.batch.machine_code import STEPPED, batch_program, contact_
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.integrators import usual_fixed_step
+from gauss.simulation.passed_switching import StepsAhead
 from gauss.simulation.simulator import Simulator, SimulatorState, random_changes
 from gauss.simulation.tolerances import check_tolerances, checked_count
-from gauss.simulation.undetected_switching import refuse_jumps, warn_of_passages, warn_of_short_features
+from gauss.simulation.undetected_switching import warn_of_passages
 from gauss.system import State, System, retract
 
 
@@ -70,8 +71,8 @@ class SimulatorBatch:
     Raises
     ------
     SimulationError
-        If there is no such method, if the scene cannot be compiled, with the reasons, or if a prescribed motion jumps within
-        the first ten thousand steps.
+        If there is no such method, if the scene cannot be compiled, with the reasons, or if a prescribed motion jumps;
+        after ten thousand steps, the step that comes near such a jump says it.
 
     Examples
     --------
@@ -99,8 +100,8 @@ class SimulatorBatch:
         with one_tier():
             self._begin, self._measure = self._compiled(method)
         self._start, self._size = system.initial_state(), checked_count("batch", batch)
-        refuse_jumps(system, self._start, self.step_size)
-        warn_of_short_features(whole.name, Laws(system), self.step_size)
+        self._ahead = StepsAhead(system, Laws(system), self.step_size)
+        self._ahead.look(self._start, self._start.t + self.step_size)
         self._u = np.zeros((self._size, 1, len(self.inputs)))
         self._alone: Simulator | None = None
         self.reset()
@@ -208,16 +209,19 @@ class SimulatorBatch:
         Warns
         -----
         SwitchingWarning
-            Once between resets, if a law of the state may have switched undetected within a step.
+            Once between resets, if a law of the state may have switched undetected within a step; every ten thousand
+            steps, if a law of time jumps, or has a feature shorter than the step, in the next ones.
 
         Raises
         ------
         SimulationError
-            If a value is not finite, or a shape is wrong; nothing changes.
+            If a value is not finite, a shape is wrong, or a prescribed motion jumps; nothing changes.
         """
         n = checked_count("n", n)
         if u is not None:
             self._set(u)
+        if self._steps + n > self._ahead.seen_from(0.0):
+            self._ahead.look(self._start, (self._steps + n) * self.step_size)
         batch, before = self._batch, self._batch.points.copy() if self.system.nonsmooth else None
         batch.worst[:] = 0.0
         batch.advance(self._steps, n, self.step_size, self.threads, self._u if self.inputs else None)

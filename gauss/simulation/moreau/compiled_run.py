@@ -68,7 +68,9 @@ class CompiledMoreauRun(CompiledFixedRun):
         return found
 
     def _law_error(self) -> float:
-        """Largest residual of the laws of contact and friction so far."""
+        """Largest residual of the laws of contact and friction so far; a law that raises at the start leaves no point."""
+        if "point" not in vars(self):
+            return 0.0
         return float(method_state_of(self.layout.point(self.point))[self.forces + 1])
 
     @cached_property
