@@ -82,7 +82,7 @@ class OptimalEquations:
             mechanism = LoadedMechanism(system, self.loads(u), t[0], q, v, np.zeros(system.n_v))
             return coordinate_rates(system, q, v), mechanism.motion()[0]
 
-        return self._in_units(values, "rates", self.units)
+        return self.in_units(values, "rates", self.units)
 
     @cached_property
     def residuals(self) -> Casadi:
@@ -95,7 +95,7 @@ class OptimalEquations:
             self.n_positions = len(positions) + len(lengths)
             return np.array([*positions, *lengths, *rates], dtype=object)
 
-        return self._in_units(values, "residuals")
+        return self.in_units(values, "residuals")
 
     def independent_rows(self, t: float, x: np.ndarray) -> list[int]:
         """Rows of the residuals that are independent in a state, in shares of the units."""
@@ -119,7 +119,7 @@ class OptimalEquations:
                 raise ArgumentError(f"optimal motion: cost: expected a function of (t, q, v, u) to a number, got {found!r}.")
             return found
 
-        return self._in_units(values, "cost")
+        return self.in_units(values, "cost")
 
     def at_end(self, function: Callable, what: str, units=1.0, size: int | None = None) -> Casadi:
         """(t, x, u) → values of a function of (q, v), in shares of the units.
@@ -146,10 +146,10 @@ class OptimalEquations:
                 raise ArgumentError(f"optimal motion: {what}: expected {size} numbers of (q, v), got {found.size}.")
             return found
 
-        return self._in_units(values, what, units)
+        return self.in_units(values, what, units)
 
-    def _in_units(self, values: Callable, name: str, units=1.0) -> Casadi:
-        """Function of CasADi of (t, x, u) in shares, x and u, and the results, of their units."""
+    def in_units(self, values: Callable, name: str, units=1.0) -> Casadi:
+        """Function of CasADi of (t, x, u), shares of their units, of a traced function of (t, q, v, u); t is an array."""
         with extra("export"):
             import casadi
         system = self.system
