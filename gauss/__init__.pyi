@@ -72,7 +72,15 @@ from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.linear_modes import LinearModes
 from gauss.analysis.mode_motion import mode_motion
 from gauss.analysis.motion_fit import fit_motion
-from gauss.analysis.optimal import FeedbackMotion, OptimalMotion, ilqr, optimal_motion
+from gauss.analysis.optimal import (
+    FeedbackMotion,
+    HybridMotion,
+    MotionPhase,
+    OptimalMotion,
+    ilqr,
+    optimal_hybrid_motion,
+    optimal_motion,
+)
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
 from gauss.analysis.planned_path import plan_path
 from gauss.analysis.prepared_linear_model import prepare_linear_model
@@ -128,6 +136,7 @@ __all__ = [
     "Force",
     "Frame",
     "GaussError",
+    "HybridMotion",
     "Identification",
     "InverseKinematics",
     "Joint",
@@ -138,6 +147,7 @@ __all__ = [
     "Linkage",
     "MotionFit",
     "MotionGradient",
+    "MotionPhase",
     "OptimalMotion",
     "Plan",
     "PlannedMotion",
@@ -194,6 +204,7 @@ __all__ = [
     "mobility",
     "mode_motion",
     "motion_gradient",
+    "optimal_hybrid_motion",
     "optimal_motion",
     "paradoxes",
     "plan_motion",

@@ -6,7 +6,7 @@ freedoms, twice. Modes are eigenvectors of A (Schiehlen and Eberhard, Applied Dy
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -60,7 +60,7 @@ class LinearModel:
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    system: System
+    system: System = field(repr=False)  # as long as a scene
     state: State
     displacements: np.ndarray
     is_equilibrium: bool
@@ -138,7 +138,7 @@ class LinearModel:
         if not self.inputs:
             raise SimulationError("lqr: expected a model with inputs; name some in linearise, or by scene.input.")
         left = self.uncontrollable()
-        moving = left.eigenvalues.real > -MARGINAL * np.abs(self.eigenvalues).max(initial=0.0)
+        moving = left.eigenvalues.real >= -MARGINAL * np.abs(self.eigenvalues).max(initial=0.0)
         if moving.any():
             named = str(LinearModes(left.eigenvalues[moving], left.shapes[moving], left.coordinates))
             raise SimulationError(

@@ -38,10 +38,15 @@ def closed(system: System, state: State, held=()) -> tuple[State, bool]:
         if not longest <= LONGEST_STEP:
             break
         found = replace(found, q=retract(system, found.q, xi))
-        if longest <= CONVERGED:
-            return found, True
+        if longest <= CONVERGED:  # with all the coordinates of a row held there is no step, however far it is from being met
+            return found, _is_met(system, found)
     found = project_positions(system, state, POSITION_STEPS, held)
-    return found, relative(system, position_residual_of(system, found)) <= RESIDUAL_TOLERANCE
+    return found, _is_met(system, found)
+
+
+def _is_met(system: System, found: State) -> bool:
+    """Whether a pose meets the position constraints."""
+    return relative(system, position_residual_of(system, found)) <= RESIDUAL_TOLERANCE
 
 
 def with_rates(system: System, state: State, held=()) -> State:

@@ -20,8 +20,9 @@ from gauss.dynamics.linear_terms import LinearTerms
 from gauss.dynamics.outputs import measured
 from gauss.dynamics.plan import LINEAR_MODELS
 from gauss.dynamics.rules import Plan, Question
-from gauss.dynamics.state_functions import TracedFunction, compiled, error_limits, error_measures, traced_loads
+from gauss.dynamics.state_functions import TracedFunction, compiled, error_limits, error_measures
 from gauss.dynamics.store import cached
+from gauss.dynamics.term_table import traced_loads
 from gauss.errors import SimulationError, require
 from gauss.scene import Scene
 from gauss.system import State, System

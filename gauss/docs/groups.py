@@ -95,7 +95,7 @@ GROUPS = (
         "Optimal motions",
         "Motions of least time, effort or any cost by direct collocation (extra ``export``), and by iLQR with feedback. "
         "Guide: :doc:`/guides/optimisation`.",
-        _of("gauss", "optimal_motion OptimalMotion ilqr FeedbackMotion"),
+        _of("gauss", "optimal_motion OptimalMotion optimal_hybrid_motion MotionPhase HybridMotion ilqr FeedbackMotion"),
     ),
     Group(
         "view",
@@ -186,6 +186,8 @@ MADE_BY = {  # names that one seldom types, and what makes such objects: a publi
     "gauss.RootLocus": "gauss.root_locus",
     "gauss.MotionGradient": "gauss.motion_gradient",
     "gauss.OptimalMotion": "gauss.optimal_motion",
+    "gauss.HybridMotion": "gauss.optimal_hybrid_motion",
+    "gauss.MotionPhase": "gauss.optimal_hybrid_motion",
     "gauss.PlannedMotion": "gauss.plan_motion",
     "gauss.Regressor": "gauss.regressor",
     "gauss.Sensitivities": "gauss.sensitivities",

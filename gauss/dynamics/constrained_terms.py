@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen import Scalar
 from gauss.dynamics.aba import invert
-from gauss.dynamics.mechanism import Mechanism
+from gauss.dynamics.mechanism import Mechanism, loop_constraints
 from gauss.dynamics.state_terms import StateTerms
 from gauss.system import System
 
@@ -66,6 +66,12 @@ class ConstrainedTerms(StateTerms):
     def allowed_acceleration(self, acceleration) -> np.ndarray:
         """N ÿ + b (n_v,), with ÿ the accelerations of the independent coordinates."""
         return self.null_space @ acceleration[self.independent] + self.null_space_bias
+
+    @cached_property
+    def loop_constraints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residual c (r,), J N (r, k) and γ − J b (r,): J N ÿ = γ − J b; all three are zero but for round-off."""
+        residual, J, bias = loop_constraints(self.system, self.q, self.v, self.t)
+        return residual, J @ self.null_space, bias - J @ self.null_space_bias
 
     def along(self, tau) -> np.ndarray:
         """Nᵀ τ (k,): forces of the constraints drop out."""

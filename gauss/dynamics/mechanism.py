@@ -199,6 +199,18 @@ class Mechanism:
         """Pivots of K M⁻¹ Kᵀ; see :attr:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody.pivots`."""
         return [pivot for body in self.bodies for pivot in body.pivots]
 
+    @property
+    def relation_rows(self) -> dict[str, slice]:
+        """Rows of the multipliers that belong to each relation, by its name; they are the last ones of its subsystem."""
+        placed, found, end = self.system.relations.placed, dict[str, slice](), 0
+        for body in self.bodies:
+            end += body.scale.size
+            place = end - sum(one.size for one in body.subsystem.relations)
+            for one in body.subsystem.relations:
+                found[placed[one.index].name] = slice(place, place + one.size)
+                place += one.size
+        return found
+
     def _each(self, feedback):
         return [None] * len(self.bodies) if feedback is None else feedback
 

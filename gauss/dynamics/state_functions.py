@@ -10,19 +10,18 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
-from gauss.dynamics.acceleration_derivatives import acceleration_derivatives, inverse_dynamics_derivatives
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
-from gauss.dynamics.inertial_regressor import STANDARD, inertial_regressor
-from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.mechanism import inverse_dynamics, loop_constraint_scales, loop_constraints, loop_residual
+from gauss.dynamics.inertial_regressor import STANDARD
+from gauss.dynamics.mechanism import loop_constraint_scales, loop_residual
 from gauss.dynamics.mobility import mobility
-from gauss.dynamics.parameter_terms import accelerations_by_parameter, inverse_dynamics_by_parameter, size_of
+from gauss.dynamics.parameter_terms import size_of
 from gauss.dynamics.projection import fixed_columns
 from gauss.dynamics.state_terms import REFERENCES, StateTerms
 from gauss.dynamics.store import cached, cached_on_disk
-from gauss.dynamics.traced_system import FINITE, applied_loads, off_unit
-from gauss.errors import ArgumentError, SimulationError, StateError, did_you_mean
+from gauss.dynamics.term_table import TERMS, Term, traced_loads
+from gauss.dynamics.traced_system import FINITE, off_unit
+from gauss.errors import ArgumentError, StateError, did_you_mean
 from gauss.system import State, System, refuse_changed, whole
 
 DOC = """Terms of one state, or of a batch (n, …) of states, in machine code.
@@ -47,96 +46,12 @@ NULL_SPACE_RESIDUAL = 1e-6  # K N, relative to the scales of the rows: where rat
 ARGUMENTS = "q", "v", "acceleration", "load"  # in this order
 
 
-class Term(NamedTuple):
-    """A function of a state.
-
-    Attributes
-    ----------
-    arguments : str
-        Its arguments, of q, v, a (acceleration), l (load).
-    shapes : tuple of str
-        Shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints; p: values
-        of the parameter; i: standard inertial parameters of all bodies.
-    trace : callable
-        (terms, request, acceleration or load) → its results.
-    of_frame, has_reference, is_reduced, has_loads, of_parameter : bool
-        Whether it is a function of a frame; in axes to be chosen; whether it exists for independent coordinates; whether it
-        depends on the loads of the scene; whether it is the derivative by a parameter.
-    """
-
-    arguments: str
-    shapes: tuple[str, ...]
-    trace: Callable
-    of_frame: bool = False
-    has_reference: bool = False
-    is_reduced: bool = True
-    has_loads: bool = False
-    of_parameter: bool = False
-
-
 class Request(NamedTuple):
     """A term, with the name of its frame or parameter, and its axes."""
 
     name: str
     frame: str = ""
     reference: str = ""
-
-
-def _inverse_dynamics(terms: StateTerms, _, acceleration):
-    loads = traced_loads(terms.system).traced
-    own, on_bodies, _ = applied_loads(terms.system, loads, State(terms.t, terms.q, terms.v))
-    allowed = terms.allowed_acceleration(acceleration)
-    return terms.along(inverse_dynamics(terms.system, terms.q, terms.v, allowed, own, on_bodies, terms.t))
-
-
-def _slopes(function: Callable) -> Callable:
-    """Derivatives of a function of the loaded system."""
-    return lambda terms, _, given: function(
-        terms.system, traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given
-    )
-
-
-def _by_parameter(function: Callable) -> Callable:
-    """Derivatives of a function of the loaded system by a parameter."""
-    return lambda terms, one, given: function(
-        terms.system, traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given, one.frame
-    )
-
-
-BY_PARAMETER = {"is_reduced": False, "has_loads": True, "of_parameter": True}
-TERMS = {
-    "mass_matrix": Term("q", ("vv",), lambda terms, *_: terms.mass_matrix),
-    "bias_forces": Term("qv", ("v",), lambda terms, *_: terms.bias_forces),
-    "gravity_forces": Term("q", ("v",), lambda terms, *_: terms.gravity_forces),
-    "coriolis_matrix": Term("qv", ("vv",), lambda terms, *_: terms.coriolis_matrix),
-    "forward_kinematics": Term("q", ("33", "3"), lambda terms, one, _: terms.frame_pose(one.frame), of_frame=True),
-    "jacobian": Term("q", ("6v",), lambda terms, one, _: terms.jacobian(*one[1:]), of_frame=True, has_reference=True),
-    "jacobian_rate": Term(
-        "qv", ("6v",), lambda terms, one, _: terms.jacobian_rate(*one[1:]), of_frame=True, has_reference=True
-    ),
-    "center_of_mass": Term("q", ("3",), lambda terms, *_: terms.center_of_mass),
-    "momentum": Term("qv", ("6",), lambda terms, *_: terms.momentum),
-    "momentum_matrix": Term("q", ("6v",), lambda terms, *_: terms.momentum_matrix),
-    "kinetic_energy": Term("qv", ("",), lambda terms, *_: terms.kinetic_energy),
-    "potential_energy": Term("q", ("",), lambda terms, *_: terms.potential_energy),
-    "inertial_regressor": Term("qva", ("vi",), lambda terms, _, given: inertial_regressor(terms, given)),
-    "null_space": Term("q", ("Vv",), lambda terms, *_: terms.null_space),
-    "inverse_dynamics": Term("qva", ("v",), _inverse_dynamics, has_loads=True),
-    "inverse_dynamics_derivatives": Term(
-        "qva", ("VV", "VV"), _slopes(inverse_dynamics_derivatives), is_reduced=False, has_loads=True
-    ),
-    "acceleration_derivatives": Term(
-        "qvl", ("VV", "VV", "VV"), _slopes(acceleration_derivatives), is_reduced=False, has_loads=True
-    ),
-    "inverse_dynamics_by": Term("qva", ("Vp",), _by_parameter(inverse_dynamics_by_parameter), **BY_PARAMETER),
-    "accelerations_by": Term("qvl", ("Vp",), _by_parameter(accelerations_by_parameter), **BY_PARAMETER),
-    "loop_constraints": Term(
-        "qv",
-        ("r", "rV", "r"),
-        lambda terms, *_: loop_constraints(terms.system, terms.q, terms.v, terms.t),
-        is_reduced=False,
-    ),
-}
 
 
 def state_function(
@@ -254,21 +169,6 @@ def _columns(system: System, requests, independent) -> tuple[int, ...]:
             f"of {', '.join(system.coordinates)}; got {', '.join(map(repr, names)) or 'none'}."
         )
     return tuple(columns)
-
-
-def traced_loads(system: System) -> Laws:
-    """Laws of the loads as they are now.
-
-    Raises
-    ------
-    SimulationError
-        If one of them cannot be compiled.
-    """
-    laws = Laws(system)
-    if laws.reasons:
-        words = "; ".join(f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items())
-        raise SimulationError(f"inverse dynamics of scene {system.scene.name!r} cannot be compiled: {words}.")
-    return laws
 
 
 class TracedFunction(NamedTuple):

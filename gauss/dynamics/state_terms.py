@@ -14,6 +14,7 @@ from gauss.codegen import Scalar, forward
 from gauss.dynamics import energies
 from gauss.dynamics.composite_bodies import CompositeBodies, composite_inertias
 from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.mechanism import loop_constraints
 from gauss.dynamics.rnea import KinematicTree, apply, force_to_inner
 from gauss.rotations import cross
 from gauss.system import PlacedFrame, State, System, coordinate_rates, whole
@@ -125,6 +126,11 @@ class StateTerms:
     def allowed_acceleration(self, acceleration) -> np.ndarray:
         """Accelerations (n_v,) of all joints that the constraints allow."""
         return acceleration
+
+    @cached_property
+    def loop_constraints(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residual c (r,), Jacobian J (r, n_v) and bias γ (r,) of the loop constraints, J q̈ = γ."""
+        return loop_constraints(self.system, self.q, self.v, self.t)
 
     def along(self, tau) -> np.ndarray:
         """Generalised forces along the coordinates of these terms, of such forces (n_v,) along all."""

@@ -21,7 +21,8 @@ from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
-from gauss.dynamics.state_functions import TERMS, traced_function
+from gauss.dynamics.state_functions import traced_function
+from gauss.dynamics.term_table import TERMS
 from gauss.errors import ArgumentError, SimulationError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.system import System, refuse_changed

@@ -217,6 +217,8 @@ class StateFunctions:
             Axes and point of Jacobians: "local_world_aligned", "world" or "local".
         independent : sequence of str, optional
             Joints, or rates such as "U.angle1", as many as degrees of freedom: terms projected on the constraints.
+            Derivatives are those of the independent accelerations, or of the efforts that cause them, by displacements
+            along the constraints, independent rates and efforts. Given accelerations are all n_v; these are read of them.
         device : str or sequence of str, optional
             "cuda" or "cuda:1": a GPU, a state in a thread; several share a batch, ["cuda:0", "cuda:1"]; "lanes": the same
             code on this CPU. The function ``f(*vectors, t=0.0, stream=None)`` takes batches of this process, and returns

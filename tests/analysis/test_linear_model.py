@@ -231,6 +231,20 @@ def test_modes_that_no_input_reaches_are_named():
         model.lqr()
 
 
+def test_free_masses_that_no_input_reaches_are_named():
+    """All eigenvalues are zero: none of them is stable."""
+    scene = gauss.Scene("masses", gravity=(0, 0, 0))
+    for name in "xy":
+        scene.prismatic(name, "ground", scene.body(f"mass {name}", 1.0), axis=(1, 0, 0))
+    scene.input("push", "x")
+    with pytest.raises(SimulationError, match="'push' do not reach (.*\n)+.* y"):
+        gauss.linearise(scene).lqr()
+
+
+def test_what_is_printed_of_a_model_is_short():
+    assert len(repr(gauss.linearise(two_pendulums(True)))) < 1500
+
+
 @pytest.mark.parametrize(
     "weights", [{"Q": [1.0]}, {"Q": [1.0, -1.0, 1.0, 1.0]}, {"R": "x"}, {"R": [[np.nan]]}, {"Q": [[0, 1], [0, 0]]}]
 )

@@ -13,6 +13,7 @@ from gauss.errors import ArgumentError, SimulationError, StateError
 from gauss.system import State, random_state, retract
 from tests.support import mechanisms
 
+LEAST_SQUARES = 1e-8  # of linear models of overconstrained loops, whose null space is cut off by a rank
 AGREEMENT = 1e-12  # relative to the largest entry, of sums in another order
 OF_STEPS = 1e-7  # of central differences, relative
 STEP = 1e-5
@@ -209,6 +210,38 @@ def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(n
     assert relative(J_rate, rate(lambda q: system.jacobian(q, frame, **which))) <= 1e-6
 
 
+@pytest.mark.parametrize("name", LOOPS)
+def test_derivatives_for_independent_coordinates_are_those_of_the_motion_on_the_constraints(name):
+    """Against the linear model of the same state, and against each other: inverse dynamics undoes the accelerations."""
+    scene, joint = LOOPS[name]
+    system = gauss.compile_scene(gauss.load(scene))
+    which, start = {"independent": (joint,)}, system.initial_state()
+    N = system.null_space(start.q, **which)
+    state = system.initial_state(start.q, 1.3 * N[:, 0], keep=[joint])
+    by_q, by_v, by_effort = system.function("acceleration_derivatives", **which)(state.q, state.v, np.zeros(system.n_v))
+    model = gauss.linearise(system, state, **which)
+    scale = np.abs(model.A).max()
+    assert np.abs([by_q[0, 0] - model.A[1, 0], by_v[0, 0] - model.A[1, 1]]).max() <= LEAST_SQUARES * scale
+    assert relative(by_effort, np.linalg.inv(system.mass_matrix(state.q, **which))) <= AGREEMENT
+    acceleration = system.accelerations(state)
+    efforts = system.function("inverse_dynamics_derivatives", **which)(state.q, state.v, acceleration)
+    for found, undone in zip(efforts, (by_q, by_v), strict=True):
+        assert np.abs(by_effort @ found + undone).max() <= 1e-9 * scale
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_independent_rates_meet_the_loop_constraints(name):
+    scene, joint = LOOPS[name]
+    system = gauss.compile_scene(gauss.load(scene))
+    start = system.initial_state()
+    v = 1.3 * system.null_space(start.q, independent=(joint,))[:, 0]
+    residual, J, bias = system.function("loop_constraints", independent=(joint,))(start.q, v)
+    _, whole, rest = system.loop_constraints(start.q, v)
+    assert J.shape == (len(residual), 1) and residual.shape == bias.shape
+    assert np.abs(J).max() <= 1e-11 * max(1.0, np.abs(whole).max())
+    assert np.abs(bias).max() <= 1e-10 * max(1.0, np.abs(rest).max())
+
+
 DIFFERENTIATED = {
     "tree of all kinds": lambda: gauss.load("random_tree", n=4, seed=1),
     "damped": lambda: gauss.load("cart_pole"),
@@ -361,7 +394,7 @@ MISTAKES = {
     "no coordinates": (lambda s, q, v: s.null_space(q), ArgumentError, "expected the names of independent joints"),
     "few": (lambda s, q, v: s.function("mass_matrix", independent=()), StateError, r"expected \d+ different .* got none"),
     "not reduced": (
-        lambda s, q, v: s.function("loop_constraints", independent="J"),
+        lambda s, q, v: s.function("accelerations_by:gravity", independent="J"),
         ArgumentError,
         "does not exist for independent coordinates",
     ),

@@ -232,19 +232,20 @@ def _assembled(system: System, conditions, what: str, near: State) -> State:
         x[one.place] = np.clip(x[one.place], one.low, one.high)
     state = State(near.t, x[: system.n_q], x[system.n_q :])
     if system.has_closures:
-        state = _closed(system, [one for one in conditions if one.is_fixed], state, what, near)
+        held = [one for one in conditions if one.is_fixed or not one.low <= _entry(near, one.place) <= one.high]
+        state = _closed(system, held, state, what, near)
     _check(system, state, conditions, what)
     return state
 
 
-def _closed(system: System, fixed: list[EndCondition], asked: State, what: str, near: State) -> State:
-    """State with closed loops that keeps fixed coordinates and rates of another one."""
-    targets = {one.place: asked.q[one.place] for one in fixed if one.place < system.n_q}
+def _closed(system: System, held: list[EndCondition], asked: State, what: str, near: State) -> State:
+    """State with closed loops that keeps some coordinates and rates of another one."""
+    targets = {one.place: asked.q[one.place] for one in held if one.place < system.n_q}
     (*_, state), is_closed = followed(system, near, targets, np.linspace(0.0, 1.0, STEPS + 1)[1:])
     if not is_closed:
-        names = ", ".join(one.name for one in fixed if one.place in targets)
+        names = ", ".join(one.name for one in held if one.place in targets)
         raise StateError(f"optimal motion: {what}: the constraints allow no state with these coordinates: {names}.")
-    rates = [one.place - system.n_q for one in fixed if one.place >= system.n_q]
+    rates = [one.place - system.n_q for one in held if one.place >= system.n_q]
     return with_rates(system, State(state.t, state.q, asked.v), rates) if rates else state
 
 

@@ -83,7 +83,7 @@ class OptimalEquations:
             mechanism = LoadedMechanism(system, self.loads(u), t[0], q, v, np.zeros(system.n_v))
             return coordinate_rates(system, q, v), mechanism.motion()[0]
 
-        return self._in_units(values, "rates", self.units)
+        return self.in_units(values, "rates", self.units)
 
     @cached_property
     def residuals(self) -> Casadi:
@@ -96,7 +96,7 @@ class OptimalEquations:
             self.n_positions = len(positions) + len(lengths)
             return np.array([*positions, *lengths, *rates], dtype=object)
 
-        return self._in_units(values, "residuals")
+        return self.in_units(values, "residuals")
 
     def independent_rows(self, t: float, x: np.ndarray) -> list[int]:
         """Rows of the residuals that are independent in a state, in shares of the units."""
@@ -114,7 +114,7 @@ class OptimalEquations:
         def values(t, q, v, u):
             return numbers_of(cost, (t[0], q, v, u), "optimal motion: cost", 1)
 
-        return self._in_units(values, "cost")
+        return self.in_units(values, "cost")
 
     def at_end(self, function: Callable, what: str, units=1.0, size: int | None = None) -> Casadi:
         """(t, x, u) → values of a function of (q, v), in shares of the units.
@@ -134,10 +134,10 @@ class OptimalEquations:
         def values(t, q, v, u):
             return numbers_of(function, (q, v), f"optimal motion: {what}", size)
 
-        return self._in_units(values, what, units)
+        return self.in_units(values, what, units)
 
-    def _in_units(self, values: Callable, name: str, units=1.0) -> Casadi:
-        """Function of CasADi of (t, x, u) in shares, x and u, and the results, of their units."""
+    def in_units(self, values: Callable, name: str, units=1.0) -> Casadi:
+        """Function of CasADi of (t, x, u), shares of their units, of a traced function of (t, q, v, u); t is an array."""
         with extra("export"):
             import casadi
         system = self.system

@@ -4,8 +4,8 @@ import numpy as np
 
 from gauss.analysis.optimal.continuation import followed
 from gauss.analysis.optimal.equations import OptimalEquations
+from gauss.analysis.optimal.problem import MotionValues
 from gauss.analysis.optimal.result import OptimalMotion
-from gauss.analysis.optimal.transcription import MotionValues
 from gauss.errors import ArgumentError, require
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System

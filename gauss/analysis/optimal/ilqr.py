@@ -64,7 +64,7 @@ class FeedbackMotion:
         Cost after each of them.
     """
 
-    system: System
+    system: System = field(repr=False)  # as long as a scene
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray

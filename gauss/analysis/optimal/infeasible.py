@@ -4,9 +4,12 @@ With the equations of motion and the limits as they are, Σ |missed| is least (t
 SNOPT, SIAM Review 47, 2005): its ℓ1 norm leaves most conditions met, and those that cannot be met stand out.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from gauss.analysis.optimal.transcription import MotionProblem, MotionValues, Solved, Transcription
+from gauss.analysis.optimal.problem import MotionProblem, MotionValues, Solved
+from gauss.analysis.optimal.programme import CollocationProgramme
 from gauss.errors import SimulationError
 
 MISSED = 1e-4  # share of the unit, above which a condition counts as missed
@@ -14,7 +17,7 @@ AT_LIMIT = 1e-3  # share of the range of an input, within which it is at its lim
 MOST_OF_THE_TIME = 0.5  # share of the mesh at the limit, from which it is named
 
 
-def refuse(problem: MotionProblem, mesh: np.ndarray, rows: list[int], guess: MotionValues, solved: Solved):
+def refuse(problems: Sequence[MotionProblem], rows: list[list[int]], guesses: Sequence[MotionValues], solved: Solved):
     """Raise an error that says what stands against a motion.
 
     Raises
@@ -22,25 +25,31 @@ def refuse(problem: MotionProblem, mesh: np.ndarray, rows: list[int], guess: Mot
     SimulationError
         Always.
     """
-    nearest = Transcription(problem, mesh, rows, relaxed=True).solve(guess)
-    units = problem.units
+    nearest = CollocationProgramme(problems, [guess.mesh for guess in guesses], rows, relaxed=True).solve(guesses)
     missed = []
-    for (kind, one), share in zip(problem.conditions, nearest.misses, strict=True):
-        if abs(share) > MISSED:
-            wanted = f"{one.low:.6g}" if one.is_fixed else f"{one.low:.6g} to {one.high:.6g}"
-            missed.append(f"{kind}: {one.name!r} misses {wanted} by {abs(share) * units[one.place]:.3g}")
+    for phase, problem in enumerate(problems):
+        for (kind, one), share in zip(problem.conditions, nearest.misses[phase], strict=True):
+            if abs(share) > MISSED:
+                wanted = f"{one.low:.6g}" if one.is_fixed else f"{one.low:.6g} to {one.high:.6g}"
+                short = abs(share) * problem.units[one.place]
+                missed.append(f"{_of_phase(problems, phase)}{kind}: {one.name!r} misses {wanted} by {short:.3g}")
     if nearest.is_optimal and missed:
-        low, high = problem.duration
+        low, high = map(sum, zip(*(problem.duration for problem in problems), strict=True))
         span = f"{low:.6g} s" if low == high else f"{low:.6g} to {high:.6g} s"
+        at_limits = "".join(_at_limits(*pair) for pair in zip(problems, nearest.values, strict=True))
         raise SimulationError(
             f"optimal motion: no motion of {span} within the limits was found. The nearest one: {'; '.join(missed)}."
-            f"{_at_limits(problem, nearest.values)} Give more time, wider limits, or guess=."
+            f"{at_limits} Give more time, wider limits, or guess=."
         )
     raise SimulationError(
         f"optimal motion: IPOPT did not converge ({solved.status} after {solved.iterations} iterations, residual "
         f"{solved.residual:.1e}){'; the conditions can be met' if nearest.is_optimal else ''}. "
         "Give guess= (a motion), another number of intervals=, or more iterations=."
     )
+
+
+def _of_phase(problems: Sequence[MotionProblem], phase: int) -> str:
+    return f"phase {phase + 1}: " if len(problems) > 1 else ""
 
 
 def _at_limits(problem: MotionProblem, values: MotionValues) -> str:

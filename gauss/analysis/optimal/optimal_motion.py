@@ -2,34 +2,14 @@
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
-from gauss.analysis.optimal.conditions import (
-    EndCondition,
-    MotionEnd,
-    end_of,
-    increments,
-    motion_limits,
-    refuse_beyond,
-    value_range,
-)
-from gauss.analysis.optimal.equations import OptimalEquations
-from gauss.analysis.optimal.guess import first_guess
-from gauss.analysis.optimal.infeasible import refuse
-from gauss.analysis.optimal.law_mesh import law_mesh, warn_of_passed
-from gauss.analysis.optimal.mesh_error import MeshError, refined
+from gauss.analysis.optimal.phases import MeshSettings, MotionPhase, PhaseProblems
+from gauss.analysis.optimal.refined_meshes import on_refined_meshes
 from gauss.analysis.optimal.result import OptimalMotion
-from gauss.analysis.optimal.transcription import MotionProblem, Solved, Transcription
 from gauss.arguments import named_arguments
 from gauss.dynamics import compile_scene
-from gauss.errors import ArgumentError, SimulationError, did_you_mean, extra, require
+from gauss.errors import require
 from gauss.scene import Scene
-from gauss.simulation.tolerances import check_tolerances
 from gauss.system import State, System
-
-COSTS: dict[str, Callable | None] = {"effort": lambda t, q, v, u: u @ u, "time": None}
-ORDERS = (2, 4, 6, 8, 10)
-SWINGS = 4.0  # times of the scene, guess of a duration without upper limit
 
 
 @named_arguments
@@ -59,7 +39,8 @@ def optimal_motion(
     Parameters
     ----------
     scene : Scene or System
-        Scene with inputs (:meth:`gauss.Scene.input`), without contacts and friction.
+        Scene with inputs (:meth:`gauss.Scene.input`), without dry friction. Stops, ropes and contacts stay open; for
+        motions in which they close see :func:`gauss.optimal_hybrid_motion`.
     duration : float or tuple of float
         Duration, or the least and the largest one [s].
     start : State or mapping of str to float or tuple of float, optional
@@ -125,122 +106,7 @@ def optimal_motion(
     """
     require(scene, (Scene, System), "optimal_motion")
     system = compile_scene(scene) if isinstance(scene, Scene) else scene
-    _check_settings(intervals, order, tolerance, refinements, iterations)
-    equations = OptimalEquations(system)
-    span, law = _span(duration, cost), _cost(equations, cost)
-    near = system.initial_state()
-    first = end_of(system, near if start is None else start, "start", near)
-    shift = increments(system, periodic, first.guess)
-    last = _last(system, end, first, shift)
-    after, meeting, meets = _impact(equations, reset, meets, bool(shift))
-    bounds = motion_limits(system, equations, {} if limits is None else limits)
-    refuse_beyond({"start": first, "end": last}, *bounds[:2])
-    ends = first.conditions, last.conditions, shift
-    impact = after, meets, meeting
-    problem = MotionProblem(equations, law, first.guess.t, span, *ends, bounds, order // 2, iterations, *impact)
-    mesh = law_mesh(system, first.guess, span, intervals)
-    turning = {entry for place in system.quaternions.values() for entry in range(place.start, place.stop)}
-    fixed = [one.place for one in (*last.conditions, *shift) if one.is_fixed]
-    led = [place for place in fixed if place < system.n_q and place not in turning]
-    begin = first_guess(equations, guess, (first.guess, last.guess), led, mesh, _middle(span, system), problem.stages)
-    return _on_refined_meshes(system, problem, begin, tolerance, refinements)
-
-
-def _impact(equations: OptimalEquations, reset, meets, is_periodic: bool):
-    """Reset at the end as a function of CasADi, names of what is met there, and its function."""
-    if reset is not None and not is_periodic:
-        raise ArgumentError("optimal motion: reset: expected periodic= as well: the state after it is that of the start.")
-    for what, given in (("reset", reset), ("meets", meets)):
-        if given is not None and not callable(given):
-            raise ArgumentError(f"optimal motion: {what}: expected a function of (q, v), got {given!r:.60}.")
-    after = None if reset is None else equations.at_end(reset, "reset", equations.units, equations.n_x)
-    met = None if meets is None else equations.at_end(meets, "meets")
-    count = 0 if met is None else met.size1_out(0)
-    return after, tuple(EndCondition(f"meets[{k}]", equations.n_x + k, 0.0, 0.0) for k in range(count)), met
-
-
-def _on_refined_meshes(system: System, problem: MotionProblem, guess, tolerance: float, refinements: int) -> OptimalMotion:
-    """Optimum on the first mesh that is fine enough."""
-    equations, meshes, iterations = problem.equations, list[tuple[int, float]](), 0
-    rows, error = equations.independent_rows(problem.start_time, guess.x[:, 0]), MeshError(equations)
-    for _ in range(refinements + 1):
-        solved = Transcription(problem, guess.mesh, rows).solve(guess)
-        if not solved.is_optimal:
-            refuse(problem, guess.mesh, rows, guess, solved)
-        iterations += solved.iterations
-        t, x, u = _samples(problem, solved)
-        errors = error.of_intervals(t, x, u)
-        meshes.append((len(u), float(errors.max())))
-        if errors.max() <= tolerance:
-            warn_of_passed(system, State(float(t[0]), *np.split(x[0], [system.n_q])), t)
-            simulated = np.abs((error.simulated(t, x[0], u) - x) / equations.units).max()
-            q, v = np.split(x, [system.n_q], axis=1)
-            accuracy = solved.kkt, solved.residual, float(errors.max()), float(simulated), iterations, tuple(meshes)
-            return OptimalMotion(system, t, q, v, equations.names, _law(t, u), solved.cost, *accuracy)
-        mesh = refined(solved.values.mesh, errors, tolerance, 2 * problem.stages)
-        guess = solved.values.on(mesh, problem.stages)
-    raise SimulationError(
-        f"optimal motion: the mesh error is {meshes[-1][1]:.1e} with {meshes[-1][0]} intervals after {refinements} "
-        "refinements; allow more refinements= or a larger tolerance=."
-    )
-
-
-def _samples(problem: MotionProblem, solved: Solved) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times (n + 1,), states (n + 1, n_q + n_v), and inputs (n, 2, n_u) at the ends of the intervals."""
-    equations, values = problem.equations, solved.values
-    low, high = problem.bounds[2:]
-    u = np.clip(values.u * equations.input_units[:, None], low[:, None], high[:, None])  # IPOPT relaxes bounds by 1e-8
-    return problem.start_time + values.duration * values.mesh, values.x.T * equations.units, np.moveaxis(u, 2, 0)
-
-
-def _law(t: np.ndarray, u: np.ndarray):
-    """Inputs as a piecewise polynomial of time."""
-    from scipy.interpolate import PPoly
-
-    return PPoly(np.array([(u[:, 1] - u[:, 0]) / np.diff(t)[:, None], u[:, 0]]), t)
-
-
-def _last(system: System, end, first: MotionEnd, shift: tuple[EndCondition, ...]) -> MotionEnd:
-    """Conditions at the end, near the start, or a period after it."""
-    x = np.concatenate([first.guess.q, first.guess.v])
-    after = {one.name: x[one.place] + one.low for one in shift if one.low}
-    near = end_of(system, after, "periodic", first.guess).guess if after else first.guess
-    return end_of(system, end, "end", near)
-
-
-def _cost(equations: OptimalEquations, cost):
-    """Cost per time as a function of CasADi; None for the time itself."""
-    with extra("export"):
-        import casadi  # noqa: F401
-    if not callable(cost) and cost not in COSTS:
-        raise ArgumentError(f"optimal motion: no cost {cost!r}, and no function. {did_you_mean(str(cost), COSTS)}")
-    law = cost if callable(cost) else COSTS[cost]
-    return None if law is None else equations.running_cost(law)
-
-
-def _span(duration, cost) -> tuple[float, float]:
-    """Least and largest duration."""
-    low, high = value_range("duration", duration, "duration")
-    if not low > 0.0 or np.isinf(low):
-        raise ArgumentError(
-            f"optimal motion: duration: expected a positive time [s], or (least, largest), got {duration!r}."
-        )
-    if cost == "time" and low == high:
-        raise ArgumentError("optimal motion: cost 'time' needs a free duration=(least, largest) [s].")
-    return low, high
-
-
-def _middle(span: tuple[float, float], system: System) -> float:
-    """First guess of the duration [s]."""
-    low, high = span
-    return float(np.sqrt(low * high)) if np.isfinite(high) else max(2.0 * low, SWINGS * system.scale.time)
-
-
-def _check_settings(intervals, order, tolerance, refinements, iterations):
-    """Refuse settings that are no numbers of their kind."""
-    for name, value, least in (("intervals", intervals, 1), ("refinements", refinements, 0), ("iterations", iterations, 1)):
-        if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
-            raise ArgumentError(f"optimal motion: {name}: expected a whole number from {least} on, got {value!r}.")
-    if order not in ORDERS:
-        raise ArgumentError(f"optimal motion: order: expected one of {', '.join(map(str, ORDERS))}, got {order!r}.")
-    check_tolerances(tolerance=tolerance)
+    settings = MeshSettings(intervals, order, tolerance, refinements, iterations)
+    phase = MotionPhase(duration, end=end, guess=guess)
+    made = PhaseProblems(system, [phase], settings, start, periodic, reset, meets, cost, limits)
+    return on_refined_meshes(made.problems, made.guesses, tolerance, refinements)[0]

@@ -1,6 +1,6 @@
 """An optimal motion: states at the mesh points, inputs as functions of time, and what its accuracy is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,7 +50,7 @@ class OptimalMotion:
         Intervals and mesh error of each mesh, the first one first.
     """
 
-    system: System
+    system: System = field(repr=False)  # as long as a scene
     t: np.ndarray
     q: np.ndarray
     v: np.ndarray

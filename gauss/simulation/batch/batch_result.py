@@ -62,7 +62,7 @@ class Rollout:
         The repeated motions.
     """
 
-    system: System
+    system: System = field(repr=False)  # as long as a scene
     t: Shaped[np.ndarray, " k"]
     q: Shaped[np.ndarray, "batch k nq"]
     v: Shaped[np.ndarray, "batch k nv"]
