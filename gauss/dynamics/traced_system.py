@@ -3,6 +3,7 @@
 Integrator loops and engines are compiled from them. Points are vectors (:class:`gauss.dynamics.point_layout.PointLayout`).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -100,7 +101,7 @@ class Program:
         self.layout = PointLayout(system.n_q, system.n_v, memory, self.inputs if family is None else family.parameters)
 
     @property
-    def elimination(self) -> type[Mechanism]:
+    def elimination(self) -> Callable[..., Mechanism]:
         """Elimination of the trees and loop constraints in one state."""
         return Mechanism
 

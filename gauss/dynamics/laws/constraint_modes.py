@@ -248,7 +248,7 @@ class ConstraintModes:
 
 def constraint_modes(system: System) -> ConstraintModes | None:
     """Modes of the constraints of a system that jump between them, or may; None where there are none."""
-    if not _has_conditions(system.relations):
+    if not cached(system, (_has_conditions,), lambda: _has_conditions(system.relations)):
         return None
     modes = cached(system, (ConstraintModes,), lambda: ConstraintModes(system))
     return modes if modes and (modes.unknown or modes.steps) else None
