@@ -14,6 +14,7 @@ from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, 
 from gauss.dynamics.laws.law_kinks import kinked_laws
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import DERIVATIVES
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError, judged_later, require
@@ -64,10 +65,13 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     SimulationError
         If the system cannot be compiled, with the reasons; if friction is between sticking and slipping, or a law has a kink
         or a jump; or if accelerations or derivatives are not determined.
+    StateError
+        If a loop that cannot move has another pose than in the scene.
     """
     require(system, (System,), "derivatives")
     require(state, (State,), "derivatives: state")
     refuse_changed(system)
+    refuse_other_pose(system, state.q)
     if not system.n_v:
         return Derivatives(*np.zeros((3, 0, 0)))
     if has_joint_modes(system) and not (system.contacts.placed or system.losses):

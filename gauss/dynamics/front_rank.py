@@ -1,10 +1,19 @@
-"""Rank of the fronts of embedded loops at a consistent state; the conditions of a rule of :mod:`gauss.dynamics.plan`."""
+"""Fronts of embedded loops that are regular at a consistent state; the conditions of a rule of :mod:`gauss.dynamics.plan`.
+
+Of redundant loop constraints a set of full rank is eliminated. The others follow from it near every state of full rank; the
+checks of accelerations and states have all rows.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.codegen import Scalar
 from gauss.dynamics.conditions import has_large_loops
 from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism
 from gauss.dynamics.error_scale import consistent_states
+from gauss.dynamics.generic_rank import ROUNDOFF_PIVOT, count, dependent_rows, is_generic_rank
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.system import State, System
@@ -12,31 +21,75 @@ from gauss.system import State, System
 ELIMINATIONS = EmbeddedMechanism, EmbeddedChains
 
 
+@dataclass(frozen=True)
+class Embedding:
+    """Elimination of loops where they close.
+
+    Parameters
+    ----------
+    mechanism : type
+        Elimination with or without hubs.
+    dependent : sequence of collections of int
+        Rows that are left out; see :class:`gauss.dynamics.embedded_aba.EmbeddedMechanism`.
+    """
+
+    mechanism: type[EmbeddedMechanism] = EmbeddedMechanism
+    dependent: Sequence[Collection[int]] = ()
+
+    def __call__(self, system: System, q, v, t: Scalar = 0.0) -> EmbeddedMechanism:
+        """The system in one state."""
+        return self.mechanism(system, q, v, t, self.dependent)
+
+    def is_regular(self, system: System, state: State) -> bool:
+        """Whether its fronts have large pivots in a state of numbers, and its rows pivots above round-off."""
+        with np.errstate(all="ignore"):
+            try:
+                found = self(system, state.q, state.v, state.t)
+            except ZeroDivisionError:
+                return False
+            return found.is_regular and all(pivot > ROUNDOFF_PIVOT for pivot in found.pivots)
+
+
 def has_loops(ask: Question) -> bool:
     """Whether loops, couplings or relations constrain the tree, few enough for straight-line code."""
     return ask.system.closes and not has_large_loops(ask.system)
 
 
-def independent_fronts(ask: Question) -> list[str]:
-    """The loop constraints are independent."""
-    found = embedded_elimination(ask.system)
-    return [] if found else ["its loop constraints are redundant, or depend on each other where chains are eliminated"]
+def regular_fronts(ask: Question) -> list[str]:
+    """The loop constraints are independent where chains are eliminated, but for rows redundant at every state."""
+    return [] if embedding(ask.system) else ["its loop constraints depend on each other where chains are eliminated"]
 
 
-def embedded_elimination(system: System) -> type[EmbeddedMechanism] | None:
-    """Elimination whose fronts have large pivots at a consistent state, with hubs if it has them there; None without one."""
-    name = cached_on_disk(system, (embedded_elimination,), lambda: _regular_elimination(system))
-    return next((elimination for elimination in ELIMINATIONS if elimination.__name__ == name), None)
+def embedding(system: System) -> Embedding | None:
+    """Embedding with large pivots at a consistent state, with hubs if it has them there; None without one."""
+    name, *dependent = cached_on_disk(system, (embedding,), lambda: _named(_regular_embedding(system)))
+    return next((Embedding(one, dependent) for one in ELIMINATIONS if one.__name__ == name), None)
 
 
-def _regular_elimination(system: System) -> str:
-    states = consistent_states(system)
-    return next((one.__name__ for state in states for one in ELIMINATIONS if _is_regular(one, system, state)), "")
+def embedding_of(system: System) -> Embedding:
+    """The same; that of all rows without one, for plans that ask for it."""
+    return embedding(system) or Embedding()
 
 
-def _is_regular(elimination: type[EmbeddedMechanism], system: System, state: State) -> bool:
-    with np.errstate(all="ignore"):
-        try:
-            return elimination(system, state.q, state.v, state.t).is_regular
-        except ZeroDivisionError:
-            return False
+def _named(found: Embedding | None) -> tuple:
+    """Name of an elimination, and its dependent rows."""
+    return (found.mechanism.__name__, *map(tuple, found.dependent)) if found else ("",)
+
+
+def _regular_embedding(system: System) -> Embedding | None:
+    before = None  # rows that depend on others at the state before; states are assembled as long as these do not decide
+    for state in consistent_states(system):
+        found = _regular_at(system, state)
+        if found:
+            return found
+        dependent = dependent_rows(system, state)
+        is_generic = is_generic_rank(system, dependent) if before is None else 0 < count(before) <= count(dependent)
+        if is_generic:
+            return _regular_at(system, state, dependent)
+        before = dependent
+    return None
+
+
+def _regular_at(system: System, state: State, dependent=()) -> Embedding | None:
+    found = (Embedding(one, dependent) for one in ELIMINATIONS)
+    return next((one for one in found if one.is_regular(system, state)), None)

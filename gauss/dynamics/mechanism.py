@@ -57,9 +57,13 @@ class Mechanism:
         relations = _relations(system, State(t, q, v))
         self.system, self.q, self.t = system, q, t
         self.bodies = [
-            self.of_subsystem(one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
-            for one in (system.subsystems if subsystems is None else subsystems)
+            self._body(index, one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
+            for index, one in enumerate(system.subsystems if subsystems is None else subsystems)
         ]
+
+    def _body(self, index: int, one: Subsystem, q, v, relations) -> ConstrainedArticulatedBody:
+        """Dynamics of a subsystem."""
+        return self.of_subsystem(one, q, v, relations)
 
     def moving(self, v) -> "Mechanism":
         """The same system in the same position at other rates; what depends on the position alone is not made again."""

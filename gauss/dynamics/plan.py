@@ -13,7 +13,7 @@ time stepping       certified       the same, where the dynamics cannot be compi
 events              compiled        unilateral constraints, joint friction, limited forces, losses
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
-compiled loop       embedded loops  smooth scenes with independent loop constraints, by explicit integrators
+compiled loop       embedded loops  smooth scenes with loop constraints, by explicit integrators
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
 compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
@@ -27,8 +27,8 @@ Python loop         certified       all other scenes
 ==================  ==============  =====================================================================================
 
 Single states: "unilateral" where frictionless contacts are the only non-smooth elements, "call graph" for many loops, "tree
-recursion" for large trees, "embedded loops" for loops with independent constraints, "compiled", and "certified" for all
-others. See :class:`gauss.dynamics.rules.Plan`.
+recursion" for large trees, "embedded loops" for loops, "compiled", and "certified" for all others. See
+:class:`gauss.dynamics.rules.Plan`.
 """
 
 from collections.abc import Callable, Hashable
@@ -59,7 +59,7 @@ from gauss.dynamics.conditions import (
     traced_laws,
     written_out,
 )
-from gauss.dynamics.front_rank import has_loops, independent_fronts
+from gauss.dynamics.front_rank import has_loops, regular_fronts
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.dynamics.store import cached
@@ -170,9 +170,7 @@ MOTIONS = RuleTable(
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, closed_form_contacts)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, closed_form_contacts)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
-        Rule(
-            "compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, independent_fronts)
-        ),
+        Rule("compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, regular_fronts)),
         Rule("compiled loop", "compiled", "refined", _both(_smooth, _without_feedback), _LOOP),
         Rule("compiled loop", "compiled", "certified", _both(_smooth, _with_feedback), _LOOP),
         Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
@@ -193,9 +191,7 @@ TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 BATCHES = RuleTable(
     (
         Rule("batch", "compiled", "simulate", is_time_stepping, (*_STEP, closed_form_contacts)),
-        Rule(
-            "batch", "embedded loops", "simulate", _both(_no_time_stepping, has_loops), (*_WHOLE_BATCH, independent_fronts)
-        ),
+        Rule("batch", "embedded loops", "simulate", _both(_no_time_stepping, has_loops), (*_WHOLE_BATCH, regular_fronts)),
         Rule("batch", "compiled", "simulate", _no_time_stepping, _WHOLE_BATCH),
     ),
     lambda ask, why: (
@@ -215,7 +211,7 @@ def _of_states(*laws: Condition) -> tuple[Rule, ...]:
         _unilateral(*laws),
         Rule("state", "call graph", "certified", large_loops, (compilable,)),
         Rule("state", "tree recursion", "certified", large_tree, (compilable,)),
-        Rule("state", "embedded loops", "compiled", has_loops, (written_out, compilable, *laws, independent_fronts)),
+        Rule("state", "embedded loops", "compiled", has_loops, (written_out, compilable, *laws, regular_fronts)),
         Rule("state", "compiled", "certified", conditions=(written_out, compilable, *laws)),
     )
 

@@ -4,19 +4,20 @@ One refinement that bounds the error of a single state, or refinement to round-o
 Limits are met by sums of absolute values, which NaN enters; a maximum ignores it.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from gauss import math
 from gauss.backends.estimate import SHARE_AT_REST
 from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK
-from gauss.dynamics.embedded_aba import EmbeddedMechanism
-from gauss.dynamics.front_rank import embedded_elimination
+from gauss.dynamics.front_rank import embedding_of
 from gauss.dynamics.mechanism import Mechanism, refined_forward_dynamics
 from gauss.dynamics.traced_system import Program, applied_loads, largest
 from gauss.system import State
 
 
-def refined_once(program: Program, q, v, tau, t, elimination: type[Mechanism] = Mechanism):
+def refined_once(program: Program, q, v, tau, t, elimination: Callable[..., Mechanism] = Mechanism):
     """q̈ after one refinement, and [its error, constraint residual of the state, sum of all inputs].
 
     The error is the size of the refinement and of the remaining residuals of loop joints and loop constraints, not zero
@@ -37,7 +38,7 @@ def refined_once(program: Program, q, v, tau, t, elimination: type[Mechanism] = 
 
 def embedded_once(program: Program, q, v, tau, t):
     """The same with loops eliminated where they close."""
-    return refined_once(program, q, v, tau, t, embedded_elimination(program.pattern) or EmbeddedMechanism)
+    return refined_once(program, q, v, tau, t, embedding_of(program.pattern))
 
 
 def refined(program: Program, q, v, tau, t):

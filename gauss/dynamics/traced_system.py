@@ -3,6 +3,7 @@
 Integrator loops and engines are compiled from them. Points are vectors (:class:`gauss.dynamics.point_layout.PointLayout`).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -30,6 +31,7 @@ from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.point_layout import PointLayout
+from gauss.dynamics.rigid_loops import is_in_other_pose, rigid_joints
 from gauss.dynamics.shared_elimination import SharedElimination
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.store import cached_on_disk
@@ -100,7 +102,7 @@ class Program:
         self.layout = PointLayout(system.n_q, system.n_v, memory, self.inputs if family is None else family.parameters)
 
     @property
-    def elimination(self) -> type[Mechanism]:
+    def elimination(self) -> Callable[..., Mechanism]:
         """Elimination of the trees and loop constraints in one state."""
         return Mechanism
 
@@ -190,8 +192,13 @@ class Program:
         return cached_on_disk(self.system, (Program.kernels, self.drift, self.laws.key), self.kernels)
 
     def residual(self, state: State):
-        """Constraint residual of a state, in position and velocity, relative; of all constraints of the system."""
+        """Constraint residual of a state, in position and velocity, relative; of all constraints of the system.
+
+        Infinite where a loop that cannot move has another pose than the rigid body to which it is reduced.
+        """
         residual = off_unit(self.system, state.q)
+        if rigid_joints(self.system):
+            residual = residual + math.where(is_in_other_pose(self.system, state.q), np.inf, 0.0)
         if self.system.has_closures:
             residual = residual + state_residual(kinematics(self.system, state))
         return residual

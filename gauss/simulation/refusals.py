@@ -2,6 +2,7 @@
 
 from gauss import integrators
 from gauss.dynamics.plan import is_time_stepping
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import SimulationError
 from gauss.integrators import Library
 from gauss.simulation.problem import Problem
@@ -9,8 +10,9 @@ from gauss.system import System
 
 
 def refuse(problem: Problem):
-    """Raise a SimulationError if the method does not apply to the scene, or not with its stabilisation."""
+    """Raise an error if the start or the method does not apply to the scene, or not with its stabilisation."""
     system, method, stabilisation = problem.system, problem.method, problem.stabilisation
+    refuse_other_pose(system, problem.start.q)
     if stabilisation == "ggl" and not isinstance(method, integrators.RadauIIA):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
     if problem.drift.partitioned and (isinstance(method, Library) or method.mechanical):

@@ -141,6 +141,8 @@ def simulate(
         Before the first step, if a prescribed position jumps, or a law is random and steps are adaptive; later, if a
         constraint jumps at a condition on the state that the motion crosses, if the motion cannot continue, or the control
         law returns a value that is no finite number: its ``trajectory`` holds the motion so far.
+    StateError
+        If the state does not fit the system, or a loop that cannot move has another pose than in the scene.
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """

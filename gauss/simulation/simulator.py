@@ -19,6 +19,7 @@ from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.plan import plan_of
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep
@@ -188,7 +189,7 @@ class Simulator:
         AssemblyError
             If the constraints cannot be met from there.
         StateError
-            If the state does not fit the system.
+            If the state does not fit the system, or a loop that cannot move has another pose than in the scene.
         """
         start, run = self._start, self._run
         if state is not None:
@@ -198,6 +199,7 @@ class Simulator:
             change = random_changes(seed, spread, (2, self.system.n_v))
             start = State(start.t, retract(self.system, start.q, change[0]), start.v + change[1])
             start = run.separated(self.system.projected(start))
+        refuse_other_pose(self.system, start.q)
         self._u[:] = 0.0
         run.inputs = self._u
         self._point[:] = run.begun(start)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.dynamics import traced_refinement
 from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism
-from gauss.dynamics.front_rank import embedded_elimination
+from gauss.dynamics.front_rank import Embedding, embedding
+from gauss.dynamics.generic_rank import dependent_rows, is_generic_rank
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import FUNCTIONS
@@ -153,15 +155,91 @@ def test_a_stretched_leg_is_left_to_the_general_elimination():
 def test_legs_that_cannot_meet_their_own_rows_are_eliminated_without_hubs():
     """The rods of a delta robot turn about themselves."""
     system = gauss.compile_scene(gauss.load("delta_robot"))
-    assert embedded_elimination(system) is EmbeddedChains
+    assert embedding(system) == Embedding(EmbeddedChains, [])
     for state, tau in _states(system):
         given = system, state.q, state.v, state.t
         (found, _), (expected, _) = EmbeddedChains(*given).motion(tau), Mechanism(*given).motion(tau)
         _agree(found, expected)
 
 
-@pytest.mark.parametrize("name", ["bricard", "planetary_gears"])
-def test_redundant_constraints_are_left_to_the_general_elimination(name):
-    system = gauss.compile_scene(gauss.load(name))
-    plan = FUNCTIONS.plan(Question(system, Laws(system)))
-    assert plan.dynamics == "compiled" and plan.rejected[0].dynamics == "embedded loops"
+def _held_at_three_points():
+    """An arm of seven hinges on a free base, whose end is held on the ground by three ball joints."""
+    rng, scene, inner = np.random.default_rng(3), gauss.Scene("three points"), "base"
+    scene.body("base", 3.0, (0.3, 0.4, 0.5))
+    scene.free("root", "ground", "base")
+    for k in range(7):
+        x = np.array([0.3 * (k + 1), 0.05 * k**2, 0.1 * k])
+        scene.body(f"link{k}", 1.0, (0.02, 0.03, 0.04), position=tuple(x))
+        scene.revolute(f"hinge{k}", inner, f"link{k}", at=tuple(x - [0.15, 0.0, 0.0]), axis=tuple(rng.standard_normal(3)))
+        inner = f"link{k}"
+    for k, side in enumerate(np.eye(3)):
+        scene.ball(f"point{k}", "ground", inner, at=tuple(x + 0.2 * side))
+    return scene
+
+
+REDUNDANT = {  # with the number of rows that follow from the others
+    "bricard": (lambda: gauss.load("bricard"), 1),
+    "planetary_gears": (lambda: gauss.load("planetary_gears"), 2),
+    "held at three points": (_held_at_three_points, 3),
+}
+
+
+@pytest.mark.parametrize("name", REDUNDANT)
+def test_of_redundant_constraints_a_set_of_full_rank_is_eliminated(name):
+    make, redundant = REDUNDANT[name]
+    system = gauss.compile_scene(make())
+    found = embedding(system)
+    assert found is not None and sum(map(len, found.dependent)) == redundant
+    assert FUNCTIONS.plan(Question(system, Laws(system))).dynamics == "embedded loops"
+    for state, tau in _states(system):
+        exact = gauss.solve(gauss.assemble(system, state, tau)).qdd
+        under_loads = system.forward_dynamics(state.q, state.v, tau)
+        assert under_loads == pytest.approx(exact, rel=CERTIFIED, abs=CERTIFIED * np.abs(exact).max())
+        given = system, state.q, state.v, state.t
+        (rates, y), (expected, multipliers) = (one(*given).motion(tau) for one in (found, Mechanism))
+        _agree(rates, expected)
+        _agree(Mechanism(*given).reaction(y), Mechanism(*given).reaction(multipliers))
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "held at three points"])
+def test_a_row_that_is_wrongly_left_out_is_no_silent_fault(name, monkeypatch):
+    scene = replace((SCENES | {key: make for key, (make, _) in REDUNDANT.items()})[name](), gravity=(0.1, 0.2, -9.7))
+    monkeypatch.setattr(traced_refinement, "embedding_of", lambda system: Embedding(dependent=wrong))
+    system = gauss.compile_scene(scene)  # of its own: machine code is cached by content
+    rows = dependent_rows(system, system.initial_state())
+    wrong = [set(range(sum(len(c.sizes) for c in body.constraints))) for body in Mechanism(*_start(system)).bodies]
+    wrong = [own and own - {min(own - set(left))} for own, left in zip(wrong, rows, strict=True)]
+    for state, tau in _states(system):
+        exact = gauss.solve(gauss.assemble(system, state, tau)).qdd
+        found = system.forward_dynamics(state.q, state.v, tau)
+        assert found == pytest.approx(exact, rel=CERTIFIED, abs=CERTIFIED * np.abs(exact).max())
+
+
+def _start(system):
+    state = system.initial_state()
+    return system, state.q, state.v, state.t
+
+
+def _flat():
+    """Parallelogram whose rods all lie on one line."""
+    scene = gauss.Scene("flat")
+    places = {"ground": (0.0, 1.0), "left": (0.0, 0.5), "coupler": (0.5, 1.5), "right": (1.0, 1.5)}
+    for name in ("left", "coupler", "right"):
+        scene.body(name, 1.0, (0.1, 0.1, 0.1), position=(np.mean(places[name]), 0.0, 0.0))
+    for one, two, x in (
+        ("ground", "left", 0.0),
+        ("left", "coupler", 0.5),
+        ("coupler", "right", 1.5),
+        ("ground", "right", 1.0),
+    ):
+        scene.revolute(f"{one} {two}", one, two, at=(x, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    return scene
+
+
+def test_rows_that_depend_on_others_at_the_start_alone_are_kept():
+    for make, generic in ((_flat, False), (REDUNDANT["bricard"][0], True)):
+        system = gauss.compile_scene(make())
+        dependent = dependent_rows(system, system.initial_state())
+        assert sum(map(len, dependent)) == 1 and is_generic_rank(system, dependent) == generic
+        found = embedding(system)
+        assert found is not None and any(found.dependent) == generic

@@ -270,9 +270,9 @@ class ConstraintModes:
 
 def constraint_modes(system: System) -> ConstraintModes | None:
     """Modes of the constraints of a system that jump between them, or may; None where there are none."""
-    own = _has_any(system.relations, CONDITIONS) and cached(system, (ConstraintModes,), lambda: ConstraintModes(system))
+    own = _has_any(system, CONDITIONS) and cached(system, (ConstraintModes,), lambda: ConstraintModes(system))
     found = own if own and (own.unknown or own.steps) else None
-    unfolded = unfolded_system(system) if _has_any(system.relations, ("atan2",)) else None
+    unfolded = unfolded_system(system) if _has_any(system, ("atan2",)) else None
     if unfolded is None:
         return found
     modes = cached(unfolded, (ConstraintModes,), lambda: ConstraintModes(unfolded))
@@ -292,8 +292,10 @@ def refuse_surfaces(system: System, what: str):
         )
 
 
-def _has_any(relations: Relations, ops: tuple[str, ...]) -> bool:
-    return any(node.op in ops for node in reachable(relations.function.outputs))
+def _has_any(system: System, ops: tuple[str, ...]) -> bool:
+    """Whether constraints have operations of these kinds."""
+    outputs = system.relations.function.outputs
+    return cached(system, (_has_any, ops), lambda: any(node.op in ops for node in reachable(outputs)))
 
 
 def _conditions(traced: tuple[np.ndarray, np.ndarray], view: Symbols) -> list[Expression]:

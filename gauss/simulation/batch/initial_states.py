@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.dynamics.consistent_states import violations
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import StateError
 from gauss.simulation.held_inputs import real_numbers
 from gauss.system import UNIT_QUATERNION, State, System
@@ -42,7 +43,9 @@ def refuse_inconsistent(system: System, starts: np.ndarray, residual: np.ndarray
     """Raise a StateError if an initial state violates the constraints, given the residuals (batch,)."""
     worst = int(np.argmax(residual))
     if not residual[worst] <= CONSISTENT:
-        off = violations(system, State(0.0, *np.split(starts[:, worst], [system.n_q])))
+        state = State(0.0, *np.split(starts[:, worst], [system.n_q]))
+        refuse_other_pose(system, state.q)
+        off = violations(system, state)
         words = "; ".join(f"{name!r} {amount}" for name, amount in list(off.items())[:4])
         where = f"q0 and v0: start number {worst} has a constraint residual of {residual[worst]:.3g}: {words}"
         raise StateError(f"{where}. Take starts from system.initial_state(q, v).")

@@ -1,0 +1,58 @@
+"""Loops that cannot move are reduced to rigid bodies in the pose of the reference configuration.
+
+A structure may have several poses, as two rods between two points and their mirror image. A state in another one is no state
+of the reduced system.
+"""
+
+import numpy as np
+
+from gauss import math
+from gauss.codegen import Scalar
+from gauss.dynamics.store import cached
+from gauss.errors import StateError
+from gauss.system import System, coordinate_units
+
+OTHER_POSE = 1e-3  # difference of coordinates, relative to the units of the scene, above the accuracy of assembled loops
+
+
+def rigid_joints(system: System) -> list[str]:
+    """Joints of loops that cannot move: those whose coordinates belong to no subsystem; without those of couplings."""
+    return cached(system, (rigid_joints,), lambda: _rigid_joints(system))
+
+
+def _rigid_joints(system: System) -> list[str]:
+    moving = np.zeros(system.n_v, dtype=bool)
+    for one in system.subsystems:
+        moving[one.v] = True
+    coupled = {name for coupling in system.scene.couplings.values() for name in (coupling.driver, coupling.driven)}
+    return [one.name for one in system.joints if one.pair.n_v and not moving[one.v].any() and one.name not in coupled]
+
+
+def pose_difference(system: System, q) -> Scalar:
+    """Sum of the squared differences of the coordinates of :func:`rigid_joints` to the reference configuration, relative."""
+    total, reference, units = 0.0, system.reference.q, list(coordinate_units(system).values())
+    for name in rigid_joints(system):
+        joint = system.joint(name)
+        turned = system.quaternions.get(name, slice(0))
+        if turned.stop:
+            total = total + 1.0 - (q[turned] @ reference[turned]) ** 2
+        for k in range(joint.q.start, turned.start if turned.stop else joint.q.stop):
+            off = q[k] - reference[k]
+            turns = units[k] == "rad" and joint.pair.kind != "screw"
+            total = total + (2.0 - 2.0 * math.cos(off) if turns else (off / system.scale.length) ** 2)
+    return total
+
+
+def is_in_other_pose(system: System, q):
+    """Whether a rigid loop has another pose than in the reference configuration; a condition over symbols."""
+    return pose_difference(system, q) > OTHER_POSE**2
+
+
+def refuse_other_pose(system: System, q):
+    """Raise a StateError if a rigid loop has another pose than in the reference configuration."""
+    joints = rigid_joints(system)
+    if joints and is_in_other_pose(system, q):
+        raise StateError(
+            f"joints {', '.join(map(repr, joints))} cannot move, and their loops are rigid bodies in the pose of the scene; "
+            "the state has another pose of them: give the scene its bodies in that pose."
+        )
