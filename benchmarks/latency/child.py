@@ -58,16 +58,13 @@ def main(name: str, answer: str) -> dict:
     builtins.__import__ = watch.part("import", imported)
     import gauss
     from benchmarks.latency.scenes import STEPPED, scenes
-    from gauss.codegen import emit, function, machine
+    from gauss.codegen import emit, function, machine, staging
 
     compile_scene, ask = gauss.compile_scene, partial(ANSWERS[answer], gauss)
     if name in STEPPED:
         ask = partial(_stepped, gauss)
-    write = function.write
-    traced = watch.part("trace", write)
-    for module in [module for key, module in sys.modules.items() if key.startswith("gauss.")]:
-        if getattr(module, "write", None) is write:
-            setattr(module, "write", traced)  # noqa: B010  # modules have no such attribute for a type checker
+    for tracer in (function.write, staging.staged):
+        _replace(tracer, watch.part("trace", tracer))
     setattr(emit.Writer, "body", watch.part("write", emit.Writer.body))  # noqa: B010  # a method, for a type checker
     for compiler in ("quick_objects", "optimised_objects"):
         setattr(machine, compiler, watch.part("LLVM", _at_once(getattr(machine, compiler))))
@@ -94,6 +91,14 @@ def main(name: str, answer: str) -> dict:
         "rates": system.n_v,
         "result": result,
     }
+
+
+def _replace(function, by):
+    """Put another function in the place of one in all modules of gauss that name it."""
+    name = function.__name__
+    for module in [module for key, module in sys.modules.items() if key.startswith("gauss.")]:
+        if getattr(module, name, None) is function:
+            setattr(module, name, by)
 
 
 def _at_once(generate):

@@ -13,7 +13,7 @@ import dis
 import hashlib
 import struct
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache, cached_property, partial
@@ -64,37 +64,44 @@ class _Encoder:
 
     def __init__(self):
         self.parts: list[bytes] = []
-        self.enclosing: dict[int, int] = {}  # address of each object that contains the present one → its depth
         self.functions: dict[int, int] = {}  # address of each traced function encoded so far → its number
         self.names: dict[int, bytes] = {}  # address of each named object encoded so far → its name
         self.codes: dict[int, int] = {}  # address of each code object encoded so far → its number
 
     def encode(self, thing):
-        """Append the encoding of an object.
+        """Append the encoding of an object: its own part, then those of what it contains, in order.
 
         Raises
         ------
         NoDigestError
             If its content is unknown.
         """
-        kind = type(thing)
-        simple = _SIMPLE.get(kind)
-        if simple is not None:
-            self.parts.append(simple(thing))
-            return
-        depth = self.enclosing.get(id(thing))
-        if depth is not None:
-            self.parts.append(b"itself%d;" % depth)
-            return
-        self.enclosing[id(thing)] = len(self.enclosing)
-        _writer(kind)(self, thing)  # type: ignore[arg-type]  # a type is hashable
-        del self.enclosing[id(thing)]
+        enclosing: dict[int, int] = {}  # address of each object that contains the present one → its depth
+        left: list[tuple[Iterator, Any]] = []  # what is to follow an object, and that object, from the outermost on
+        present = iter((thing,))
+        while True:
+            for one in present:
+                kind = type(one)
+                simple = _SIMPLE.get(kind)
+                if simple is not None:
+                    self.parts.append(simple(one))
+                elif id(one) in enclosing:
+                    self.parts.append(b"itself%d;" % enclosing[id(one)])
+                elif inside := _writer(kind)(self, one):  # type: ignore[arg-type]  # a type is hashable
+                    enclosing[id(one)] = len(enclosing)
+                    left.append((present, one))
+                    present = iter(inside)
+                    break
+            else:
+                if not left:
+                    return
+                present, one = left.pop()
+                del enclosing[id(one)]
 
-    def sequence(self, tag: bytes, things):
-        """Append a number of objects."""
+    def sequence(self, tag: bytes, things: Sequence) -> Sequence:
+        """Append the head of a number of objects, which are to follow."""
         self.parts.append(b"%s%d(" % (tag, len(things)))
-        for thing in things:
-            self.encode(thing)
+        return things
 
 
 def _text(text: str) -> bytes:
@@ -114,8 +121,11 @@ _SIMPLE: dict[type, Callable[[Any], bytes]] = {
 }
 
 
+Writer = Callable[[_Encoder, Any], Sequence]  # appends the part of an object, and returns the objects to follow it
+
+
 @cache
-def _writer(kind: type) -> Callable[[_Encoder, Any], None]:
+def _writer(kind: type) -> Writer:
     """Encoding of objects of a kind."""
     for kinds, write, exactly in _WRITERS:
         if issubclass(kind, kinds):
@@ -123,41 +133,40 @@ def _writer(kind: type) -> Callable[[_Encoder, Any], None]:
     return _record if is_dataclass(kind) and _has_name(kind) else _refused
 
 
-def _refused(_: _Encoder, thing):
+def _refused(_: _Encoder, thing) -> Sequence:
     raise NoDigestError(f"{type(thing).__name__}: unknown content")
 
 
-def _tuple(encoder: _Encoder, thing):
+def _tuple(encoder: _Encoder, thing) -> Sequence:
     if type(thing) is not tuple:
         _named(encoder, type(thing))
     if set(map(type, thing)) == {float}:
         encoder.parts.append(b"v%d:" % len(thing) + struct.pack(f"<{len(thing)}d", *thing))
-    else:
-        encoder.sequence(b"t", thing)
+        return ()
+    return encoder.sequence(b"t", thing)
 
 
-def _member(encoder: _Encoder, member: Enum):
+def _member(encoder: _Encoder, member: Enum) -> Sequence:
     _named(encoder, type(member))
-    encoder.encode(member.name)
+    return (member.name,)
 
 
-def _slice(encoder: _Encoder, thing: slice | range):
+def _slice(encoder: _Encoder, thing: slice | range) -> Sequence:
     ends = thing.start, thing.stop, thing.step
     if all(type(end) in (int, NoneType) for end in ends):
         encoder.parts.append(repr(thing).encode() + b";")
-    else:
-        encoder.sequence(b"S", ends)
+        return ()
+    return encoder.sequence(b"S", ends)
 
 
-def _record(encoder: _Encoder, thing):
-    """Append the fields of a record; an attribute beside them must be a property computed from them."""
+def _record(encoder: _Encoder, thing) -> Sequence:
+    """The fields of a record; an attribute beside them must be a property computed from them."""
     kind = type(thing)
     beside = getattr(thing, "__dict__", {}).keys() - kind.__dataclass_fields__.keys()
     if not all(isinstance(getattr(kind, name, None), cached_property) for name in beside):
         _refused(encoder, thing)
     _named(encoder, kind)
-    for name in _field_names(kind):  # type: ignore[arg-type]  # a type is hashable
-        encoder.encode(getattr(thing, name))
+    return [getattr(thing, name) for name in _field_names(kind)]  # type: ignore[arg-type]  # a type is hashable
 
 
 @cache
@@ -165,30 +174,30 @@ def _field_names(kind: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind) if field.metadata.get(IS_CONTENT, True))
 
 
-def _array(encoder: _Encoder, array: np.ndarray):
+def _array(encoder: _Encoder, array: np.ndarray) -> Sequence:
     kind = f"a{array.dtype.str}{array.shape}:".encode()
     if array.dtype.fields is not None:
         _refused(encoder, array)
-    elif array.dtype.hasobject:
-        encoder.sequence(kind, array.ravel().tolist())
-    else:
-        encoder.parts.append(kind + array.tobytes())
+    if array.dtype.hasobject:
+        return encoder.sequence(kind, array.ravel().tolist())
+    encoder.parts.append(kind + array.tobytes())
+    return ()
 
 
-def _number(encoder: _Encoder, number: np.generic):
-    encoder.sequence(b"n", (number.dtype.str, number.tobytes()))
+def _number(encoder: _Encoder, number: np.generic) -> Sequence:
+    return encoder.sequence(b"n", (number.dtype.str, number.tobytes()))
 
 
-def _set(encoder: _Encoder, things):
+def _set(encoder: _Encoder, things) -> Sequence:
     found = []
     for thing in things:
         own = _Encoder()
         own.encode(thing)
         found.append(b"".join(own.parts))
-    encoder.sequence(b"u", sorted(found))
+    return encoder.sequence(b"u", sorted(found))
 
 
-def _named(encoder: _Encoder, thing):
+def _named(encoder: _Encoder, thing) -> Sequence:
     """Append the name of a top-level object of a package that the key of the cache holds."""
     name = encoder.names.get(id(thing))
     if name is None:
@@ -196,6 +205,7 @@ def _named(encoder: _Encoder, thing):
             _refused(encoder, thing)
         name = encoder.names[id(thing)] = b"@" + _text(thing.__module__) + _text(thing.__qualname__)
     encoder.parts.append(name)
+    return ()
 
 
 def _has_name(thing) -> bool:
@@ -211,38 +221,38 @@ def _has_name(thing) -> bool:
     return found is thing
 
 
-def _builtin(encoder: _Encoder, thing):
+def _builtin(encoder: _Encoder, thing) -> Sequence:
     owner = getattr(thing, "__self__", None)
-    if isinstance(owner, ModuleType) or owner is None:
-        if thing.__name__ in OPAQUE_BUILTINS:
-            _refused(encoder, thing)
-        _named(encoder, thing)
-    else:
-        encoder.sequence(b"m", (thing.__name__, owner))
+    if not (isinstance(owner, ModuleType) or owner is None):
+        return encoder.sequence(b"m", (thing.__name__, owner))
+    if thing.__name__ in OPAQUE_BUILTINS:
+        _refused(encoder, thing)
+    return _named(encoder, thing)
 
 
-def _ufunc(encoder: _Encoder, ufunc: np.ufunc):
+def _ufunc(encoder: _Encoder, ufunc: np.ufunc) -> Sequence:
     if getattr(np, ufunc.__name__, None) is not ufunc:
         _refused(encoder, ufunc)
     encoder.parts.append(b"@" + _text(ufunc.__name__))
+    return ()
 
 
-def _module(encoder: _Encoder, module: ModuleType):
+def _module(encoder: _Encoder, module: ModuleType) -> Sequence:
     if module.__name__.partition(".")[0] not in BY_NAME or module is builtins:
         _refused(encoder, module)
     encoder.parts.append(b"M" + _text(module.__name__))
+    return ()
 
 
-def _function(encoder: _Encoder, function: FunctionType):
-    """Append the name of a top-level function of this package, or the code of another and all that it can see."""
+def _function(encoder: _Encoder, function: FunctionType) -> Sequence:
+    """The name of a top-level function of this package, or the code of another and all that it can see."""
     if id(function) in encoder.names or _has_name(function):
-        _named(encoder, function)
-        return
+        return _named(encoder, function)
     ours = (function.__module__ or "").partition(".")[0] == PACKAGE
     closed = tuple(_content(cell) for cell in function.__closure__ or ())
     seen = {} if ours else named_globals(function)
-    encoder.sequence(b"p", (function.__defaults__, function.__kwdefaults__, vars(function), closed, seen))
-    encoder.encode(function.__code__)
+    defaults = function.__defaults__, function.__kwdefaults__
+    return encoder.sequence(b"p", (*defaults, vars(function), closed, seen, function.__code__))
 
 
 def _content(cell) -> tuple:
@@ -252,36 +262,33 @@ def _content(cell) -> tuple:
         return ()
 
 
-def _code(encoder: _Encoder, code: CodeType):
+def _code(encoder: _Encoder, code: CodeType) -> Sequence:
     if id(code) in encoder.codes:
         encoder.parts.append(b"K%d;" % encoder.codes[id(code)])
-        return
+        return ()
     encoder.codes[id(code)] = len(encoder.codes)
     if not IMPORTS.isdisjoint(code.co_code[::2]) or not OPAQUE_BUILTINS.isdisjoint(code.co_names):
         _refused(encoder, code)
-    encoder.sequence(b"k", [getattr(code, name) for name in CODE_FIELDS])
-    encoder.encode(code.co_consts)
+    return encoder.sequence(b"k", [*(getattr(code, name) for name in CODE_FIELDS), code.co_consts])
 
 
-def _traced(encoder: _Encoder, function: Function):
-    """Append the operations of a traced function."""
+def _traced(encoder: _Encoder, function: Function) -> Sequence:
+    """The operations of a traced function."""
     if id(function) in encoder.functions:
         encoder.parts.append(b"g%d;" % encoder.functions[id(function)])
-        return
+        return ()
     encoder.functions[id(function)] = len(encoder.functions)
     place = {node: k for k, node in enumerate(function.nodes)}
     ends = [place.get(x, -1) if isinstance(x, Expression) else float(x) for x in function.outputs]
     inputs = [place.get(symbol, -1) for symbol in function.inputs]
-    encoder.sequence(b"G", (function.name, function.parameters, inputs, ends, len(place)))
-    for node in place:
-        operands = ",".join([str(place[x]) for x in node.operands])
-        encoder.parts.append(b"x%s%s;" % (_text(node.op), operands.encode()))
-        encoder.encode(node.value)
+    operations = [f"{node.op} {','.join([str(place[x]) for x in node.operands])}" for node in place]
+    values = [node.value for node in place]
+    return encoder.sequence(b"G", (function.name, function.parameters, inputs, ends, "; ".join(operations), values))
 
 
 # kinds, their encoding, and whether a subclass is refused, since it may hold more
-_WRITERS: tuple[tuple[tuple[type, ...], Callable[[_Encoder, Any], None], bool], ...] = (
-    ((IdentityKey,), lambda encoder, key: encoder.encode(key.thing), True),
+_WRITERS: tuple[tuple[tuple[type, ...], Writer, bool], ...] = (
+    ((IdentityKey,), lambda _, key: (key.thing,), True),
     ((Function,), _traced, True),
     ((Enum,), _member, False),
     ((np.ndarray,), _array, True),

@@ -14,7 +14,7 @@ from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError
 from gauss.integrators import ExplicitPair, FixedStep
-from gauss.scene import Collider, Contact, Points
+from gauss.scene import ClosedGap, Collider, Contact, Points
 from gauss.scene.contact_pairs import have_closed_form
 from gauss.scene.patch_distances import no_closed_form
 from gauss.system import System, build, phase_scene, sides
@@ -44,6 +44,7 @@ CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordi
     ("Box", "HalfSpace"): 635,
     ("Box", "Box"): 42_787,
 }
+MOST_CLOSED_GAPS = 24  # of a phase up to which its code is made before its first evaluation: that of more takes seconds
 WIDEST_MECHANISM = 128  # rates up to which the mass matrix of a mechanism is dense straight-line code
 MOST_ROWS = (
     10  # loop constraints of a linear model in straight-line code: 15, of a Stewart platform, take minutes to compile
@@ -205,6 +206,13 @@ def small_contact_problem(ask: Question) -> list[str]:
     found = [f"its contacts have {rows} rows, more than {MOST_CONTACT_ROWS}"] if rows > MOST_CONTACT_ROWS else []
     n_v = ask.system.n_v
     return found + ([f"{n_v} rates beside contacts are more than {WIDEST_CONTACT}"] if n_v > WIDEST_CONTACT else [])
+
+
+def few_closed_gaps(ask: Question) -> list[str]:
+    """The closed gaps of a phase are few, and no more than its rates: code for redundant ones takes long to compile."""
+    closed = sum(isinstance(relation, ClosedGap) for relation in ask.system.scene.relations.values())
+    most = min(ask.system.n_v, MOST_CLOSED_GAPS)
+    return [f"{closed} closed gaps are more than {most}"] if closed > most else []
 
 
 def few_contact_operations(ask: Question) -> list[str]:

@@ -41,6 +41,7 @@ from gauss.dynamics.conditions import (
     contacts_alone,
     explicit,
     few_bodies,
+    few_closed_gaps,
     few_contact_operations,
     few_loop_rows,
     few_loops,
@@ -220,11 +221,23 @@ def _refused_state(ask: Question, why: str) -> str:
     return f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use system.accelerations(state, load)."
 
 
-# Active set of frictionless contacts.
-CONTACTS = RuleTable((_unilateral(traced_laws), Rule("state", "certified")), _refused_state)
-# A smooth phase between events: numpy first, compiled above the threshold of evaluations.
+_ACTIVE_SET = contacts_alone, smooth(compilable), smooth(traced_laws)
+# Active set of frictionless contacts; "tiered": by numpy first, compiled above a threshold of evaluations.
+CONTACTS = RuleTable(
+    (
+        Rule("state", "compiled", "certified", has_contacts, (*_ACTIVE_SET, few_contact_operations)),
+        Rule("state", "tiered", "certified", has_contacts, _ACTIVE_SET),
+        Rule("state", "certified"),
+    ),
+    _refused_state,
+)
+# A smooth phase between events.
 MODES = RuleTable(
-    (Rule("events", "compiled", "certified", conditions=(own_backend, compilable)), Rule("events", "certified")),
+    (
+        Rule("events", "compiled", "certified", conditions=(own_backend, compilable, few_closed_gaps)),
+        Rule("events", "tiered", "certified", conditions=(own_backend, compilable)),
+        Rule("events", "certified"),
+    ),
     _refused_state,
 )
 # Time steps and impacts: free accelerations, and responses to unit forces.

@@ -1,9 +1,12 @@
-"""Phases between events: their machine code is made when it pays, is kept, and moves them as numpy does."""
+"""Phases between events: their machine code moves them as numpy does, is kept, and every run gives the same digits."""
+
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 import gauss
+from gauss.dynamics import conditions
 from gauss.dynamics.engines import tiering
 from gauss.simulation.phases import phase
 
@@ -23,15 +26,23 @@ def _stopped_gears():
     return scene, 0.5
 
 
+def _box():
+    return gauss.load("box_on_plane_4"), 0.2
+
+
+def _friction():
+    return gauss.load("friction_oscillator"), 1.0
+
+
 @pytest.mark.parametrize("make", [_stops, _stopped_gears])
-def test_a_second_motion_is_compiled_from_the_start_and_the_same(make, monkeypatch):
+def test_machine_code_is_kept_and_moves_phases_as_numpy_does(make, monkeypatch):
     scene, end = make()
     system = gauss.compile_scene(scene)
-    monkeypatch.setattr(tiering, "LEAST_THRESHOLD", np.inf)
-    slow = gauss.simulate(system, end, times=[end], **TIGHT)
-    monkeypatch.setattr(tiering, "LEAST_THRESHOLD", 0)
+    with monkeypatch.context() as numpy_alone:
+        numpy_alone.setattr(conditions, "MOST_CLOSED_GAPS", -1)
+        numpy_alone.setattr(tiering, "LEAST_THRESHOLD", np.inf)
+        slow = gauss.simulate(system, end, times=[end], **TIGHT)
     gauss.simulate(system, end, times=[end], **TIGHT)
-    monkeypatch.setattr(tiering, "LEAST_THRESHOLD", np.inf)
     monkeypatch.setattr(phase, "build", None)  # nothing is made anew
     fast = gauss.simulate(system, end, times=[end], **TIGHT)
     assert "0 of them compiled" in slow.stats.method
@@ -42,8 +53,19 @@ def test_a_second_motion_is_compiled_from_the_start_and_the_same(make, monkeypat
     assert fast.work == pytest.approx(slow.work, abs=SAME)
 
 
-def test_each_motion_counts_its_own_evaluations():
-    scene, end = _stops()
+@pytest.mark.parametrize("make", [_stops, _stopped_gears, _box, _friction])
+@pytest.mark.parametrize("limits", [{}, {"MOST_CLOSED_GAPS": -1, "MOST_CONTACT_OPERATIONS": -1}], ids=["at once", "tiered"])
+def test_every_run_gives_the_same_digits(make, limits, monkeypatch):
+    """The first motion of a process, later ones, and those of several threads: what was compiled before is not seen."""
+    for name, value in limits.items():
+        monkeypatch.setattr(conditions, name, value)
+    scene, end = make()
     system = gauss.compile_scene(scene)
-    counts = [gauss.simulate(system, end, times=[end], **TIGHT).stats.evaluations for _ in range(2)]
-    assert counts[1] == pytest.approx(counts[0], rel=0.05)  # machine code differs by rounding, and so may its steps
+
+    def move(_=None):
+        motion = gauss.simulate(system, end, **TIGHT)
+        return [part.tobytes() for part in (motion.t, motion.q, motion.v, motion.work)], motion.stats.evaluations
+
+    first = move()
+    with ThreadPoolExecutor(3) as threads:
+        assert all(later == first for later in [move(), *threads.map(move, range(3))])

@@ -85,7 +85,7 @@ def unilateral_dynamics(system: System, laws: Laws, certified: Callable, doc: st
 
 
 class ActiveSetKernel:
-    """Active set of contacts at the level of accelerations, by machine code above the compile threshold.
+    """Active set of contacts at the level of accelerations, by machine code: at once, or above the compile threshold.
 
     Parameters
     ----------
@@ -95,11 +95,12 @@ class ActiveSetKernel:
 
     def __init__(self, system: System):
         self.system, self.gaps = system, len(system.contacts.placed)
-        self.threshold = CompileThreshold(CONTACT_THRESHOLD)
+        self.plan = CONTACTS.plan(Question(system, Laws(system)))
+        self.threshold = CompileThreshold(0 if self.plan.dynamics == "compiled" else CONTACT_THRESHOLD)
 
     def __call__(self, state: State, touching: np.ndarray) -> np.ndarray | None:
         """Those of the gaps ``touching`` that stay closed; None below the threshold, and where a check fails."""
-        if not self.threshold.passed() or self.kernel is None:
+        if self.plan.dynamics == "certified" or not self.threshold.passed():
             return None
         closed = np.zeros(self.gaps)
         closed[touching] = 1.0
@@ -109,11 +110,9 @@ class ActiveSetKernel:
         return touching[found[touching] <= 0.0]
 
     @cached_property
-    def kernel(self) -> Kernel | None:
-        """Machine code; None if a law cannot be traced."""
+    def kernel(self) -> Kernel:
+        """Machine code."""
         system, n_v = self.system, self.system.n_v
-        if CONTACTS.plan(Question(system, Laws(system))).dynamics != "unilateral":
-            return None
         laws = Laws(moreau_stepper(system).smooth)
 
         def flat(t, q, v, closed):

@@ -21,8 +21,9 @@ from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
-from gauss.dynamics.engines.tiering import tiered
+from gauss.dynamics.engines.tiering import tiered_kernels
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.scene import ClosedGap, Stop
@@ -192,7 +193,7 @@ def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndar
 
 
 class CutRowEngine(Engine):
-    """Accelerations of a phase with cut rows: by numpy first, compiled above the threshold of evaluations.
+    """Accelerations of a phase with cut rows: compiled, or by numpy up to a threshold of evaluations.
 
     Parameters
     ----------
@@ -204,13 +205,14 @@ class CutRowEngine(Engine):
         The cut rows.
     backend : str, Backend or class
         How accelerations are solved.
-    may_compile : bool
-        Whether the phase may be compiled.
+    plan : Plan
+        Of the phase.
     """
 
-    def __init__(self, system: System, cut: System, links: CutRows, backend: str | Backend | type, may_compile: bool):
-        self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
-        self.certified, self.counted = CertifiedEngine(backend), 0
+    def __init__(self, system: System, cut: System, links: CutRows, backend: str | Backend | type, plan: Plan):
+        self.system, self.cut, self.links = system, cut, links
+        self.plan: Plan | None = plan
+        self.certified = CertifiedEngine(backend)
         self.compiled: CompiledEngine | None = None
         self.Q = np.zeros(len(links.names))  # initial guess
 
@@ -243,10 +245,9 @@ class CutRowEngine(Engine):
 
     def _compile(self):
         """Compile the system without the rows once the evaluations reach the threshold."""
-        if self.compiled is not None or not self.may_compile:
+        if self.compiled is not None or self.plan is None:
             return
-        spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
-        kernels = tiered(self.cut).kernels(self.laws, spent)
+        kernels = tiered_kernels(self.cut, self.plan, self.laws, self.certified.evaluations)
         if kernels is not None:
             self.compiled = CompiledEngine(self.cut, kernels)
 
@@ -324,5 +325,5 @@ class CutRowEngine(Engine):
 
     def hand_over(self, t: float) -> bool:
         """Switch to the certified engine with all rows; False if that is in use already."""
-        used, self.compiled, self.may_compile = self.compiled is not None, None, False
+        used, self.compiled, self.plan = self.compiled is not None, None, None
         return used

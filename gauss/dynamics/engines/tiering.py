@@ -1,15 +1,17 @@
 """Tiered compilation: numpy first, machine code once evaluations have taken about as long as compiling will.
 
 So a motion takes at most twice as long as with the better of both. The time to compile grows with the number of operations,
-which is known once the equations are traced; tracing costs little. Thresholds are numbers of evaluations.
+which is known once the equations are traced; tracing costs little. Thresholds are numbers of evaluations. Those of a motion
+are counted from its start, whatever was compiled before: numpy and machine code differ by rounding, and a motion is to be
+the same to the last digit in every run.
 """
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from threading import Lock
 
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_system import Kernels, Program
@@ -80,48 +82,26 @@ class TieredFunction:
         return self.function(*args, **kwargs)
 
 
-class Tiered:
-    """Machine code of one system, for steps formed by Python, shared by motions and phases.
+def tiered_kernels(system: System, plan: Plan, laws: Laws, spent: int) -> Kernels | None:
+    """Machine code of a phase; None where the plan is not to compile, below the threshold, and with opaque laws.
 
     Parameters
     ----------
     system : System
         One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
+    plan : Plan
+        Of the phase, see :data:`gauss.dynamics.plan.MODES`: "compiled" has no threshold, "tiered" has one.
+    laws : Laws
+        Loads of the system.
+    spent : int
+        Evaluations of the phase by numpy in this motion.
     """
-
-    def __init__(self, system: System):
-        self.system, self.spent = system, 0
-        self.programs: dict[str, Program] = {}
-        self.made: dict[str, Kernels] = {}
-        self._lock = Lock()
-
-    def kernels(self, laws: Laws, spent: int) -> Kernels | None:
-        """Machine code for these laws; None below the threshold, and with opaque laws.
-
-        Parameters
-        ----------
-        laws : Laws
-            Loads of the system.
-        spent : int
-            Evaluations by numpy since the last call.
-        """
-        with self._lock:
-            return self._kernels(laws, spent)
-
-    def _kernels(self, laws: Laws, spent: int) -> Kernels | None:
-        self.spent += spent
-        if laws.key in self.made:
-            return self.made[laws.key]
-        at_once = _at_once.get()
-        if laws.called or (self.spent < LEAST_THRESHOLD and not at_once):
-            return None
-        program = self.programs.setdefault(laws.key, Program(self.system, laws, Drift()))
-        operations = cached_on_disk(self.system, (Tiered, laws.key), lambda: sum(program.rates.operations().values()))
-        if self.spent < LEAST_THRESHOLD + PER_OPERATION * operations and not at_once:
-            return None
-        return self.made.setdefault(laws.key, program.cached_kernels)
-
-
-def tiered(system: System) -> Tiered:
-    """Machine code of a system, cached from motion to motion."""
-    return cached(system, (Tiered,), lambda: Tiered(system))
+    if laws.called or plan.dynamics not in ("compiled", "tiered"):
+        return None
+    program = cached(system, (Program, laws.key), lambda: Program(system, laws, Drift()))
+    if plan.dynamics == "compiled" or _at_once.get():
+        return program.cached_kernels
+    if spent < LEAST_THRESHOLD:
+        return None
+    operations = cached_on_disk(system, (tiered_kernels, laws.key), lambda: sum(program.rates.operations().values()))
+    return program.cached_kernels if spent >= LEAST_THRESHOLD + PER_OPERATION * operations else None

@@ -23,7 +23,6 @@ from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
-from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, crossed_time
@@ -96,8 +95,7 @@ class EventDrivenRun(PythonRun):
         others = self.selector.names or self.selector.losses or self.selector.trains
         if self.backend != "auto" or others or not self.names:
             return None
-        key, make = (ActiveSetKernel, Laws(self.system).key), lambda: ActiveSetKernel(self.system)
-        return self.system.mechanics.on_demand(key, make)
+        return ActiveSetKernel(self.system)
 
     def _gaps(self, state: State) -> np.ndarray:
         """Gap functions and their rates (2, m)."""

@@ -19,7 +19,7 @@ from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, closed_stop, cut_rows
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.tiering import tiered
+from gauss.dynamics.engines.tiering import tiered_kernels
 from gauss.dynamics.gap_functions import margin_kernel
 from gauss.dynamics.laws.switching_functions import SwitchingFunctions, watch_of
 from gauss.dynamics.laws.traced_laws import Laws
@@ -103,21 +103,19 @@ class Phase:
         self.signs = np.array([mode.set_valued[name] for name in selector.names], dtype=int)
         self.system, self.links, cut, self.margins = phase_parts(whole, tuple(names), mode, places)
         smooth = self.system if cut is None else cut
-        self.backend, may_compile = backend, MODES.plan(Question(smooth, Laws(smooth), backend)).dynamics == "compiled"
+        self.backend, self.plan = backend, MODES.plan(Question(smooth, Laws(smooth), backend))
         if cut is not None:
-            self.solvers: list = [CutRowEngine(self.system, cut, self.links, backend, may_compile)]
+            self.solvers: list = [CutRowEngine(self.system, cut, self.links, backend, self.plan)]
         else:
             self.solvers = [CertifiedEngine(backend)]
-        self.may_compile, self.counted = may_compile and not self.links.names, 0
         rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
         self.rows = np.array([rows[name].start for name in names], dtype=int)
 
     @property
     def solver(self) -> Engine:
-        """Source of accelerations: numpy first, compiled above the threshold of evaluations."""
-        if self.may_compile and len(self.solvers) == 1:
-            done = self.solvers[0].evaluations
-            kernels, self.counted = tiered(self.system).kernels(self.laws, done - self.counted), done
+        """Source of accelerations: machine code, or numpy up to a threshold of evaluations."""
+        if not self.links.names and len(self.solvers) == 1:
+            kernels = tiered_kernels(self.system, self.plan, self.laws, self.solvers[0].evaluations)
             if kernels is not None:
                 self.solvers.append(CompiledEngine(self.system, kernels))
         return self.solvers[-1]
