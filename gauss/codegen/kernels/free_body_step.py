@@ -38,7 +38,7 @@ ADDRESSES = (
     *ISLANDS,
     *("modes", "next_modes", "closed", "fresh", "counts"),
 )
-SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "unit", "tolerance", "unsolved")
+SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "unit", "tolerance", "unsolved", "removal")
 POSE, COORDINATES, RATES = 24, 7, 6  # pose and velocities of a body, coordinates and rates of its joint
 
 
@@ -237,7 +237,7 @@ class _FreeBodyStepWriter:
         law = at.table("law")[p] - 1
         at["mu"][place], e = at["friction"][law], at["restitution"][law]
         gap = row[0]
-        given = gap, first[0], s["h"], s["rest"], s["share"]
+        given = gap, first[0], s["h"], s["rest"], s["share"], r.maximum(s["h"], s["removal"])
         (plastic,) = r.inline(self.functions.plastic, *given)
         (elastic,) = r.inline(self.functions.elastic, *given[:2], e, *given[2:])
         for q in range(3):

@@ -19,21 +19,15 @@ from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep
 from gauss.dynamics.contact.contact_step import ContactProblem
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.free_body_step import ATTEMPTS, REACH_MARGIN
+from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
 from gauss.dynamics.contact.mechanism_compliance import Compliance
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms, mechanism_kernels
 from gauss.dynamics.contact.mechanism_rows import MechanismRows, StepRows
-from gauss.dynamics.contact.moreau_step import (
-    MIDPOINT,
-    MISSED_CLOSING_RATE,
-    REST_STEPS,
-    START_OVERLAP,
-    UNSEEN_OVERLAP,
-    is_impact,
-    least_rate,
-)
+from gauss.dynamics.contact.moreau_step import MIDPOINT, MISSED_CLOSING_RATE
 from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.contact.step_doubts import JAMMED_RESPONSE, paradoxes_of_step, refuse_jam
@@ -100,6 +94,8 @@ class MechanismStepper:
         A system with contacts of shapes.
     held : bool
         Whether the inputs of the scene are held in each step; otherwise they are zero.
+    removal : float
+        Least time in which penetration is removed [s]; zero: within a step.
 
     Attributes
     ----------
@@ -107,8 +103,9 @@ class MechanismStepper:
         Values of the inputs in the next step.
     """
 
-    def __init__(self, system: System, held: bool = False):
+    def __init__(self, system: System, held: bool = False, removal: float = 0.0):
         self.system, self.smooth, self.table = system, smooth_system(system), ShapeTable(system)
+        self.removal = removal
         carriers = tuple(sorted({int(body) for body in self.table.body if body >= 0}))
         self.kernels = mechanism_kernels(system, self.smooth, carriers, held)
         self.inputs = np.zeros(len(system.scene.inputs) if held else 0)
@@ -124,6 +121,7 @@ class MechanismStepper:
         self.constants = {
             "margin": REACH_MARGIN,
             "missed": MISSED_CLOSING_RATE,
+            "removal": removal,
             "jammed": JAMMED_RESPONSE,
             "contact_unit": self.rows.contact_unit,
         }
@@ -333,7 +331,7 @@ class MechanismStepper:
         coefficients = self.rows.coefficients
         for e in coefficients:
             mine = slice(0, m) if len(coefficients) == 1 else np.flatnonzero(rows.restitution == e)
-            after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], float(e), h, rest, share)
+            after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], float(e), h, rest, share, max(h, self.removal))
         force, scale = self.rows.start(near, rows, self.known), 1.0 + np.abs(rows.rate).max(initial=0.0)
         active = (after[:m] < 0.0) | (force[:m] > 0.0)
         responses = rows.K @ begun.H

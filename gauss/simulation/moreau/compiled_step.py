@@ -68,7 +68,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         normals = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # above 0 without a contact normal
         lost = [
             math.where(apart <= -deepest, 1.0, 0.0)
-            for apart, deepest in zip(touch.apart, stepper.guarded.values(), strict=True)
+            for apart, deepest in zip(touch.apart, stepper.overlaps.deepest.values(), strict=True)
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
         unseen = program.watch.passes(point, Point(found.state, found.work, rates))
