@@ -17,12 +17,7 @@ from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactG
 from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_memory
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
-from gauss.dynamics.contact.contact_step import (
-    LAW_TOLERANCE,
-    ContactLaws,
-    ContactProblem,
-    contact_solver,
-)
+from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem, contact_solver
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
 from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
@@ -307,10 +302,11 @@ class FreeBodyStepper:
             Step [s], and the share of it that the bodies have moved.
         """
         b, before, rest = known[..., 1] + (h * (1.0 - share)) * near.bias, known[:, 0, 0], self._rest(begun)
-        restitution = self.table.restitution[near.law]
+        restitution, closed = self.table.restitution[near.law], self._start(near)[:, 0] * (self.removal > 0.0)
         for e in self.coefficients:
             mine = slice(None) if len(self.coefficients) == 1 else restitution == e
-            b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), h, rest, share, max(h, self.removal))
+            given = h, rest, share, max(h, self.removal)
+            b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), *given, closed[mine])
         return b
 
     def _dense(self, near: NearContacts, begun: _Begun, bodies, b, f, friction):

@@ -2,7 +2,9 @@
 
 A gap d that would close within a step closes at its end, ḋ⁺ ≥ −d/((1 − s) h). Penetration is removed with ḋ⁺ ≥ −d/τ. In
 steps of one length τ is the step. Where steps become shorter, that speed would grow without bound, and bodies that penetrate
-a little would jump apart: then τ is a time of the scene, over which the gap closes exponentially, whatever the steps.
+a little would jump apart: then τ is a time of the scene, in which the gap closes exponentially, whatever the steps. What is
+left of a gap that stays closed vanishes in the same time: if it closed at the end of each step, curved gaps would make the
+rates alternate in proportion to the step.
 """
 
 from gauss import math
@@ -22,7 +24,7 @@ def _both(one, other):
     return math.where(one, math.where(other, 1.0, 0.0), 0.0)
 
 
-def least_rate(width, rate, restitution: Scalar, h, rest, share, removal):
+def least_rate(width, rate, restitution: Scalar, h, rest, share, removal, closed=0.0):
     """Least rate of a gap after a step; numbers, arrays or expressions.
 
     Parameters
@@ -39,8 +41,12 @@ def least_rate(width, rate, restitution: Scalar, h, rest, share, removal):
         Share of the step before.
     removal : float
         Time in which penetration is removed [s], a step at least: without oscillation.
+    closed : float
+        Above 0 for a gap that is closed and stays so: then also what is left of it closes in that time.
     """
-    shut = math.where(width > 0.0, -width / ((1.0 - share) * h), -width / removal)
+    stays = isinstance(closed, float) and not closed
+    opened = width > 0.0 if stays else _both(width > 0.0, closed <= 0.0) > 0.0
+    shut = math.where(opened, -width / ((1.0 - share) * h), -width / removal)
     if isinstance(restitution, float) and not restitution:
         return shut
     hit = _both(width + h * rate <= 0.0, rate < -rest)
@@ -56,6 +62,6 @@ def laws_of_gaps() -> tuple[Function, Function, Function]:
     """Traced: whether a gap has an impact, and its least rates after a step, without restitution and with it."""
     return (
         write(lambda x: [is_impact(*x)], 5, name="impact"),
-        write(lambda x: [least_rate(x[0], x[1], 0.0, *x[2:])], 6, name="plastic"),
-        write(lambda x: [least_rate(*x)], 7, name="elastic"),
+        write(lambda x: [least_rate(x[0], x[1], 0.0, *x[2:])], 7, name="plastic"),
+        write(lambda x: [least_rate(*x)], 8, name="elastic"),
     )

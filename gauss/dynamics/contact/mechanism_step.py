@@ -237,7 +237,8 @@ class MechanismStepper:
         """Step of length h up to its contact problem, which expects the forces of the last step."""
         rest = self.rest(state.v)
         share, begun, near, rows, _ = self._open(state, h, rest)
-        return OpenStep(begun, near, rows, self._without_forces(rows, begun, h, rest, share))
+        force = self.rows.start(near, rows, self.known)
+        return OpenStep(begun, near, rows, self._without_forces(rows, begun, h, rest, share, force))
 
     def _prescribed_power(self, rows: StepRows, begun: FreeStep, a: np.ndarray, v: np.ndarray, force: np.ndarray) -> float:
         """Power of constraints that prescribe velocities [W]: (M a − τ − Kᵀ f) · v, as all others have none."""
@@ -286,13 +287,14 @@ class MechanismStepper:
         speeds = REST_STEPS * h * np.abs(rows.K[:m] @ begun.acceleration + rows.bias[:m]) + rest
         return is_impact(rows.gap, rows.rate[:m], speeds, h, share)
 
-    def _without_forces(self, rows: StepRows, begun: FreeStep, h: float, rest: float, share: float) -> np.ndarray:
-        """Rates (n,) after a step without forces, less the least that gaps may have."""
+    def _without_forces(self, rows: StepRows, begun: FreeStep, h: float, rest: float, share: float, force) -> np.ndarray:
+        """Rates (n,) after a step without forces, less the least that gaps may have; with the forces of the last step."""
         after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
         coefficients = self.rows.coefficients
         for e in coefficients:
             mine = slice(0, rows.gap.size) if len(coefficients) == 1 else np.flatnonzero(rows.restitution == e)
-            after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], float(e), h, rest, share, max(h, self.removal))
+            given = float(e), h, rest, share, max(h, self.removal), force[: rows.gap.size][mine] * (self.removal > 0.0)
+            after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], *given)
         return after
 
     def _solve(self, state: State, rows: StepRows, begun: FreeStep, near: NearContacts, h: float, rest: float, share: float):
@@ -300,8 +302,8 @@ class MechanismStepper:
         m, n = rows.gap.size, rows.rate.size
         if not n:
             return np.zeros(0), np.zeros(begun.acceleration.size), 0.0
-        after = self._without_forces(rows, begun, h, rest, share)
         force, scale = self.rows.start(near, rows, self.known), 1.0 + np.abs(rows.rate).max(initial=0.0)
+        after = self._without_forces(rows, begun, h, rest, share, force)
         active = (after[:m] < 0.0) | (force[:m] > 0.0)
         responses = rows.K @ begun.H
         while True:

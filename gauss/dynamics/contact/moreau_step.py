@@ -160,7 +160,7 @@ class MoreauStepper:
             name = [*self.names, *self.sliding, *self.system.scene.set_valued][row]
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
         m = touch.width.size
-        after = self.without_forces(touch, free.acceleration, h, rest, share)
+        after = self.without_forces(touch, free.acceleration, h, rest, share, force)
         scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
         active_gaps = (after[:m] < 0.0) | (force[:m] > 0.0)
@@ -233,7 +233,7 @@ class MoreauStepper:
         gaps = zip(touch.width, touch.rate, speeds, strict=False)
         return [is_impact(width, rate, speed, h, share) for width, rate, speed in gaps]
 
-    def without_forces(self, touch: ContactTerms, acceleration, h, rest, share) -> np.ndarray:
+    def without_forces(self, touch: ContactTerms, acceleration, h, rest, share, start) -> np.ndarray:
         """Rates (n,) after a step without contact forces, less the least that gaps may have; numbers or expressions.
 
         The least rate is that of restitution after an impact, else that which closes the gap at the end of the step.
@@ -250,10 +250,12 @@ class MoreauStepper:
             Rate below which a gap neither opens nor closes, in units of the scene.
         share : float
             Share of the step before.
+        start : ndarray, shape (n,)
+            Forces of the last step, or expressions.
         """
-        gaps = zip(touch.width, touch.rate, self.restitution, strict=False)
+        gaps = zip(touch.width, touch.rate, self.restitution, start if self.removal else np.zeros(len(start)), strict=False)
         removal = math.maximum(h, self.removal) if self.removal else h
-        least = [least_rate(width, rate, e, h, rest, share, removal) for width, rate, e in gaps]
+        least = [least_rate(width, rate, e, h, rest, share, removal, closed) for width, rate, e, closed in gaps]
         least += [0.0] * (touch.rate.size - len(least))
         return touch.rate + h * (touch.J @ acceleration + (1.0 - share) * touch.bias) - np.array(least)
 

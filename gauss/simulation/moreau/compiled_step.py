@@ -52,7 +52,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         H = stepper.compliance(mechanism)
         expected = H @ (touch.J.T @ before) * (method_state[n] * (1.0 / MIDPOINT))  # zero after an impact
         _, free = program.instant(advance_rates(state, first.acceleration + expected, h, share))
-        after = stepper.without_forces(touch, free.acceleration, h, rest, share)
+        after = stepper.without_forces(touch, free.acceleration, h, rest, share, before)
         limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
