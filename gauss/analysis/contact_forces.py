@@ -161,7 +161,7 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
 def _parts(trajectory: Trajectory):
     plan = trajectory.stats.plan
     if plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None:
-        stepper = contact_stepper(trajectory.system)
+        stepper = contact_stepper(trajectory.system, removal=trajectory.removal)
         stepper.forget()
         for index in range(len(trajectory)):
             yield stepper.forces_over(trajectory.state(index), trajectory.step)

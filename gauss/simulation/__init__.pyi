@@ -1,6 +1,7 @@
 from gauss.simulation.batch.batch_result import Rollout
 from gauss.simulation.batch.rollout import rollout
 from gauss.simulation.batch.simulator_batch import SimulatorBatch
+from gauss.simulation.contact_export import friction_problem
 from gauss.simulation.initial_overlaps import resolve_overlaps
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.prepared_motion import PreparedMotion, prepare
@@ -20,6 +21,7 @@ __all__ = [
     "Trajectory",
     "crossings",
     "prepare",
+    "friction_problem",
     "resolve_overlaps",
     "rollout",
     "simulate",

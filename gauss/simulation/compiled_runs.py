@@ -41,13 +41,13 @@ def adaptive_run(problem: Problem, dynamics: str) -> "CompiledAdaptiveRun":
     return CompiledAdaptiveRun(problem, program_of(dynamics))
 
 
-def moreau_run(problem: Problem) -> "CompiledMoreauRun":
-    """Moreau–Jean steps of a problem in machine code."""
+def moreau_run(problem: Problem, removal: float = 0.0) -> "CompiledMoreauRun":
+    """Moreau–Jean steps of a problem in machine code; penetration is removed in a time ``removal`` [s], zero: in a step."""
     laws = smooth_question(problem.question).laws
     if laws.called:
         from gauss.simulation.moreau.called_run import CalledMoreauRun
 
-        return CalledMoreauRun(problem, laws)
+        return CalledMoreauRun(problem, laws, removal)
     from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 
-    return CompiledMoreauRun(problem, laws)
+    return CompiledMoreauRun(problem, laws, removal=removal)

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from gauss.codegen.kernels import Due
-from gauss.dynamics.contact.moreau_step import START_OVERLAP
+from gauss.dynamics.contact.overlaps import START_OVERLAP
 from gauss.dynamics.gap_functions import gaps
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SimulationError

@@ -180,6 +180,8 @@ class Trajectory:
         Arguments of the simulation by name.
     energies : EnergyRecord, optional
         Energies recorded by the compiled loop, of motions that it computed from start to end.
+    removal : float
+        Time in which steps chosen by error control remove penetration [s]; zero: within a step.
     """
 
     system: System
@@ -192,6 +194,7 @@ class Trajectory:
     step: float | None = None
     settings: dict = field(default_factory=dict, repr=False)
     energies: EnergyRecord | None = field(default=None, repr=False, compare=False)
+    removal: float = field(default=0.0, repr=False)
 
     @classmethod
     def from_coordinates(cls, system: System, t, q, v=None) -> "Trajectory":

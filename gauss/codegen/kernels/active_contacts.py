@@ -38,8 +38,10 @@ class ActiveContacts:
             push = self.at.dot(self.at["K"].after(i * n_v), self.at["a"], n_v)
             self.at["after"][i] = self.at["rate"][i] + s["h"] * (push + self.at.remaining * self.at["bias"][i])
             scale[0] = r.maximum(r.absolute(self.at["rate"][i]), scale[0])
+        removal = r.maximum(s["h"], s["removal"])
         with r.each(m + g) as i:
-            given = self.at["gap"][i], self.at["rate"][i], s["h"], s["rest"], s["share"]
+            closed = r.choose(s["removal"] > 0.0, self.at["force"][i], 0.0)
+            given = self.at["gap"][i], self.at["rate"][i], s["h"], s["rest"], s["share"], removal, closed
             (plastic,) = r.inline(self.functions.plastic, *given)
             (elastic,) = r.inline(self.functions.elastic, *given[:2], self.at["e"][i], *given[2:])
             self.at["after"][i] = self.at["after"][i] - r.choose(self.at["e"][i] > 0.0, elastic, plastic)

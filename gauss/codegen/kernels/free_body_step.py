@@ -38,7 +38,7 @@ ADDRESSES = (
     *ISLANDS,
     *("modes", "next_modes", "closed", "fresh", "counts"),
 )
-SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "unit", "tolerance", "unsolved")
+SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "unit", "tolerance", "unsolved", "removal")
 POSE, COORDINATES, RATES = 24, 7, 6  # pose and velocities of a body, coordinates and rates of its joint
 
 
@@ -162,10 +162,10 @@ class _FreeBodyStepWriter:
             with r.each(m) as c:
                 self._touch(c)
             self.islands.divide(m)
+            self._known(m)
             with r.each(m) as c:
                 self._row(c)
             with r.when(~(self._impact(m) > 0.0)):
-                self._known(m)
                 solved = self.islands.solve()
                 with r.when(solved & (self._speed("added") <= s["margin"] * speed)):
                     self._finish(m)
@@ -237,7 +237,8 @@ class _FreeBodyStepWriter:
         law = at.table("law")[p] - 1
         at["mu"][place], e = at["friction"][law], at["restitution"][law]
         gap = row[0]
-        given = gap, first[0], s["h"], s["rest"], s["share"]
+        closed = r.choose(s["removal"] > 0.0, at["f"][place * 3], 0.0)
+        given = gap, first[0], s["h"], s["rest"], s["share"], r.maximum(s["h"], s["removal"]), closed
         (plastic,) = r.inline(self.functions.plastic, *given)
         (elastic,) = r.inline(self.functions.elastic, *given[:2], e, *given[2:])
         for q in range(3):

@@ -37,7 +37,8 @@ class StepFunctions:
     impact : Function
         (gap, rate, speed, h, share) → 1 for an impact.
     plastic, elastic : Function
-        (gap, rate, h, rest, share), the latter with the coefficient of restitution after the rate → least rate.
+        (gap, rate, h, rest, share, removal, closed), the latter with the coefficient of restitution after the rate → least
+        rate.
     """
 
     place: Function

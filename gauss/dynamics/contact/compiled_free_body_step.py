@@ -9,10 +9,9 @@ from gauss.codegen import from_disk
 from gauss.codegen.kernels import CompiledFreeBodyStep, FreeBodyFunctions
 from gauss.codegen.kernels.contact_islands import ISLANDS
 from gauss.codegen.kernels.free_body_step import FREE_BODIES, SETTINGS
-from gauss.dynamics.contact.compiled_mechanism_step import laws_of_gaps
 from gauss.dynamics.contact.compiled_step_memory import CompiledStepMemory
 from gauss.dynamics.contact.free_bodies import CONSTANTS, begin_function, end_function, place_function
-from gauss.dynamics.contact.moreau_step import REST_STEPS
+from gauss.dynamics.contact.gap_laws import REST_STEPS, laws_of_gaps
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.dynamics.contact.paradox import SLIDING as SLIDING_SPEED
 from gauss.dynamics.contact.shape_table import MOST_FEATURES

@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import Function, from_disk, write
+from gauss.codegen import from_disk
 from gauss.codegen.kernels import CallingSteps, CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.step_memory import MECHANISM, STEP_SETTINGS, TERMS
 from gauss.dynamics.contact.compiled_step_memory import CompiledStepMemory, LoopOfSteps
 from gauss.dynamics.contact.contact_step import contact_solver
 from gauss.dynamics.contact.free_bodies import place_function
+from gauss.dynamics.contact.gap_laws import laws_of_gaps
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms
-from gauss.dynamics.contact.moreau_step import is_impact, least_rate
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.dynamics.contact.paradox import SLIDING as SLIDING_SPEED
 from gauss.dynamics.contact.shape_table import MOST_FEATURES
@@ -171,12 +171,3 @@ def compiled_mechanism_step() -> CompiledMechanismStep:
         return CompiledMechanismStep(StepFunctions(place_function(), contact_solver(), *laws_of_gaps()))
 
     return from_disk((CompiledMechanismStep,), make)
-
-
-def laws_of_gaps() -> tuple[Function, Function, Function]:
-    """Traced: whether a gap has an impact, and its least rates after a step, without restitution and with it."""
-    return (
-        write(lambda x: [is_impact(*x)], 5, name="impact"),
-        write(lambda x: [least_rate(x[0], x[1], 0.0, *x[2:])], 5, name="plastic"),
-        write(lambda x: [least_rate(*x)], 6, name="elastic"),
-    )

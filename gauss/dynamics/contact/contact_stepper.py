@@ -8,13 +8,27 @@ from gauss.dynamics.store import cached
 from gauss.system import System
 
 
-def contact_stepper(system: System, held: bool = False) -> FreeBodyStepper | MechanismStepper:
-    """Stepper of a system, made once for its laws as they are now; with inputs that are held in each step, or without."""
+def contact_stepper(system: System, held: bool = False, removal: float = 0.0) -> FreeBodyStepper | MechanismStepper:
+    """Stepper of a system, made once for its laws as they are now; with inputs that are held in each step, or without.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    held : bool
+        Whether the inputs of the scene are held in each step.
+    removal : float
+        Least time in which penetration is removed [s]; zero: within a step.
+    """
     laws = Laws(smooth_system(system))
     names = tuple(bound.load.name for bound in laws.called)
-    return cached(system, (contact_stepper, held, laws.key, names), lambda: new_contact_stepper(system, held))
+    return cached(
+        system, (contact_stepper, held, removal, laws.key, names), lambda: new_contact_stepper(system, held, removal)
+    )
 
 
-def new_contact_stepper(system: System, held: bool = False) -> FreeBodyStepper | MechanismStepper:
-    """Stepper of a system, for one motion alone."""
-    return MechanismStepper(system, held) if held or not are_free_in_contact(system) else FreeBodyStepper(system)
+def new_contact_stepper(system: System, held: bool = False, removal: float = 0.0) -> FreeBodyStepper | MechanismStepper:
+    """Stepper of a system, for one motion alone; as of :func:`contact_stepper`."""
+    if held or not are_free_in_contact(system):
+        return MechanismStepper(system, held, removal)
+    return FreeBodyStepper(system, removal)

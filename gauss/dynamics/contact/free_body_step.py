@@ -17,24 +17,14 @@ from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactG
 from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_memory
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
-from gauss.dynamics.contact.contact_step import (
-    LAW_TOLERANCE,
-    ContactLaws,
-    ContactProblem,
-    contact_solver,
-)
+from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem, contact_solver
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
+from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
-from gauss.dynamics.contact.moreau_step import (
-    MIDPOINT,
-    REST_STEPS,
-    START_OVERLAP,
-    UNSEEN_OVERLAP,
-    is_impact,
-    least_rate,
-)
+from gauss.dynamics.contact.moreau_step import MIDPOINT
 from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.errors import SimulationError, StateError
@@ -108,10 +98,12 @@ class FreeBodyStepper:
     ----------
     system : System
         Bodies on free joints from the ground, or fixed to it, without loads; contacts of shapes.
+    removal : float
+        Least time in which penetration is removed [s]; zero: within a step.
     """
 
-    def __init__(self, system: System):
-        self.system, self.kernels = system, free_body_kernels()
+    def __init__(self, system: System, removal: float = 0.0):
+        self.system, self.kernels, self.removal = system, free_body_kernels(), removal
         self.table = ShapeTable(system)
         self.moving = [joint for joint in system.joints if joint.pair.n_v]
         Phi = system.Phi.reshape(-1, 6)
@@ -130,7 +122,13 @@ class FreeBodyStepper:
         self.first_set_valued, self.record = len(self.elements), ModeRecord(len(self.elements))
         self.graph: ContactGraph | None = None
         unit = system.scale.length / system.scale.time
-        settings = {"margin": REACH_MARGIN, "unit": unit, "tolerance": LAW_TOLERANCE, "unsolved": UNSOLVED}
+        settings = {
+            "margin": REACH_MARGIN,
+            "unit": unit,
+            "tolerance": LAW_TOLERANCE,
+            "unsolved": UNSOLVED,
+            "removal": removal,
+        }
         self.memory = first_memory(self, block_contact_laws(), settings)
         self.forget()
 
@@ -304,10 +302,11 @@ class FreeBodyStepper:
             Step [s], and the share of it that the bodies have moved.
         """
         b, before, rest = known[..., 1] + (h * (1.0 - share)) * near.bias, known[:, 0, 0], self._rest(begun)
-        restitution = self.table.restitution[near.law]
+        restitution, closed = self.table.restitution[near.law], self._start(near)[:, 0] * (self.removal > 0.0)
         for e in self.coefficients:
             mine = slice(None) if len(self.coefficients) == 1 else restitution == e
-            b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), h, rest, share)
+            given = h, rest, share, max(h, self.removal)
+            b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), *given, closed[mine])
         return b
 
     def _dense(self, near: NearContacts, begun: _Begun, bodies, b, f, friction):

@@ -8,32 +8,26 @@ The equations of the step are those of :mod:`gauss.dynamics.contact.moreau_step`
 """
 
 from functools import cached_property, partial
-from typing import NamedTuple
 
 import numpy as np
 
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.contact.compiled_mechanism_step import KnownForces, MechanismMemory
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
-from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep
+from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.contact_step import ContactProblem
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.free_body_step import ATTEMPTS, REACH_MARGIN
+from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
 from gauss.dynamics.contact.mechanism_compliance import Compliance
-from gauss.dynamics.contact.mechanism_kernels import MechanismTerms, mechanism_kernels
+from gauss.dynamics.contact.mechanism_kernels import mechanism_kernels
 from gauss.dynamics.contact.mechanism_rows import MechanismRows, StepRows
-from gauss.dynamics.contact.moreau_step import (
-    MIDPOINT,
-    MISSED_CLOSING_RATE,
-    REST_STEPS,
-    START_OVERLAP,
-    UNSEEN_OVERLAP,
-    is_impact,
-    least_rate,
-)
+from gauss.dynamics.contact.mechanism_step_parts import FreeStep, MechanismStep, OpenStep
+from gauss.dynamics.contact.moreau_step import MIDPOINT, MISSED_CLOSING_RATE
 from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.dynamics.contact.step_doubts import JAMMED_RESPONSE, paradoxes_of_step, refuse_jam
@@ -46,51 +40,6 @@ from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
 
 
-class MechanismStep(NamedTuple):
-    """Result of one step.
-
-    Attributes
-    ----------
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates and rates at its end.
-    contacts : NearContacts or None
-        Near contacts; None of a step by machine code.
-    force : ndarray, shape (m, 3), or None
-        Mean forces with impulses along their normals and tangents [N].
-    others : ndarray, shape (g + s,), or None
-        Those of other unilateral constraints, and of set-valued elements [N, N m].
-    power : ndarray, shape (3,)
-        Mean power of drives, of forces on bodies, and of dissipation [W].
-    error : float or None
-        Error of the laws in units of the scene; None for the convex relaxation.
-    paradoxes : list of Paradox
-        Contacts with undetermined forces.
-    modes : ModesOfStep or None
-        Elements that bear a force; None of a step by machine code.
-    """
-
-    q: np.ndarray
-    v: np.ndarray
-    contacts: NearContacts | None
-    force: np.ndarray | None
-    others: np.ndarray | None
-    power: np.ndarray
-    error: float | None
-    paradoxes: list[Paradox]
-    modes: ModesOfStep | None
-
-
-class _FreeStep(NamedTuple):
-    """Terms after the share of a step, compliance H, accelerations without forces, with loads, and power of these."""
-
-    q: np.ndarray
-    terms: MechanismTerms
-    H: np.ndarray
-    offset: np.ndarray
-    acceleration: np.ndarray
-    power: np.ndarray
-
-
 class MechanismStepper:
     """Steps of one system.
 
@@ -100,6 +49,8 @@ class MechanismStepper:
         A system with contacts of shapes.
     held : bool
         Whether the inputs of the scene are held in each step; otherwise they are zero.
+    removal : float
+        Least time in which penetration is removed [s]; zero: within a step.
 
     Attributes
     ----------
@@ -107,8 +58,9 @@ class MechanismStepper:
         Values of the inputs in the next step.
     """
 
-    def __init__(self, system: System, held: bool = False):
+    def __init__(self, system: System, held: bool = False, removal: float = 0.0):
         self.system, self.smooth, self.table = system, smooth_system(system), ShapeTable(system)
+        self.removal = removal
         carriers = tuple(sorted({int(body) for body in self.table.body if body >= 0}))
         self.kernels = mechanism_kernels(system, self.smooth, carriers, held)
         self.inputs = np.zeros(len(system.scene.inputs) if held else 0)
@@ -124,6 +76,7 @@ class MechanismStepper:
         self.constants = {
             "margin": REACH_MARGIN,
             "missed": MISSED_CLOSING_RATE,
+            "removal": removal,
             "jammed": JAMMED_RESPONSE,
             "contact_unit": self.rows.contact_unit,
         }
@@ -239,14 +192,7 @@ class MechanismStepper:
             If shapes overlap unseen by their gap functions, or no forces are found.
         """
         rest = self.rest(state.v)
-        for share in self.shares:
-            begun = self._begin(state, h, share)
-            speed = max(self._speed(begun, state.v), self._speed(begun, state.v + h * begun.acceleration))
-            near = self._near(state, begun, speed, h, share)
-            rows = self.rows.of(begun.terms, near)
-            begun = self._at_later_rates(begun, state, rows, near, h, share)
-            if share == self.shares[-1] or not self._impacts(rows, begun, h, rest, share).any():
-                break
+        share, begun, near, rows, speed = self._open(state, h, rest)
         for _ in range(ATTEMPTS):
             force, added, error = self._solve(state, rows, begun, near, h, rest, share)
             acceleration = begun.acceleration + added
@@ -275,13 +221,32 @@ class MechanismStepper:
         modes = self.rows.modes(rows, near, force, h * acceleration, h * work, hits, self.slow(state.v))
         return MechanismStep(q, v, near, contacts, others, power, error, paradoxes, modes)
 
-    def _prescribed_power(self, rows: StepRows, begun: _FreeStep, a: np.ndarray, v: np.ndarray, force: np.ndarray) -> float:
+    def _open(self, state: State, h: float, rest: float) -> tuple[float, FreeStep, NearContacts, StepRows, float]:
+        """Share of the step before its forces, bodies, near contacts and rows there, and the speed that these are for."""
+        for share in self.shares:
+            begun = self._begin(state, h, share)
+            speed = max(self._speed(begun, state.v), self._speed(begun, state.v + h * begun.acceleration))
+            near = self._near(state, begun, speed, h, share)
+            rows = self.rows.of(begun.terms, near)
+            begun = self._at_later_rates(begun, state, rows, near, h, share)
+            if share == self.shares[-1] or not self._impacts(rows, begun, h, rest, share).any():
+                break
+        return share, begun, near, rows, speed
+
+    def open_step(self, state: State, h: float) -> OpenStep:
+        """Step of length h up to its contact problem, which expects the forces of the last step."""
+        rest = self.rest(state.v)
+        share, begun, near, rows, _ = self._open(state, h, rest)
+        force = self.rows.start(near, rows, self.known)
+        return OpenStep(begun, near, rows, self._without_forces(rows, begun, h, rest, share, force))
+
+    def _prescribed_power(self, rows: StepRows, begun: FreeStep, a: np.ndarray, v: np.ndarray, force: np.ndarray) -> float:
         """Power of constraints that prescribe velocities [W]: (M a − τ − Kᵀ f) · v, as all others have none."""
         if not self.smooth.relations.have_power:
             return 0.0
         return float((begun.terms.M @ a - begun.terms.tau - rows.K.T @ force) @ v)
 
-    def _begin(self, state: State, h: float, share: float) -> _FreeStep:
+    def _begin(self, state: State, h: float, share: float) -> FreeStep:
         kernels, t = self.kernels, state.t + share * h
         q = kernels.move(np.concatenate([state.q, (share * h) * state.v])) if share else state.q
         terms = kernels.terms(t, q, state.v, self.inputs)
@@ -289,11 +254,11 @@ class MechanismStepper:
         acceleration, power = H @ terms.tau + offset, terms.power
         if not np.isfinite(acceleration).all():
             raise SimulationError(f"t = {t:.6g} s: accelerations are not finite; a law or a very fast motion makes them so.")
-        return _FreeStep(q, terms, H, offset, acceleration, power)
+        return FreeStep(q, terms, H, offset, acceleration, power)
 
     def _at_later_rates(
-        self, begun: _FreeStep, state: State, rows: StepRows, near: NearContacts, h: float, share: float
-    ) -> _FreeStep:
+        self, begun: FreeStep, state: State, rows: StepRows, near: NearContacts, h: float, share: float
+    ) -> FreeStep:
         """Accelerations and power at the rates after the share, where the forces of the last step are expected."""
         if not share:
             return begun
@@ -303,7 +268,7 @@ class MechanismStepper:
         ahead = self.kernels.forces(np.concatenate([[t], begun.q, state.v + (share * h) * acceleration, self.inputs]))
         return begun._replace(acceleration=begun.H @ ahead[:-3] + begun.offset, power=ahead[-3:])
 
-    def _speed(self, begun: _FreeStep, v: np.ndarray) -> float:
+    def _speed(self, begun: FreeStep, v: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
         if not self.n:
             return 0.0
@@ -311,30 +276,34 @@ class MechanismStepper:
         turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in (twists[:, :3], twists[:, 3:]))
         return float((moving + turning * self.reach[: self.n]).max())
 
-    def _near(self, state: State, begun: _FreeStep, speed: float, h: float, share: float) -> NearContacts:
+    def _near(self, state: State, begun: FreeStep, speed: float, h: float, share: float) -> NearContacts:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         near, overlaps = self.detection.find(begun.terms.bodies, reach, UNSEEN_OVERLAP)
         return confirmed(near, overlaps, self.table, state.t)
 
-    def _impacts(self, rows: StepRows, begun: _FreeStep, h: float, rest: float, share: float) -> np.ndarray:
+    def _impacts(self, rows: StepRows, begun: FreeStep, h: float, rest: float, share: float) -> np.ndarray:
         m = rows.gap.size
         speeds = REST_STEPS * h * np.abs(rows.K[:m] @ begun.acceleration + rows.bias[:m]) + rest
         return is_impact(rows.gap, rows.rate[:m], speeds, h, share)
 
-    def _solve(
-        self, state: State, rows: StepRows, begun: _FreeStep, near: NearContacts, h: float, rest: float, share: float
-    ):
+    def _without_forces(self, rows: StepRows, begun: FreeStep, h: float, rest: float, share: float, force) -> np.ndarray:
+        """Rates (n,) after a step without forces, less the least that gaps may have; with the forces of the last step."""
+        after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
+        coefficients = self.rows.coefficients
+        for e in coefficients:
+            mine = slice(0, rows.gap.size) if len(coefficients) == 1 else np.flatnonzero(rows.restitution == e)
+            given = float(e), h, rest, share, max(h, self.removal), force[: rows.gap.size][mine] * (self.removal > 0.0)
+            after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], *given)
+        return after
+
+    def _solve(self, state: State, rows: StepRows, begun: FreeStep, near: NearContacts, h: float, rest: float, share: float):
         """Forces (n,) in units of the rows, the accelerations (n_v,) that they add, and the error of the laws."""
         m, n = rows.gap.size, rows.rate.size
         if not n:
             return np.zeros(0), np.zeros(begun.acceleration.size), 0.0
-        after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
-        coefficients = self.rows.coefficients
-        for e in coefficients:
-            mine = slice(0, m) if len(coefficients) == 1 else np.flatnonzero(rows.restitution == e)
-            after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], float(e), h, rest, share)
         force, scale = self.rows.start(near, rows, self.known), 1.0 + np.abs(rows.rate).max(initial=0.0)
+        after = self._without_forces(rows, begun, h, rest, share, force)
         active = (after[:m] < 0.0) | (force[:m] > 0.0)
         responses = rows.K @ begun.H
         while True:

@@ -4,7 +4,8 @@ Coordinates move with the rates before the step over a share s of it; forces are
 rates that the free accelerations and the contact forces of the last step have changed by then; the rest of the way takes the
 rates after the step (midpoint rule: Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). With an impact s = 0.
 Impulses of an impact are no forces of the step after it, which expects none. A gap that would close within the step
-closes at its end, ḋ⁺ ≥ −d/((1 − s) h); one with an impact opens with e times its speed (Moreau 1988; Stewart, Trinkle 1996).
+closes at its end (:mod:`gauss.dynamics.contact.gap_laws`); one with an impact opens with e times its speed (Moreau 1988;
+Stewart, Trinkle 1996).
 Friction and set-valued elements act on the rates after the step. The forces f solve the problem of
 :mod:`gauss.dynamics.contact.contact_step`.
 """
@@ -22,7 +23,9 @@ from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import contact_scales, gap_scales
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, laws_of
 from gauss.dynamics.contact.force_responses import ForceResponses
+from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
+from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps
 from gauss.dynamics.contact.paradox import (
     MOST,
     NEGATIVE,
@@ -39,15 +42,12 @@ from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
-from gauss.scene import Box, Contact, JointDryFriction, Scene
-from gauss.system import State, System, guards, retract, sides
+from gauss.scene import JointDryFriction
+from gauss.system import State, System, retract, sides
 from gauss.system.contact_gaps import slips
 
-START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
-UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
 MIDPOINT = 0.5  # share of a step in which coordinates move with the rates before it
 INCONSISTENT_RESPONSE = 1e-6  # relative: responses that violate the constraints by more are round-off
-REST_STEPS = 2.0  # steps: a gap that closes no faster than by its acceleration in so many is at rest, without impact
 MISSED_CLOSING_RATE = 1e-12  # units of the scene times 1 + the fastest rate: faster closing of an inactive gap activates it
 
 
@@ -90,19 +90,21 @@ class MoreauStepper:
         With unilateral constraints, friction or set-valued elements.
     backend : str, Backend or class
         Backend of the free accelerations.
+    removal : float
+        Least time in which penetration is removed [s]; zero: within a step.
     """
 
-    def __init__(self, system: System, backend: str | Backend | type = "auto"):
+    def __init__(self, system: System, backend: str | Backend | type = "auto", removal: float = 0.0):
         scene = system.scene
-        self.system, self.smooth = system, smooth_system(system)
+        self.system, self.smooth, self.removal = system, smooth_system(system), removal
         self.backend, self.kernel = backend, ContactTermsKernel(system)
-        self.unit, self.deep = system.scale.time / contact_scales(system), START_OVERLAP * system.scale.time
+        self.unit = system.scale.time / contact_scales(system)
         gaps, rough = sides(scene), slips(scene)
         set_valued = cast(list[JointDryFriction], [*scene.set_valued.values()])  # others are refused
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
         self.owners = [side.whole.name for side in gaps]
-        self.guarded = {guard.name: UNSEEN_OVERLAP * shortest_edge(scene, guard.whole) for guard in guards(scene)}
+        self.overlaps = UnseenOverlaps(system, self.owners)
         self.restitution = np.array([side.whole.restitution for side in gaps])
         m, k = len(gaps), len(rough)
         self.laws = ContactLaws(
@@ -152,13 +154,13 @@ class MoreauStepper:
             free = self._free(at, h, share, touch.J[pushed].T @ force[pushed], last)
             if not any(self.hits(touch, free.acceleration, h, rest, share)):
                 break
-        self._refuse_overlap(touch, state)
+        self.overlaps.refuse(touch, state.t)
         if not np.isfinite(touch.J).all():
             row = int(np.flatnonzero(~np.isfinite(touch.J).all(axis=1))[0])
             name = [*self.names, *self.sliding, *self.system.scene.set_valued][row]
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
         m = touch.width.size
-        after = self.without_forces(touch, free.acceleration, h, rest, share)
+        after = self.without_forces(touch, free.acceleration, h, rest, share, force)
         scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
         active_gaps = (after[:m] < 0.0) | (force[:m] > 0.0)
@@ -231,7 +233,7 @@ class MoreauStepper:
         gaps = zip(touch.width, touch.rate, speeds, strict=False)
         return [is_impact(width, rate, speed, h, share) for width, rate, speed in gaps]
 
-    def without_forces(self, touch: ContactTerms, acceleration, h, rest, share) -> np.ndarray:
+    def without_forces(self, touch: ContactTerms, acceleration, h, rest, share, start) -> np.ndarray:
         """Rates (n,) after a step without contact forces, less the least that gaps may have; numbers or expressions.
 
         The least rate is that of restitution after an impact, else that which closes the gap at the end of the step.
@@ -248,9 +250,12 @@ class MoreauStepper:
             Rate below which a gap neither opens nor closes, in units of the scene.
         share : float
             Share of the step before.
+        start : ndarray, shape (n,)
+            Forces of the last step, or expressions.
         """
-        gaps = zip(touch.width, touch.rate, self.restitution, strict=False)
-        least = [least_rate(width, rate, e, h, rest, share) for width, rate, e in gaps]
+        gaps = zip(touch.width, touch.rate, self.restitution, start if self.removal else np.zeros(len(start)), strict=False)
+        removal = math.maximum(h, self.removal) if self.removal else h
+        least = [least_rate(width, rate, e, h, rest, share, removal, closed) for width, rate, e, closed in gaps]
         least += [0.0] * (touch.rate.size - len(least))
         return touch.rate + h * (touch.J @ acceleration + (1.0 - share) * touch.bias) - np.array(least)
 
@@ -347,17 +352,6 @@ class MoreauStepper:
             speed = float((-after / self.unit)[held].max())
             raise jammed_error(f"t = {state.t:.6g} s", [self.names[k] for k in held], speed)
 
-    def _refuse_overlap(self, touch: ContactTerms, state: State):
-        for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):
-            if apart > -deepest:
-                continue
-            least = touch.width[[k for k, owner in enumerate(self.owners) if owner == name]].min()
-            if least > -self.deep:
-                raise SimulationError(
-                    f"t = {state.t:.6g} s: shapes are {-apart:.3g} m in each other, and no gap of {name!r} leads out; "
-                    "move them apart with scene.start, or shorten the step."
-                )
-
     def _paradoxes(self, state: State, touch: ContactTerms, free, force, rows, A) -> list[Paradox]:
         """Painlevé's paradoxes of the active gaps; A are accelerations of the rows by their forces."""
         laws = self.laws
@@ -385,31 +379,7 @@ def advance_rates(state: State, acceleration, h, share) -> State:
     return State(state.t, state.q, state.v + (share * h) * acceleration)
 
 
-def is_impact(width, rate, speed, h, share):
-    """Whether gaps close within the rest of a step faster than at rest; numbers, arrays or expressions."""
-    return _both(width + (1.0 - share) * h * rate <= 0.0, rate < -speed)
-
-
-def _both(one, other):
-    return math.where(one, math.where(other, 1.0, 0.0), 0.0)
-
-
-def least_rate(width, rate, restitution: Scalar, h, rest, share):
-    """Least rate of a gap after a step; penetration is removed over a whole step at least, without oscillation."""
-    shut = math.where(width > 0.0, -width / ((1.0 - share) * h), -width / h)
-    if isinstance(restitution, float) and not restitution:
-        return shut
-    hit = _both(width + h * rate <= 0.0, rate < -rest)
-    return math.where(hit > share, -restitution * rate, shut)
-
-
-def shortest_edge(scene: Scene, contact: Contact) -> float:
-    """Shortest edge [m] of the boxes of a contact."""
-    shapes = (scene.shapes[name] for name in (contact.shape, contact.other))
-    return min(min(shape.size) for shape in shapes if isinstance(shape, Box))
-
-
-def moreau_stepper(system: System, backend: str | Backend | type = "auto") -> MoreauStepper:
+def moreau_stepper(system: System, backend: str | Backend | type = "auto", removal: float = 0.0) -> MoreauStepper:
     """Stepper of a system, cached."""
     key = backend if isinstance(backend, str) else id(backend)  # kept alive by the stepper
-    return cached(system, (MoreauStepper, key), lambda: MoreauStepper(system, backend))
+    return cached(system, (MoreauStepper, key, removal), lambda: MoreauStepper(system, backend, removal))

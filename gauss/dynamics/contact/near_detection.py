@@ -10,8 +10,8 @@ from gauss.codegen.kernels.broad_phase import grid_room
 from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, NEAR_INTEGERS, NEAR_NUMBERS, PART, ROW
 from gauss.codegen.kernels.near_pairs import KINDS as MOST_KINDS
 from gauss.dynamics.contact.free_bodies import place_function
-from gauss.dynamics.contact.moreau_step import START_OVERLAP
 from gauss.dynamics.contact.near_contacts import COLUMNS, NearContacts, Overlap
+from gauss.dynamics.contact.overlaps import START_OVERLAP
 from gauss.dynamics.contact.pair_kernels import SIGNS, PairKernels, pair_kernels
 from gauss.dynamics.contact.patch_kernels import PatchKernels
 from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable

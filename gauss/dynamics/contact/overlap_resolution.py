@@ -9,7 +9,7 @@ some repetitions.
 import numpy as np
 
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem
-from gauss.dynamics.contact.moreau_step import START_OVERLAP
+from gauss.dynamics.contact.overlaps import START_OVERLAP
 from gauss.errors import StateError
 from gauss.system import State, retract
 

@@ -16,8 +16,10 @@ class CalledMoreauRun(CalledFixedRun, CompiledMoreauRun):
         As of :class:`gauss.simulation.moreau.compiled_run.CompiledMoreauRun`.
     laws : Laws
         Loads of the system without unilateral and set-valued elements.
+    removal : float
+        As of the same.
     """
 
-    def __init__(self, problem: Problem, laws: Laws):
-        CompiledMoreauRun.__init__(self, problem, laws, CalledProgram)
+    def __init__(self, problem: Problem, laws: Laws, removal: float = 0.0):
+        CompiledMoreauRun.__init__(self, problem, laws, CalledProgram, removal)
         self._receive()

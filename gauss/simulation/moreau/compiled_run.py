@@ -9,10 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
-from gauss.codegen.kernels import Due, Fixed, LoopStatus
+from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.contact.step_modes import UNKNOWN
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.plan import method_key
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
@@ -40,10 +41,12 @@ class CompiledMoreauRun(CompiledFixedRun):
         Loads of the system without these elements.
     program : type
         Makes the functions of that system.
+    removal : float
+        Least time in which penetration is removed [s]; zero: within a step.
     """
 
-    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program):
-        self.whole, self.stepper = problem, moreau_stepper(problem.system)
+    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program, removal: float = 0.0):
+        self.whole, self.stepper = problem, moreau_stepper(problem.system, removal=removal)
         self.stepper.refuse_penetration(problem.start)
         self.contacts, self.forces = ContactEvents(self.stepper.modes), self.stepper.lossy.size
         self.codes = self.stepper.modes.codes
@@ -51,6 +54,10 @@ class CompiledMoreauRun(CompiledFixedRun):
 
     def _beside(self) -> tuple:
         return (self.whole.system,)  # with the elements that the stepper adds
+
+    def prepared(self) -> Loop:
+        """Machine code of the steps."""
+        return self._loop_of((method_key(self.method), self.stepper.removal), lambda: self._functions().compile())
 
     def collect(self) -> Trajectory:
         """Trajectory to the end.
@@ -76,7 +83,7 @@ class CompiledMoreauRun(CompiledFixedRun):
     @cached_property
     def python_steps(self) -> MoreauRun:
         """Steps in Python."""
-        return MoreauRun(self._driven_system(), "auto", self.step, self.end, self.switching)
+        return MoreauRun(self._driven_system(), "auto", self.step, self.end, self.switching, self.stepper.removal)
 
     def _driven_system(self) -> System:
         """System with drives by the present inputs."""

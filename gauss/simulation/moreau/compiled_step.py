@@ -52,7 +52,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         H = stepper.compliance(mechanism)
         expected = H @ (touch.J.T @ before) * (method_state[n] * (1.0 / MIDPOINT))  # zero after an impact
         _, free = program.instant(advance_rates(state, first.acceleration + expected, h, share))
-        after = stepper.without_forces(touch, free.acceleration, h, rest, share)
+        after = stepper.without_forces(touch, free.acceleration, h, rest, share, before)
         limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
@@ -68,7 +68,7 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         normals = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # above 0 without a contact normal
         lost = [
             math.where(apart <= -deepest, 1.0, 0.0)
-            for apart, deepest in zip(touch.apart, stepper.guarded.values(), strict=True)
+            for apart, deepest in zip(touch.apart, stepper.overlaps.deepest.values(), strict=True)
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
         unseen = program.watch.passes(point, Point(found.state, found.work, rates))

@@ -6,7 +6,9 @@ import numpy as np
 
 from gauss.codegen.kernels.step_memory import CHANGES_ROOM
 from gauss.dynamics.contact.contact_changes import ModeChange
-from gauss.dynamics.contact.contact_stepper import contact_stepper, new_contact_stepper
+from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.free_body_step import FreeBodyStepper
+from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_events import event_of
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings
@@ -44,8 +46,8 @@ class ContactMotion:
         The system.
     held : bool
         Whether the inputs of the scene are held in each step; otherwise they are zero.
-    own : bool
-        Whether the stepper is of this motion alone: of one that others may interrupt.
+    stepper : FreeBodyStepper or MechanismStepper, optional
+        Steps of this motion alone, where others may interrupt it.
 
     Attributes
     ----------
@@ -59,8 +61,8 @@ class ContactMotion:
         Changes of the contact mode.
     """
 
-    def __init__(self, system: System, held: bool = False, own: bool = False):
-        self.system, self.stepper = system, (new_contact_stepper if own else contact_stepper)(system, held)
+    def __init__(self, system: System, held: bool = False, stepper: FreeBodyStepper | MechanismStepper | None = None):
+        self.system, self.stepper = system, stepper or contact_stepper(system, held)
         self.row = 4 + system.n_q + system.n_v
         self.paradoxes, self.warned = ParadoxWarnings(), set[bytes]()
 

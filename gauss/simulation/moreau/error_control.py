@@ -4,7 +4,9 @@ A step h and two steps h/2 are made from the same point. Their difference over 2
 is the order of the method; where no gap is closed, it is added to the two (Richardson extrapolation), which raises the
 order by one; closed gaps would open or penetrate by it. With an impact in a step the positions are off by up to h |Δv|,
 wherever in the step it is: such steps become as short as the tolerance asks for, and end within it of the impact. No shape
-moves farther in a step than a share of its thickness: none passes through another one unseen.
+moves farther in a step than a share of its thickness: none passes through another one unseen. Penetration is removed in a
+time of the scene, however short the steps (:mod:`gauss.dynamics.contact.gap_laws`): within a step, the speed of removal
+would depend on the step.
 """
 
 from itertools import pairwise
@@ -12,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from gauss.dynamics.conditions import smooth_system
+from gauss.dynamics.contact.gap_laws import removal_time
 from gauss.dynamics.laws.switching_functions import TRIES
 from gauss.dynamics.laws.switching_times import COARSE
 from gauss.dynamics.rules import Plan
@@ -20,13 +23,12 @@ from gauss.integrators import Point, Rates
 from gauss.simulation.compiled_runs import moreau_run
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.single_steps import CompiledSingleSteps, PairKernelSingleSteps, ReachedPoint, SingleSteps
+from gauss.simulation.moreau.step_errors import FAILED, LocalError, RateJumps, StepErrors
 from gauss.simulation.moreau.step_record import StepRecord
 from gauss.simulation.moreau.unseen_contacts import StepLimit
 from gauss.simulation.problem import Problem
 from gauss.simulation.progress import Progress
 from gauss.simulation.trajectory import Trajectory
-from gauss.simulation.verify import differences
-from gauss.system import State, System
 
 FIRST = 1e-3  # of the scale of times of the scene: first step
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.1, 4.0  # of the change of the step
@@ -49,9 +51,8 @@ class ControlledMotion:
 
     def __init__(self, problem: Problem, steps: SingleSteps):
         system = problem.system
-        self.problem, self.steps, self.rate_of = problem, steps, _rate_of_each_coordinate(system)
+        self.problem, self.steps, self.errors = problem, steps, StepErrors(system, problem.tolerance, steps)
         self.closes = bool(smooth_system(system).closes)
-        self.order = 2 if steps.shares[0] else 1  # the midpoint rule is of order 2
         self.least, self.limit = LEAST * system.scale.time, StepLimit(system)
         self.record = StepRecord(problem, steps)
 
@@ -83,14 +84,18 @@ class ControlledMotion:
     def _to(self, here: ReachedPoint, t: float, stop: float, h: float, bar: Progress) -> tuple[float, ReachedPoint]:
         """Steps from one stop to the next; the step to go on with, and the point there."""
         coarse, refused = (stop - t) / COARSE, 0
-        longest = self.limit.step(self._state(here))
+        jumps = RateJumps()
+        longest = self.limit.step(self.errors.state(here))
         while t < stop:
             h = min(h, coarse, longest)
             end = stop if stop - t < h * (1.0 + TO_END) else t + h
             h = end - t
-            found, error, hides = self._tried(here, end)
+            found, local, hides = self._tried(here, end)
+            error = local.largest(jumps.shown(h, local) or h <= ROUNDED * self.least)
             error = max(error, HIDING) if hides and refused < TRIES else error
-            change = SAFETY * max(error, 1e-12) ** (-1.0 / (self.order + 1))
+            limit = self.limit.step(self.errors.state(found)) if error <= 1.0 else np.inf
+            error = max(error, (h / limit) ** (self.errors.order + 1))  # as steep as an error
+            change = SAFETY * max(error, 1e-12) ** (-1.0 / (self.errors.order + 1))
             if error > 1.0 and h > ROUNDED * self.least:
                 self.record.rejected, refused = self.record.rejected + 1, refused + 1
                 h = max(h * min(max(change, SMALLEST_FACTOR), 0.5), self.least)
@@ -99,73 +104,48 @@ class ControlledMotion:
                 raise SimulationError(self._unmet(t))
             samples = self.record.due(end)
             self.record.keep(here, found, [found.row if at == end else self._doubled(here, at)[0].row for at in samples])
-            self.record.unseen, refused = self.record.unseen + hides, 0
-            longest = self.limit.step(self._state(found))
-            here, t, h = found, end, h * min(max(change, SMALLEST_FACTOR), LARGEST_FACTOR)
+            self.record.unseen, refused, jumps = self.record.unseen + hides, 0, RateJumps()
+            longest, here, t, h = limit, found, end, h * min(max(change, SMALLEST_FACTOR), LARGEST_FACTOR)
             bar.update(t - self.problem.start.t)
         return h, here
 
-    def _tried(self, here: ReachedPoint, end: float) -> tuple[ReachedPoint, float, bool]:
+    def _tried(self, here: ReachedPoint, end: float) -> tuple[ReachedPoint, LocalError, bool]:
         """Point at a time [s], its error, and whether laws may have switched unseen; a step that fails may be too long."""
         try:
             found, error = self._doubled(here, end)
-            hides, error = self._switched(here, found, max(error, self._unseen(here, found)))
+            hides, switched = self._switched(here, found)
+            error = error._replace(displacement=max(error.displacement, switched))
         except GaussError:
             if end - here.row[0] <= ROUNDED * self.least:
                 raise
-            return here, np.inf, False
+            return here, FAILED, False
         return found, error, hides
 
-    def _doubled(self, begin: ReachedPoint, t: float) -> tuple[ReachedPoint, float]:
+    def _doubled(self, begin: ReachedPoint, t: float) -> tuple[ReachedPoint, LocalError]:
         """Point at a time [s], and its error over the tolerance."""
         half = self.steps.after(begin, 0.5 * (begin.row[0] + t))
         found, whole = self.steps.after(half, t), self.steps.after(begin, t)
         events = half.events + found.events
-        error = self._error(begin, whole, found, any(event.kind == "impact" for event in events + whole.events))
+        error = self.errors.of(begin, half, found, whole)
         smooth = not (events or whole.events or half.closed or found.closed or whole.closed)
         if smooth and not self.closes:
             found = self.steps.with_row(found, self._extrapolated(whole.row, found.row))
         return found._replace(events=events), error
 
-    def _error(self, begin: ReachedPoint, whole: ReachedPoint, found: ReachedPoint, impact: bool) -> float:
-        """Local error of two steps over the tolerance."""
-        n_q, system = 1 + self.problem.system.n_q, self.problem.system
-        (q, v), (q_whole, v_whole) = ((x.row[1:n_q], x.row[n_q:-3]) for x in (found, whole))
-        allowed = self._allowed(self._state(found))
-        share = 1.0 / (2.0**self.order - 1.0)
-        apart = share * np.abs(differences(system, q_whole[None], q[None])[0]) / allowed[self.rate_of]
-        if impact:  # a gap without restitution may close with a rate that depends on the step, which the next one stops
-            rates = (found.row[0] - begin.row[0]) * np.abs(v - begin.row[n_q:-3]) / allowed[: system.n_v]
-        else:
-            rates = share * np.abs(v_whole - v) / allowed[system.n_v :]
-        every = np.concatenate([apart, rates])
-        return float(every.max(initial=0.0)) if np.isfinite(every).all() else np.inf
-
-    def _switched(self, begin: ReachedPoint, found: ReachedPoint, error: float) -> tuple[bool, float]:
-        """Whether laws of the state may have switched in a step and back; its error, with that of a jump wherever it is."""
-        system, h, states = self.problem.system, found.row[0] - begin.row[0], [self._state(x) for x in (begin, found)]
+    def _switched(self, begin: ReachedPoint, found: ReachedPoint) -> tuple[bool, float]:
+        """Whether laws of the state may have switched in a step and back; the error of a jump of them, wherever it is."""
+        system, h, states = self.problem.system, found.row[0] - begin.row[0], [self.errors.state(x) for x in (begin, found)]
         mean = Rates((states[1].v - states[0].v) / h, np.zeros(3))
         share, _, place = self.problem.switching.share(*(Point(state, np.zeros(3), mean) for state in states))
+        error = 0.0
         if place < 1.0:
             before, after = (smooth_system(system).accelerations(state) for state in states)
-            error = max(error, float((h * np.abs(after - before) / self._allowed(states[1])[system.n_v :]).max()))
+            error = float((h * np.abs(after - before) / self.errors.allowed(states[1])[system.n_v :]).max())
         return share < 1.0, error
-
-    def _unseen(self, begin: ReachedPoint, found: ReachedPoint) -> float:
-        """Above 1 for steps in which a shape may pass through another one, and as steep as an error."""
-        return float((found.row[0] - begin.row[0]) / self.limit.step(self._state(found))) ** (self.order + 1)
-
-    def _state(self, reached: ReachedPoint) -> State:
-        n_q = 1 + self.problem.system.n_q
-        return State(float(reached.row[0]), reached.row[1:n_q], reached.row[n_q:-3])
-
-    def _allowed(self, state: State) -> np.ndarray:
-        """Tolerance (2 n_v,) of displacements and rates."""
-        return self.problem.tolerance.scale(self.problem.system, state)
 
     def _extrapolated(self, whole: np.ndarray, two: np.ndarray) -> np.ndarray:
         """Row with the local error of two steps removed."""
-        row = two + (two - whole) / (2.0**self.order - 1.0)
+        row = two + (two - whole) / (2.0**self.errors.order - 1.0)
         row[0] = two[0]
         for place in self.problem.system.quaternions.values():
             Q = row[1:][place]
@@ -175,7 +155,7 @@ class ControlledMotion:
     def _unmet(self, t: float) -> str:
         return (
             f"t = {t:.6g} s: a step of {self.least:.3g} s does not meet rtol {self.problem.tolerance.rtol:g}, for instance "
-            "because a little penetration is to vanish within it; give a fixed step=."
+            "because of impacts that follow each other ever faster; give a fixed step=."
         )
 
 
@@ -196,13 +176,5 @@ def controlled_motion(problem: Problem, plan: Plan) -> Trajectory:
     if plan.dynamics == "pair kernels":
         return ControlledMotion(problem, PairKernelSingleSteps(problem.system)).collect()
     whole = problem._replace(step=problem.end - problem.start.t)  # steps that Python repeats have lengths of their own
-    return ControlledMotion(problem, CompiledSingleSteps(moreau_run(whole))).collect()
-
-
-def _rate_of_each_coordinate(system: System) -> np.ndarray:
-    """Rate (n_q,) that goes with each coordinate; with the four of a quaternion the first of its angular velocity."""
-    found = np.empty(system.n_q, dtype=int)
-    for joint in system.joints:
-        plain = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
-        found[joint.q] = joint.v.start + np.minimum(np.arange(joint.pair.n_q), plain)
-    return found
+    run = moreau_run(whole, removal_time(problem.system))
+    return ControlledMotion(problem, CompiledSingleSteps(run)).collect()

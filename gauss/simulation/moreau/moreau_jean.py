@@ -45,10 +45,22 @@ class MoreauRun(PythonRun):
         How free accelerations are solved.
     step, end : float
         Length of a step, and when to stop [s].
+    switching : Switching
+        Where laws of the state switch.
+    removal : float
+        Least time in which penetration is removed [s]; zero: within a step.
     """
 
-    def __init__(self, system: System, backend: str | Backend | type, step: float, end: float, switching=Switching()):  # noqa: B008
-        self.stepper = moreau_stepper(system, backend)
+    def __init__(
+        self,
+        system: System,
+        backend: str | Backend | type,
+        step: float,
+        end: float,
+        switching=Switching(),  # noqa: B008
+        removal: float = 0.0,
+    ):
+        self.stepper = moreau_stepper(system, backend, removal)
         super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
         self.h, self.relaxed, self.error = step, 0, 0.0
         self.paradoxes, self.contacts = ParadoxWarnings(), ContactEvents(self.stepper.modes)
@@ -145,7 +157,8 @@ NONSMOOTH = (TIME_STEPPING,)
 
 def step_at(trajectory: Trajectory, index: int, backend: str | Backend | type = "auto") -> MoreauStep:
     """Step from a sample of a motion by time stepping."""
-    return moreau_stepper(trajectory.system, backend).step(trajectory.state(index), cast(float, trajectory.step))
+    stepper = moreau_stepper(trajectory.system, backend, trajectory.removal)
+    return stepper.step(trajectory.state(index), cast(float, trajectory.step))
 
 
 def contact_parts(motion: Kinematics, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

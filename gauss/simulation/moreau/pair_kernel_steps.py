@@ -5,7 +5,7 @@ import numpy as np
 from gauss.codegen.kernels import Control, LoopStatus
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_question
-from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.contact_stepper import contact_stepper, new_contact_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.overlap_resolution import resolved
 from gauss.dynamics.traced_system import Program
@@ -39,7 +39,10 @@ class PairKernelSteps:
         assert isinstance(problem.method, FixedStep)
         held = problem.held is not None
         self.method, self.control = problem.method, Control()
-        self.motion, ask = ContactMotion(problem.system, held, own=True), smooth_question(problem.question)
+        self.motion, ask = (
+            ContactMotion(problem.system, held, new_contact_stepper(problem.system, held)),
+            smooth_question(problem.question),
+        )
         self.motion.stepper.refuse_penetration(problem.start)
         self.motion.stepper.check(problem.start)
         measured = any(output.kind == "contact_force" for output in problem.system.scene.outputs.values())

@@ -5,6 +5,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from gauss.codegen.kernels import Due, LoopStatus
+from gauss.dynamics.contact.contact_stepper import new_contact_stepper
+from gauss.dynamics.contact.gap_laws import removal_time
 from gauss.errors import SimulationError
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.contact_motion import ContactMotion
@@ -67,6 +69,9 @@ class SingleSteps(Protocol):
     def with_row(self, reached: ReachedPoint, row: np.ndarray) -> ReachedPoint:
         """The same point with another row."""
 
+    def reverses(self, begin: ReachedPoint, end: ReachedPoint) -> bool:
+        """Whether a force of friction or of a set-valued element has changed its direction between two points."""
+
 
 class CompiledSingleSteps:
     """Steps in machine code of a whole scene.
@@ -85,7 +90,9 @@ class CompiledSingleSteps:
         self.given = run.arrays(self.point, self.confirmed, self.grid, self.note)
         first = self.layout.row + self.layout.n_v + 3
         self.largest, self.law_at = 0.0, first + run.forces + 1
-        self.normal = slice(first, first + run.stepper.laws.normal.size)
+        laws = run.stepper.laws
+        self.normal = slice(first, first + laws.normal.size)
+        self.across, self.set_valued = first + laws.across, first + laws.set_valued
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -139,6 +146,12 @@ class CompiledSingleSteps:
         moved = np.concatenate([row, point[self.layout.row :]])
         return reached._replace(row=moved[: self.layout.row], kept=(moved, modes))
 
+    def reverses(self, begin: ReachedPoint, end: ReachedPoint) -> bool:
+        """Whether a force of friction or of a set-valued element has changed its direction between two points."""
+        (before, _), (after, _) = begin.kept, end.kept
+        turned = (before[self.across] * after[self.across]).sum(axis=1) < 0.0
+        return bool(turned.any() or (before[self.set_valued] * after[self.set_valued] < 0.0).any())
+
 
 class PairKernelSingleSteps:
     """Steps by kernels of pairs of shapes.
@@ -150,7 +163,7 @@ class PairKernelSingleSteps:
     """
 
     def __init__(self, system: System):
-        self.motion = ContactMotion(system, own=True)
+        self.motion = ContactMotion(system, stepper=new_contact_stepper(system, removal=removal_time(system)))
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -193,3 +206,15 @@ class PairKernelSingleSteps:
         end = 1 + self.motion.system.n_q
         state = State(float(row[0]), row[1:end], row[end:-3])
         return reached._replace(row=row, kept=reached.kept._replace(state=state, work=row[-3:]))
+
+    def reverses(self, begin: ReachedPoint, end: ReachedPoint) -> bool:
+        """Whether a force of friction or of a set-valued element has changed its direction between two points."""
+        before, after = begin.kept.known, end.kept.known
+        _, one, other = np.intersect1d(before.key, after.key, assume_unique=True, return_indices=True)
+        turned = (before.force[one, 1:] * after.force[other, 1:]).sum(axis=1) < 0.0
+        return bool(turned.any() or (self._set_valued(before) * self._set_valued(after) < 0.0).any())
+
+    def _set_valued(self, known) -> np.ndarray:
+        """Forces of set-valued elements; free bodies have none."""
+        elements = len(self.motion.stepper.elements) - self.motion.stepper.first_set_valued
+        return known.others[known.others.size - elements :] if elements else np.zeros(0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.dynamics.contact.gap_laws import removal_time
 from gauss.simulation.energy_balance import energy_record
 from gauss.simulation.moreau.single_steps import ReachedPoint, SingleSteps
 from gauss.simulation.problem import Problem
@@ -78,6 +79,7 @@ class StepRecord:
         )
         step = float(np.sqrt(self.shortest * self.longest)) if self.accepted else None
         found = Trajectory(self.problem.system, *self._parts(self.rows), stats, tuple(self.events), step=step)
+        found = replace(found, removal=removal_time(self.problem.system))
         if self.problem.samples is None or not self.looked:
             return found
         t, q, v, work = self._parts(self.looked)

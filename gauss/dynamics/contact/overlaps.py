@@ -1,0 +1,53 @@
+"""Overlaps of shapes that a step refuses: those at its start, and those that no gap function shows."""
+
+import numpy as np
+
+from gauss.dynamics.contact_terms import ContactTerms
+from gauss.errors import SimulationError
+from gauss.scene import Box, Contact, Scene
+from gauss.system import System, guards
+
+START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
+UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
+
+
+class UnseenOverlaps:
+    """Overlaps of boxes that no gap function shows, in one scene.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    owners : list of str
+        Contact, stop or rope of each gap.
+    """
+
+    def __init__(self, system: System, owners: list[str]):
+        scene, self.owners, self.deep = system.scene, owners, START_OVERLAP * system.scale.time
+        self.deepest = {guard.name: UNSEEN_OVERLAP * shortest_edge(scene, guard.whole) for guard in guards(scene)}
+
+    def refuse(self, touch: ContactTerms, t: float):
+        """Raise a SimulationError if shapes overlap by more than these, and no gap of theirs is negative.
+
+        Parameters
+        ----------
+        touch : ContactTerms
+            Contact terms in units of the scene.
+        t : float
+            Time [s].
+        """
+        for (name, deepest), apart in zip(self.deepest.items(), touch.apart, strict=True):
+            if apart > -deepest:
+                continue
+            least = touch.width[np.array([k for k, owner in enumerate(self.owners) if owner == name])].min()
+            if least > -self.deep:
+                raise SimulationError(
+                    f"t = {t:.6g} s: shapes are {-apart:.3g} m in each other, and no gap of {name!r} leads out; "
+                    "move them apart with scene.start, or shorten the step."
+                )
+
+
+def shortest_edge(scene: Scene, contact: Contact) -> float:
+    """Shortest edge [m] of the boxes of a contact."""
+    shapes = (scene.shapes[name] for name in (contact.shape, contact.other))
+    return min(min(shape.size) for shape in shapes if isinstance(shape, Box))
