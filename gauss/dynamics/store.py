@@ -1,6 +1,7 @@
 """Cache of one system: machine code, plans, initial states."""
 
 from collections.abc import Callable, Hashable
+from functools import partial
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
@@ -79,7 +80,8 @@ def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> 
     *beside
         What else the entry depends on, where the system is a part of another.
     """
-    return cached(system, key, lambda: from_disk((system, *key, *beside), make, _digest(system)))
+    store = system.dynamics if isinstance(system.dynamics, Store) else Store()
+    return store.on_demand(key, lambda: from_disk((system, *key, *beside), make, _digest(system)))
 
 
 def is_noted_on_disk(system: System, key: Key, *beside) -> bool:
@@ -93,4 +95,4 @@ def note_on_disk(system: System, key: Key, *beside):
 
 
 def _digest(system: System) -> bytes | None:
-    return cached(system, (content_digest,), lambda: content_digest(system))
+    return cached(system, (content_digest,), partial(content_digest, system))
