@@ -7,7 +7,7 @@ from gauss.analysis import Energy, energy, unique_reactions
 from gauss.dynamics.assemble import position_residual
 from gauss.simulation import Trajectory
 from gauss.system import coordinate_units, rate_units
-from gauss.view.style import INK, check_format, curves, legend, looks, saved
+from gauss.view.style import INK, check_format, curves, keep_flat, legend, looks, saved, unit_sizes
 
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
 MANY = 8  # names that fit into a title
@@ -199,6 +199,7 @@ def _by_unit(trajectory: Trajectory, columns: dict, units: dict[str, str], label
     grid = figure.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
     for axes, unit in zip(grid, present, strict=True):
         curves(axes, trajectory.t, {name: column for name, column in columns.items() if units[name] == unit}, labels[unit])
+        keep_flat(axes, unit_sizes(trajectory.system)[unit])
         legend(axes)
     return _finished(figure, trajectory, grid[-1:], path)
 

@@ -11,6 +11,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 LINES = ("-", "--", "-.", ":")
 INK = "#333333"
 NAMED = 12  # more curves than this need no legend: their colours repeat
+FLAT = 1e-9  # relative to a unit of the scene: what changes by less is rounding, and is drawn as a flat line
 DPI = 150
 PAGE_DPI = 140  # of figures beside pages of results
 
@@ -65,3 +66,17 @@ def legend(axes, beside: bool = True):
     if 0 < len(axes.get_legend_handles_labels()[1]) <= NAMED:
         place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if beside else {}
         axes.legend(fontsize="small", frameon=False, **place)
+
+
+def unit_sizes(system) -> dict[str, float]:
+    """Sizes of quantities by their units, from the scale of a system."""
+    scale = system.scale
+    speed = scale.length / scale.time
+    return {"rad": 1.0, "m": scale.length, "1": 1.0, "rad/s": 1.0 / scale.time, "m/s": speed, "J": scale.mass * speed**2}
+
+
+def keep_flat(axes, size: float):
+    """Widen the ordinate to a share of a size, if all curves are within it."""
+    low, high = axes.get_ylim()
+    if high - low < 2 * FLAT * size:
+        axes.set_ylim((low + high) / 2 - FLAT * size, (low + high) / 2 + FLAT * size)

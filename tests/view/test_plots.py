@@ -1,6 +1,7 @@
 """Figures of motions: what is drawn is the motion, and every axis says its unit."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from gauss import view
 from gauss.errors import FileError, NonUniqueReactionWarning, StateError
 from gauss.scene import GROUND
 from gauss.view.skeleton import lines, placed, skeleton
+from gauss.view.style import FLAT
 
 ROUNDING = 1e-12  # of positions along a chain of rotations [m]
 FIGURES = {
@@ -69,6 +71,18 @@ def test_curves_are_the_coordinates_of_one_unit(motions):
         (line,) = axes.lines
         assert line.get_label() == joint
         assert line.get_ydata() == pytest.approx(motion.coordinate(joint), abs=0)
+
+
+def test_rounding_is_drawn_as_a_flat_line(motions):
+    """The coordinate of a slide that rests but for 1e-35 m, beside one that moves."""
+    motion = motions["cart_pole"]
+    rail = list(motion.system.coordinates).index("rail")
+    q = motion.q.copy()
+    q[:, rail] = 1e-35 * np.sin(motion.t)
+    moving, resting = view.plot_coordinates(replace(motion, q=q)).axes
+    assert np.ptp(resting.get_ylim()) == pytest.approx(2 * FLAT * motion.system.scale.length)
+    low, high = moving.get_ylim()
+    assert np.ptp(motion.coordinate("pin")) <= high - low <= 1.2 * np.ptp(motion.coordinate("pin"))
 
 
 def test_reactions_are_the_sizes_of_forces(motions):

@@ -130,6 +130,18 @@ def test_a_slider_poses_a_loop_and_the_others_follow():
         posed.close()
 
 
+def test_sliders_show_angles_within_a_turn_in_steps_of_theirs():
+    posed = show(gauss.load("double_pendulum"), port=_free_port())
+    try:
+        player, slider = posed.player, posed.player.sliders["A"]
+        for angle, seen in ((2 * np.pi + 0.3, 0.3), (-np.pi - 0.2, np.pi - 0.2), (0.123456789, 0.123)):
+            player._place(player.system.state([angle, 0.0], [0.0, 0.0]))
+            assert abs(slider.value - seen) <= slider.step and round(slider.value, 3) == slider.value
+            assert player.state.q[0] == angle
+    finally:
+        posed.close()
+
+
 def test_a_spring_pulls_a_point_to_the_pointer():
     scene = gauss.Scene("puck", gravity=(0, 0, 0))
     scene.free("F", "ground", scene.body("puck", mass=2.0, inertia=(0.1, 0.1, 0.1)))
@@ -157,6 +169,12 @@ def test_a_page_has_curves_cameras_and_layers_beside_the_scene(motion):
     assert not given["layers"]["frames"]["visible"] and given["layers"]["reactions"]["nodes"] == ["/reactions"]
     for label in ("coordinates [rad]", "rates [rad/s]", "energies [J]"):
         assert label in panel
+
+
+def test_curves_of_two_motions_say_which_side_they_are_of(motion):
+    both = page(motion, beside=motion).html
+    for label in ("coordinates [rad]", "rates [rad/s]", "energies [J]"):
+        assert [both.count(f">{label}{side}<") for side in ("", ", left", ", right")] == [0, 1, 1]
 
 
 def test_pictures_between_samples_lie_on_the_motion():

@@ -13,13 +13,14 @@ from matplotlib.figure import Figure
 from gauss.analysis import energy
 from gauss.simulation import Trajectory
 from gauss.system import coordinate_units, rate_units
-from gauss.view.style import NAMED, looks
+from gauss.view.style import NAMED, keep_flat, looks, unit_sizes
 from gauss.view.viewer.cameras import CAMERAS, eye
 from gauss.view.viewer.stage import ViewerStage
 
 WIDTH, HEIGHT = 3.3, 1.5  # of the axes of one quantity [inch]
 LEFT, RIGHT = 0.17, 0.97  # ends of all time axes, of the width
 MOST = 500  # points of a curve
+SIDES = (", left", ", right")  # where two motions are beside each other
 INK = {False: "#333333", True: "#dfe3e8"}  # on light and on dark
 LAYERS = {"link": "links", "joint": "joints", "contact": "shapes", "frame": "frames", "path": "paths"}
 
@@ -46,7 +47,11 @@ def with_panel(page: str, stages: list[ViewerStage]) -> str:
         "right": RIGHT,
     }
     title = " | ".join(stage.trajectory.system.scene.name for stage in stages)
-    figures = [_curves(stage.trajectory, float(t[-1]), first.ground.dark) for stage in stages] if len(t) > 1 else []
+    sides = SIDES if len(stages) > 1 else ("",)
+    figures = [
+        _curves(stage.trajectory, float(t[-1]), first.ground.dark, side)
+        for stage, side in zip(stages if len(t) > 1 else [], sides, strict=False)
+    ]
     text = Path(__file__).with_name("panel.html").read_text(encoding="utf-8")
     text = text.replace("CLASS", "dark" if first.ground.dark else "light").replace("TITLE", escape(title))
     text = text.replace("CURVES", "".join(figures)).replace("GIVEN", json.dumps(given).replace("<", "\\u003c"))
@@ -69,9 +74,9 @@ def _layers(stages: list[ViewerStage]) -> dict[str, dict]:
     return found
 
 
-def _curves(trajectory: Trajectory, end: float, dark: bool) -> str:
+def _curves(trajectory: Trajectory, end: float, dark: bool, side: str) -> str:
     """Coordinates, rates and energies against time, as SVG."""
-    found, ink = _quantities(trajectory), INK[dark]
+    found, ink, sizes = _quantities(trajectory), INK[dark], unit_sizes(trajectory.system)
     kept = np.unique(np.linspace(0, len(trajectory) - 1, MOST).astype(int))
     style: Any = {"svg.fonttype": "none", "font.size": 7, "text.color": ink, "axes.edgecolor": ink, "axes.labelcolor": ink}
     with rc_context(style | {"xtick.color": ink, "ytick.color": ink}):
@@ -83,7 +88,8 @@ def _curves(trajectory: Trajectory, end: float, dark: bool) -> str:
             for k, (name, column) in enumerate(columns.items()):
                 axes.plot(trajectory.t[kept], column[kept], label=name, **looks(k))
             axes.set_xlim(trajectory.t[0], end)
-            axes.set_title(label, loc="left", pad=3)
+            keep_flat(axes, sizes[label.partition("[")[2].removesuffix("]")])
+            axes.set_title(label + side, loc="left", pad=3)
             axes.grid(alpha=0.25)
             if len(columns) <= NAMED:
                 axes.legend(fontsize=6, frameon=False, handlelength=1.2, ncols=2 if len(columns) > 4 else 1)

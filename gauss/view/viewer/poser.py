@@ -48,10 +48,13 @@ class Poser:
         group = gui.add_button_group("run", ("step", "reset"))
         group.on_click(lambda _: self.advance(FRAME) if group.value == "step" else self.reset())
         self.said = gui.add_markdown(HINT)
+        self.turning: set[str] = set()  # angles without limits, of which sliders show what is within a turn
         with gui.add_folder("pose"):
             self.sliders = {name: self._slider(gui, name, unit) for name, unit in self._plain().items()}
         add_layers([stage], lambda: None)
         add_view(stage)
+        # In a drag browsers print that preventDefault fails: viser's client calls it in a listener that react-three-fiber
+        # has registered as passive. The drag is not affected, as viser locks its camera itself.
         for body, node in stage.solids:
             node.on_drag("left")(lambda event, body=body: self._dragged(event, body))
 
@@ -112,9 +115,15 @@ class Poser:
         joint = self.system.scene.joints.get(name)
         reach = TURN if unit == "rad" else self.stage.framing.reach
         value = float(self.state.q[list(coordinate_units(self.system)).index(name)])
-        low, high = (joint.limits if joint is not None else None) or (-reach, reach)
+        limits = joint.limits if joint is not None else None
+        if limits is None and unit == "rad":
+            self.turning.add(name)
+            value = within_a_turn(value)
+        low, high = limits or (-reach, reach)
         low, high = min(low, value), max(high, value)
-        slider = gui.add_slider(f"{name} [{unit}]", low, high, FINEST * (high - low), value)
+        digits = int(np.ceil(-np.log10(FINEST * (high - low))))
+        low, high, value = (round(number, digits) for number in (low, high, value))
+        slider = gui.add_slider(f"{name} [{unit}]", low, high, 10.0**-digits, value)
 
         @slider.on_update
         def _(event):
@@ -136,9 +145,17 @@ class Poser:
             self.state, self.current = state, None
             self.stage.place(state)
             for name, column in zip(coordinate_units(self.system), state.q, strict=True):
-                if name in self.sliders and self.sliders[name].value != column:
-                    slider = self.sliders[name]
-                    slider.value = float(np.clip(column, slider.min, slider.max))
+                if name in self.sliders:
+                    self._slide(name, float(column))
+
+    def _slide(self, name: str, value: float):
+        """Show the value of a coordinate by its slider, in steps of that."""
+        slider, turns = self.sliders[name], name in self.turning
+        if turns and abs(within_a_turn(value - slider.value)) < slider.step:  # as at its ends, which are one direction
+            return
+        value = within_a_turn(value) if turns else value
+        digits = int(round(-np.log10(slider.step)))
+        slider.value = float(np.clip(round(value, digits), slider.min, slider.max))
 
     def _simulator(self) -> Simulator:
         """Simulator whose inputs act on the dragged body, in the present state."""
@@ -169,3 +186,8 @@ class Poser:
             self.play(True)
         except GaussError as error:
             self.pull, self.said.content = None, str(error)
+
+
+def within_a_turn(angle: float) -> float:
+    """Angle in [−π, π) of the same direction [rad]."""
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
