@@ -1,5 +1,7 @@
 """Command line: each command parses arguments and calls a few functions; one file for each group of commands."""
 
+import os
+import sys
 import warnings
 from errno import EDQUOT, EFBIG, ENOSPC
 from typing import Annotated
@@ -61,4 +63,5 @@ def main():
         if error.errno not in FULL:
             raise
         typer.secho(f"error: the output cannot be written: {error.strerror}.", fg="red", err=True)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left of it is written at the end
         raise SystemExit(2) from None

@@ -98,7 +98,7 @@ def optimal_hybrid_motion(
     >>> push = ball.input("push", "lift", limits=100.0)
     >>> fall, rise = gauss.MotionPhase((0.1, 2.0)), gauss.MotionPhase((0.1, 2.0), struck="floor", end={"lift rate": 0.0})
     >>> found = gauss.optimal_hybrid_motion(ball, [fall, rise], start={"lift": 1.0, "lift rate": 0.0})
-    >>> round(found.q[-1, 0], 6)  # without effort: e² of the height
+    >>> round(float(found.q[-1, 0]), 6)  # without effort: e² of the height
     0.25
     """
     require(scene, (Scene, System), "optimal_hybrid_motion")
