@@ -48,9 +48,7 @@ def on_refined_meshes(
         largest = [float(own.max()) for own in errors]
         meshes = [[*mesh, (len(own), worst)] for mesh, own, worst in zip(meshes, errors, largest, strict=True)]
         if max(largest) <= tolerance:
-            for problem, (t, x, _) in zip(problems, samples, strict=True):
-                system = problem.equations.system
-                warn_of_passed(system, State(float(t[0]), *np.split(x[0], [system.n_q])), t)
+            _warn_of_passed(problems, samples)
             return [
                 _motion(problem, check, one, cost, (solved.kkt, solved.residual, mesh[-1][1]), iterations, tuple(mesh))
                 for problem, check, one, cost, mesh in zip(problems, checks, samples, solved.costs, meshes, strict=True)
@@ -61,6 +59,13 @@ def on_refined_meshes(
         f"optimal motion: the mesh error is {worst:.1e} with {count} intervals after {refinements} "
         "refinements; allow more refinements= or a larger tolerance=."
     )
+
+
+def _warn_of_passed(problems: Sequence[MotionProblem], samples):
+    """Warn of features of laws of time that pass between the points of the meshes."""
+    for problem, (t, x, _) in zip(problems, samples, strict=True):
+        system = problem.equations.system
+        warn_of_passed(system, State(float(t[0]), *np.split(x[0], [system.n_q])), t)
 
 
 def _rows(problems: Sequence[MotionProblem], guesses: Sequence[MotionValues]) -> list[list[int]]:
