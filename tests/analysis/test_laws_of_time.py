@@ -58,16 +58,21 @@ def test_feedback_motions(law):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("phases", [1, 2])
 @pytest.mark.parametrize("law", LAWS)
-def test_optimal_motions_of_a_given_duration(law):
+def test_optimal_motions_of_a_given_duration(law, phases):
     pytest.importorskip("casadi")
     force, rate, place = LAWS[law]
     scene = slider(force)
     scene.input("push", "x", limits=5.0)
 
     def motion():
-        found = gauss.optimal_motion(scene, 1.0, start={"x": 0.0, "x rate": 0.0})
-        return found.end.v[0], found.end.q[0]
+        rest = {"x": 0.0, "x rate": 0.0}
+        if phases == 1:
+            found = gauss.optimal_motion(scene, 1.0, start=rest)
+        else:
+            found = gauss.optimal_hybrid_motion(scene, [gauss.MotionPhase(0.15), gauss.MotionPhase(0.85)], start=rest)
+        return found.v[-1, 0], found.q[-1, 0]
 
     assert verdict(motion, [rate, place], relative=1e-6) == "right"  # the tolerance of the mesh
 
