@@ -48,7 +48,8 @@ def _has_full_rank(system: System, guess: State) -> bool:
 
 def dependent_rows(system: System, state: State, tolerance: float = ROUNDOFF_PIVOT) -> list[tuple[int, ...]]:
     """Rows of each subsystem that depend on others at a state, by pivots up to a tolerance over those on free bodies."""
-    bodies = Mechanism(system, state.q, state.v, state.t).bodies
+    with np.errstate(all="ignore"):
+        bodies = Mechanism(system, state.q, state.v, state.t).bodies
     return [_dependent_rows(body.S.astype(float), tolerance) if body.unit_forces else () for body in bodies]
 
 
@@ -57,7 +58,7 @@ def _dependent_rows(S: np.ndarray, tolerance: float) -> tuple[int, ...]:
     left = np.ones(len(S), dtype=bool)
     while left.any():
         pivots = np.where(left, np.diag(S), -np.inf)
-        if pivots.max() <= tolerance:
+        if not pivots.max() > tolerance:  # NaN, too: bodies whose inertia does not determine their motion
             break
         row = int(np.argmax(pivots >= SIMILAR_PIVOTS * pivots.max()))
         left[row] = False
