@@ -215,6 +215,11 @@ def few_closed_gaps(ask: Question) -> list[str]:
     return [f"{closed} closed gaps are more than {most}"] if closed > most else []
 
 
+def inertia_in_all_directions(ask: Question) -> list[str]:
+    """Every body has inertia in all directions: without it machine code may divide by zero, and numpy solves what it can."""
+    return ["a body has no inertia in some direction"] if not ask.system.Phi.all() else []
+
+
 def few_contact_operations(ask: Question) -> list[str]:
     """The gap functions of contacts are short enough to be written out."""
     scene = ask.system.scene

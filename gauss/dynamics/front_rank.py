@@ -60,6 +60,16 @@ def regular_fronts(ask: Question) -> list[str]:
     return [] if embedding(ask.system) else ["its loop constraints depend on each other where chains are eliminated"]
 
 
+def independent_fronts(ask: Question) -> list[str]:
+    """The loop constraints are independent where chains are eliminated.
+
+    Between the steps of a motion, states are a little off the constraints, where redundant rows contradict each other.
+    """
+    found = embedding(ask.system)
+    redundant = found is not None and any(found.dependent)
+    return ["its loop constraints are redundant"] if redundant else regular_fronts(ask)
+
+
 def embedding(system: System) -> Embedding | None:
     """Embedding with large pivots at a consistent state, with hubs if it has them there; None without one."""
     name, *dependent = cached_on_disk(system, (embedding,), lambda: _named(_regular_embedding(system)))

@@ -13,7 +13,7 @@ time stepping       certified       the same, where the dynamics cannot be compi
 events              compiled        unilateral constraints, joint friction, limited forces, losses
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
-compiled loop       embedded loops  smooth scenes with loop constraints, by explicit integrators
+compiled loop       embedded loops  smooth scenes with independent loop constraints, by explicit integrators
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
 compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
@@ -47,6 +47,7 @@ from gauss.dynamics.conditions import (
     few_loops,
     has_contacts,
     has_opaque_laws,
+    inertia_in_all_directions,
     large_loops,
     large_tree,
     named,
@@ -60,7 +61,7 @@ from gauss.dynamics.conditions import (
     traced_laws,
     written_out,
 )
-from gauss.dynamics.front_rank import has_loops, regular_fronts
+from gauss.dynamics.front_rank import has_loops, independent_fronts, regular_fronts
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.dynamics.store import cached
@@ -171,7 +172,9 @@ MOTIONS = RuleTable(
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, closed_form_contacts)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, closed_form_contacts)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
-        Rule("compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, regular_fronts)),
+        Rule(
+            "compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, independent_fronts)
+        ),
         Rule("compiled loop", "compiled", "refined", _both(_smooth, _without_feedback), _LOOP),
         Rule("compiled loop", "compiled", "certified", _both(_smooth, _with_feedback), _LOOP),
         Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),
@@ -192,7 +195,9 @@ TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 BATCHES = RuleTable(
     (
         Rule("batch", "compiled", "simulate", is_time_stepping, (*_STEP, closed_form_contacts)),
-        Rule("batch", "embedded loops", "simulate", _both(_no_time_stepping, has_loops), (*_WHOLE_BATCH, regular_fronts)),
+        Rule(
+            "batch", "embedded loops", "simulate", _both(_no_time_stepping, has_loops), (*_WHOLE_BATCH, independent_fronts)
+        ),
         Rule("batch", "compiled", "simulate", _no_time_stepping, _WHOLE_BATCH),
     ),
     lambda ask, why: (
@@ -222,10 +227,11 @@ def _refused_state(ask: Question, why: str) -> str:
 
 
 _ACTIVE_SET = contacts_alone, smooth(compilable), smooth(traced_laws)
+_AT_ONCE = *_ACTIVE_SET, smooth(inertia_in_all_directions)
 # Active set of frictionless contacts; "tiered": by numpy first, compiled above a threshold of evaluations.
 CONTACTS = RuleTable(
     (
-        Rule("state", "compiled", "certified", has_contacts, (*_ACTIVE_SET, few_contact_operations)),
+        Rule("state", "compiled", "certified", has_contacts, (*_AT_ONCE, few_contact_operations)),
         Rule("state", "tiered", "certified", has_contacts, _ACTIVE_SET),
         Rule("state", "certified"),
     ),
@@ -234,7 +240,12 @@ CONTACTS = RuleTable(
 # A smooth phase between events.
 MODES = RuleTable(
     (
-        Rule("events", "compiled", "certified", conditions=(own_backend, compilable, few_closed_gaps)),
+        Rule(
+            "events",
+            "compiled",
+            "certified",
+            conditions=(own_backend, compilable, few_closed_gaps, inertia_in_all_directions),
+        ),
         Rule("events", "tiered", "certified", conditions=(own_backend, compilable)),
         Rule("events", "certified"),
     ),

@@ -8,22 +8,22 @@ import pytest
 import gauss
 from gauss.codegen import Kernel, write
 from gauss.dynamics import embedded_program
+from gauss.dynamics.embedded_aba import EmbeddedMechanism
 from gauss.dynamics.embedded_program import EmbeddedProgram
-from gauss.dynamics.front_rank import Embedding
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Point, Rates
 from gauss.system import retract
-from tests.dynamics.test_embedded_loops import REDUNDANT, SCENES, _platform
+from tests.dynamics.test_embedded_loops import SCENES, _platform
 
 SAME = 1e-9  # relative to the largest output: both eliminations lose digits near singular states
 DAMPED = 1e-3  # of the error of wrong accelerations: the general elimination damps the residual of the constraints
 REGULARISED = 1e-6  # of projected states: so are the Newton steps of the general elimination
 SAME_MOTION = 1e-9  # of coordinates and rates after some steps, relative to the largest
 NEAR = 1e-3  # of the units of the coordinates: distance of the states from the constraints
-MOTIONS = SCENES | {"delta": lambda: gauss.load("delta_robot")} | {name: make for name, (make, _) in REDUNDANT.items()}
+MOTIONS = SCENES | {"delta": lambda: gauss.load("delta_robot")}
 GENERAL, EMBEDDED = (Plan("compiled loop", dynamics) for dynamics in ("compiled", "embedded loops"))
 RK4 = {"integrator": "rk4", "step": 1e-3}
 
@@ -78,7 +78,7 @@ def test_a_batch_makes_the_motions_of_the_general_elimination():
 @pytest.mark.parametrize("method", [{}, RK4], ids=["dop853", "rk4"])
 def test_a_motion_near_a_singular_front_goes_on_with_the_general_elimination(method, monkeypatch):
     """A stretched leg cannot meet its own rows, though the platform moves on."""
-    monkeypatch.setattr(embedded_program, "embedding_of", lambda system: Embedding())
+    monkeypatch.setattr(embedded_program, "embedded_elimination", lambda system: EmbeddedMechanism)
     system = gauss.compile_scene(replace(_platform("revolute", reach=2.0), gravity=(0.0, 0.1, -9.7)))  # a scene of its own
     found, expected = (gauss.simulate(system, 0.01, plan=plan, progress=False, **method) for plan in (EMBEDDED, GENERAL))
     assert found.stats.handed_over is not None and expected.stats.handed_over is None
