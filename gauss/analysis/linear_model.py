@@ -237,7 +237,7 @@ def linearise(
     tangents = Tangents(changes.system, state)
     N, rate = tangents.position, tangents.rate
     if independent is not None:
-        chosen = fixed_columns(system, (independent,) if isinstance(independent, str) else independent)
+        chosen = fixed_columns(system, _names(independent, "independent"))
         N, turning = _described_by(N, chosen, independent), _best_rows(rate / system.scale.rates[:, None], chosen)
         rate = _described_by(rate, turning, independent)
         tangents.__dict__.update(position=N, rate=rate, independent_coordinates=chosen, independent_rates=turning)

@@ -4,6 +4,7 @@ from gauss.analysis.equilibrium import equilibrium
 from gauss.analysis.linear_model import linearise
 from gauss.analysis.linear_modes import LinearModes
 from gauss.arguments import named_arguments
+from gauss.errors import require
 from gauss.scene import Scene
 from gauss.system import State, System
 
@@ -46,6 +47,7 @@ def modes(system: System | Scene, state: State | None = None, *, t: float | None
     >>> gauss.modes(system, hanging).frequencies.round(4).tolist()  # Hz
     [0.4266, 1.1441]
     """
+    require(system, (System, Scene), "modes")
     if state is None:
         return equilibrium(system, t=t).model.modes()
     return linearise(system, state, t=t).modes()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.errors import ArgumentError, SimulationError
+from gauss.errors import ArgumentError, SimulationError, StateError
 
 LIMITS = {"A": ((-1.0, 1.5), 2.0, 8.0), "B": ((-2.0, 2.0), 3.0, 15.0)}
 DIFFERENCE, ROUGH = 1e-5, 1e-6  # of central differences in time
@@ -90,6 +90,8 @@ def test_what_does_not_fit_is_refused():
     ball.ball("socket", "ground", ball.body("ball", 1.0, (0.1, 0.1, 0.1), com=(0.1, 0, 0)))
     with pytest.raises(SimulationError, match="socket"):
         gauss.excitation(ball, 5.0)
+    with pytest.raises(StateError, match="expected 1 coordinates"):
+        gauss.excitation(gauss.load("four_bar"), 5.0, independent=["A", "B"])
     with pytest.raises(ArgumentError, match="'C'"):
         gauss.excitation(scene, 5.0, limits={"C": ((0, 1), 1, 1)})
     with pytest.raises(ArgumentError, match="limits of 'A'"):
