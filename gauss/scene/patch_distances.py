@@ -1,4 +1,4 @@
-"""Gap functions of two convex solids without a closed form, in numbers: points of their patch of contact."""
+"""Gap functions of two solids without a closed form, in numbers: points of their patch of contact."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,9 @@ from gauss.scene import values
 from gauss.scene.box_distances import far
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace
 from gauss.scene.contact_distances import FeaturePair, Touch
-from gauss.scene.contact_patch import SLOTS, SolidPose, solid_pair
-from gauss.scene.curved_shapes import ConvexCollider
+from gauss.scene.contact_patch import SLOTS, SolidPose
+from gauss.scene.curved_shapes import BoundedCollider
+from gauss.scene.solid_pairs import solid_pair
 
 
 @dataclass(frozen=True)
@@ -64,13 +65,13 @@ def patch_points(first: Collider, second: Collider) -> list[FeaturePair]:
 
 
 def _pose(shape: Collider, at) -> SolidPose:
-    centre = shape.centre if isinstance(shape, ConvexCollider) else shape.at
+    centre = shape.centre if isinstance(shape, BoundedCollider) else shape.at
     return SolidPose(at.rotation(shape.body) @ axes_of(shape), at.position(shape.body, centre))
 
 
 def axes_of(shape: Collider) -> np.ndarray:
     """Rotation (3, 3) from the axes of a shape to the frame of its body."""
-    if isinstance(shape, ConvexCollider | Box):
+    if isinstance(shape, BoundedCollider | Box):
         return shape.axes
     if isinstance(shape, Capsule):
         return along(values.unit(shape.axis))
