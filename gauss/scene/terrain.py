@@ -56,6 +56,7 @@ class Terrain:
         half = field.half_edges
         self.heights, self.base = z - (z.max() - half[2]), -float(half[2])
         self.size = float(np.linalg.norm(half))  # radius of the ball around it [m]
+        self.least = float(self.edges.min() ** 2)  # square of the shorter edge of a cell [m²]
 
     def under(self, low: np.ndarray, high: np.ndarray) -> Triangles:
         """Triangles of the cells that a box overlaps from above, by its lowest and highest corners (3,) [m]."""
@@ -100,13 +101,15 @@ class Terrain:
         """Distance of a place of the solid from its sides and its bottom, which nothing touches [m]."""
         return float(min((place[:2] - self.start).min(), (self.end - place[:2]).min(), place[2] - self.base))
 
-    def has_normal(self, corners: np.ndarray, normal: np.ndarray, place: np.ndarray, direction: np.ndarray) -> bool:
+    def has_normal(
+        self, corners: np.ndarray, points: np.ndarray, normal: np.ndarray, place: np.ndarray, direction: np.ndarray
+    ) -> bool:
         """Whether a direction is one of the normals of the surface at a place of a triangle.
 
         Parameters
         ----------
-        corners, normal : ndarray, shape (3,)
-            Numbers of its vertices, and its normal.
+        corners, points, normal : ndarray, shape (3,), (3, 3), (3,)
+            Numbers of its vertices, these vertices, and its normal.
         place, direction : ndarray, shape (3,)
             The place [m], and a unit vector.
         """
@@ -114,14 +117,15 @@ class Terrain:
             return True
         if direction[2] <= 0.0:
             return False
-        points = self.vertices(corners)
         (a, b), (c, d) = (points[1:, :2] - points[0, :2]).tolist()
         x, y = (place[:2] - points[0, :2]).tolist()
         shares = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)
         on = [k for k, share in zip(corners.tolist(), (1.0 - sum(shares), *shares), strict=True) if share > ON_EDGE]
+        if len(on) == len(corners):  # within the triangle there is one normal
+            return False
         near = set(on).union(set.intersection(*map(self._around, on)))
         out = self.vertices(np.array(sorted(near))) - place
-        return bool((out @ direction <= ALIGNED * np.maximum(np.linalg.norm(out, axis=1), self.edges.min())).all())
+        return bool((out @ direction <= ALIGNED * np.sqrt(np.maximum((out * out).sum(axis=1), self.least))).all())
 
     def _around(self, number: int) -> set[int]:
         """Neighbours of a vertex."""

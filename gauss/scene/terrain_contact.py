@@ -1,15 +1,16 @@
 """Contact points of a height field: with a ball in closed form, with other convex solids by a prism under each triangle.
 
 Of the nearest points of all triangles those count whose normal is one of the surface (:mod:`gauss.scene.terrain`): the
-local minima of the distance. A solid deep in the field, of which no triangle has such a normal, is pushed out along those of
-the triangles over it. Cost follows the cells under a body, whatever the size of the field. Nearest point of a
-triangle: Ericson, Real-Time Collision Detection, 2005, sec. 5.1.
+local minima of the distance. A solid deep in the field, where no triangle has such a normal, is pushed out along those of
+the triangles over it. Cost follows the cells under a body, whatever the size of the field. Nearest point of a triangle:
+Ericson, Real-Time Collision Detection, 2005, sec. 5.1.
 """
 
 from math import dist, sqrt
 
 import numpy as np
 
+from gauss.rotations import cross
 from gauss.scene.contact_patch import SLOTS, ContactPoint, Solid, SolidPair, SolidPose, spread
 from gauss.scene.support_faces import Polytope, Segment
 from gauss.scene.terrain import ALIGNED, Terrain, Triangles
@@ -17,7 +18,7 @@ from gauss.scene.terrain import ALIGNED, Terrain, Triangles
 SAME = 1e-9  # relative to the size of a solid: places and planes that are the same
 LEAST_DEPTH = 4.0  # sizes of the solid that prisms reach below their triangles at least, where the field does
 NEAR_SIDE = 1e-5  # of the size of the solid: a place is at the sides or the bottom of the field
-ODD = (0.31, 0.57, 0.76), (0.76, -0.31, 0.57)  # directions along which no edges are expected: ties are sorted by rounding
+ODD = np.array([(0.31, 0.57, 0.76), (0.76, -0.31, 0.57)])  # along which no edges are expected: ties are sorted by rounding
 FLUSH = 0.9998  # cosine of the angle of two faces that lie on each other
 MOST_PRISMS = 4096  # that are kept
 TINY = 1e-12  # relative to the size of the field: distance of a centre from the surface that has no direction
@@ -60,7 +61,7 @@ class BallOnTerrain:
         found: dict[tuple, ContactPoint] = {}
         for k in np.flatnonzero(distances <= far).tolist():
             up = out[k] / distances[k] if distances[k] > TINY * terrain.size else near.normals[k]
-            if terrain.has_normal(near.corners[k], near.normals[k], places[k], up):
+            if terrain.has_normal(near.corners[k], near.points[k], near.normals[k], places[k], up):
                 key = tuple(np.rint(places[k] / (SAME * (self.radius or terrain.size))).tolist())
                 gap = float(distances[k]) - self.radius
                 found.setdefault(key, ContactPoint(gap, other.x + other.R @ places[k], other.R @ up))
@@ -123,14 +124,16 @@ class SolidOnTerrain:
             if nearest.gap > reach:
                 continue
             place, direction = other.R.T @ (nearest.place - other.x), other.R.T @ nearest.normal
-            if self.terrain.has_normal(corners, normal, place, direction):
+            if self.terrain.has_normal(corners, points, normal, place, direction):
                 found += _beside(pair.around(nearest, one, pose, reach), nearest, reach)
             elif nearest.gap > 0.0:  # another triangle is nearer; the faces that meet here may touch next
                 patch = pair.patch(one, pose, nearest.normal, reach)[0]
                 found += [point for point in patch if point.normal @ other.R[:, 2] > ALIGNED]
             elif self.terrain.margin(place) > NEAR_SIDE * self.first.size:
                 within += pair.patch(one, pose, other.R @ normal, reach)[0]
-        return _chosen(_outlines(found or within, SAME * self.first.size))
+        if all(point.gap > 0.0 for point in found):
+            found += within
+        return _chosen(_outlines(found, SAME * self.first.size))
 
     def _prism(self, corners: np.ndarray, points: np.ndarray) -> tuple[SolidPair, np.ndarray]:
         """Solid and prism under a triangle, and the middle of the prism."""
@@ -183,12 +186,10 @@ def _outline(points: list[ContactPoint], near: float) -> list[ContactPoint]:
     if len(points) < 3:
         return points
     normal = points[0].normal
-    first = max((np.cross(normal, odd) for odd in ODD), key=np.linalg.norm)
-    first = first / np.linalg.norm(first)
-    places = np.array([point.place for point in points]) - points[0].place
-    flat = np.column_stack([places @ first, places @ np.cross(normal, first)])
-    order = np.lexsort(flat.T[::-1]).tolist()
-    plane = flat.tolist()
+    first = max((cross(normal, odd) for odd in ODD), key=lambda axis: axis @ axis)
+    axes = np.array([first, cross(normal, first)]) / sqrt(first @ first)
+    plane = (np.array([point.place for point in points]) @ axes.T).tolist()
+    order = sorted(range(len(plane)), key=plane.__getitem__)
     chains = _chain(order, plane, near)[:-1] + _chain(order[::-1], plane, near)[:-1]
     return [points[k] for k in dict.fromkeys(chains)]
 
@@ -211,7 +212,7 @@ def _chain(order: list[int], plane: list[list[float]], near: float) -> list[int]
 
 
 def _seen(a: list[float], b: list[float], c: list[float]) -> tuple[float, float]:
-    """Distance of b to the right of the line from a to c, and its share of the way."""
+    """Distance of b to the right of the line from a to c, and its share of the way; zero where b lies between equal ones."""
     x, y, u, v = c[0] - a[0], c[1] - a[1], b[0] - a[0], b[1] - a[1]
     square = x * x + y * y
-    return (u * y - v * x) / sqrt(square), (u * x + v * y) / square
+    return ((u * y - v * x) / sqrt(square), (u * x + v * y) / square) if square else (0.0, 0.0)
