@@ -11,7 +11,7 @@ from gauss.scene.convex_mesh import ConvexMesh
 from gauss.scene.curved_distances import ApexOnHalfSpace, EllipsoidOnHalfSpace, rim
 from gauss.scene.curved_shapes import Cone, ConvexCollider, Cylinder, Ellipsoid
 from gauss.scene.height_field import HeightField
-from gauss.scene.patch_distances import patch_points
+from gauss.scene.patch_distances import feet_points, patch_points
 
 BOTH_SIDES = (-1, 1)
 
@@ -118,4 +118,6 @@ RULES |= {
     for first, second in combinations_with_replacement(SOLIDS, 2)
     if (first, second) not in RULES and (issubclass(first, ConvexCollider) or issubclass(second, ConvexCollider))
 }
-RULES |= {(kind, HeightField): patch_points for kind in SOLIDS if kind is not HalfSpace}
+RULES |= {(kind, HeightField): patch_points for kind in SOLIDS if kind is not HalfSpace} | {
+    (Points, HeightField): feet_points
+}

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Sphere
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.convex_mesh import ConvexMesh
 from gauss.scene.curved_shapes import Cone, Cylinder, Ellipsoid
 from gauss.scene.support_faces import Face, Oval, Polytope, Revolved, Segment
@@ -55,7 +55,7 @@ def solid_of(shape: Collider) -> Solid | None:
         return _box(0.5 * np.array(shape.size))
     if isinstance(shape, Ellipsoid):
         return Oval(shape.half_edges)
-    if isinstance(shape, Sphere | Capsule):
+    if isinstance(shape, Sphere | Capsule | Points):  # each of several points alone
         return Segment(0.5 * getattr(shape, "length", 0.0), shape.radius)
     assert isinstance(shape, Cylinder | Cone)
     return Revolved(shape.radius, float(shape.half_edges[2]), isinstance(shape, Cone))

@@ -9,7 +9,7 @@ from gauss.errors import SceneError
 from gauss.rotations import along
 from gauss.scene import values
 from gauss.scene.box_distances import far
-from gauss.scene.collision import Box, Capsule, Collider, HalfSpace
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points
 from gauss.scene.contact_distances import FeaturePair, Touch
 from gauss.scene.contact_patch import SLOTS, SolidPose
 from gauss.scene.curved_shapes import BoundedCollider
@@ -26,11 +26,14 @@ class PatchPoint(FeaturePair):
         The shapes.
     index : int
         Which point.
+    corner : int
+        Which ball of the first shape, where it is a set of points.
     """
 
     shape: Collider
     other: Collider
     index: int
+    corner: int = 0
 
     @property
     def is_traced(self) -> bool:
@@ -45,7 +48,7 @@ class PatchPoint(FeaturePair):
         SceneError
             If the view is in symbols: the distance is found by iteration.
         """
-        poses = _pose(self.shape, at), _pose(self.other, at)
+        poses = _pose(self.shape, at, self.corner), _pose(self.other, at)
         if any(isinstance(entry, Expression) for pose in poses for entry in (*np.ravel(pose.R), *pose.x)):
             raise SceneError(f"{no_closed_form(self.shape, self.other)}; use integrator='time_stepping'.")
         found = solid_pair(self.shape, self.other).points(*poses, far(at))
@@ -64,7 +67,22 @@ def patch_points(first: Collider, second: Collider) -> list[FeaturePair]:
     return [PatchPoint(first, second, k) for k in range(SLOTS)]
 
 
-def _pose(shape: Collider, at) -> SolidPose:
+def feet_points(first: Points, second: Collider) -> list[FeaturePair]:
+    """Points of the patches of balls around points and a shape.
+
+    Raises
+    ------
+    SceneError
+        If the points have no radius.
+    """
+    if not first.is_round:
+        raise SceneError(f"{first.what} and {second.what}: points touch it as balls; give them a radius [m].")
+    return [PatchPoint(first, second, k, corner) for corner in range(len(first.corners)) for k in range(SLOTS)]
+
+
+def _pose(shape: Collider, at, corner: int = 0) -> SolidPose:
+    if isinstance(shape, Points):
+        return SolidPose(at.rotation(shape.body), at.position(shape.body, shape.corners[corner]))
     centre = shape.centre if isinstance(shape, BoundedCollider) else shape.at
     return SolidPose(at.rotation(shape.body) @ axes_of(shape), at.position(shape.body, centre))
 

@@ -11,6 +11,8 @@ import numpy as np
 from gauss.scene.height_field import HeightField
 
 AROUND = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1))  # rows and columns to the neighbours of a vertex
+ROWS = np.array([[0, 0, 1], [0, 1, 1]])  # of the corners of the lower and the upper triangle of a cell
+COLUMNS = np.array([[0, 1, 1], [0, 1, 0]])
 ON_EDGE = 1e-5  # share of a corner in a place of a triangle below which the place is on the opposite edge
 ALIGNED = 1e-4  # rad: angle of two normals that are the same, above the errors of iterated ones
 
@@ -40,6 +42,9 @@ class Triangles(NamedTuple):
         return Triangles(*(part[kept] for part in self))
 
 
+NO_TRIANGLES = Triangles(np.zeros((0, 3), dtype=int), np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0, dtype=bool))
+
+
 class Terrain:
     """Height field in its own axes around the middle of its box.
 
@@ -55,44 +60,51 @@ class Terrain:
         self.edges = np.array([x[1] - x[0], y[1] - y[0]])  # of a cell [m]
         half = field.half_edges
         self.heights, self.base = z - (z.max() - half[2]), -float(half[2])
+        high = np.maximum(self.heights[:-1], self.heights[1:])
+        self.tops = np.maximum(high[:, :-1], high[:, 1:])  # of cells
         self.size = float(np.linalg.norm(half))  # radius of the ball around it [m]
         self.least = float(self.edges.min() ** 2)  # square of the shorter edge of a cell [m²]
 
     def under(self, low: np.ndarray, high: np.ndarray) -> Triangles:
         """Triangles of the cells that a box overlaps from above, by its lowest and highest corners (3,) [m]."""
-        rows, columns = self.heights.shape
-        (left, front), (right, back) = self._cells(low), self._cells(high)
         if (high[:2] < self.start).any() or (low[:2] > self.end).any() or high[2] < self.base:
-            right = left - 1  # none
-        i, j = (part.ravel() for part in np.mgrid[front : back + 1, left : right + 1])
-        z = self.heights[front : back + 2, left : right + 2]
-        if i.size:
-            tops = np.maximum(np.maximum(z[:-1, :-1], z[1:, :-1]), np.maximum(z[:-1, 1:], z[1:, 1:])).ravel()
-            i, j = i[tops >= low[2]], j[tops >= low[2]]
-        first = (i * columns + j)[:, None]
-        corners = np.concatenate([first + (0, 1, columns + 1), first + (0, columns + 1, columns)])
-        points, is_upper = self.vertices(corners), np.repeat([False, True], i.size)
+            return NO_TRIANGLES
+        (left, front), (right, back) = self._cell(low), self._cell(high)
+        i, j = np.nonzero(self.tops[front : back + 1, left : right + 1] >= low[2])
+        if not i.size:
+            return NO_TRIANGLES
+        rows, columns = ((part[:, None, None] + of).reshape(-1, 3) for part, of in ((i + front, ROWS), (j + left, COLUMNS)))
+        points, is_upper = self._places(rows, columns), np.arange(len(rows)) % 2 > 0
         a, b, c = points[:, :, 2].T  # the edge along x is from a to b, of an upper triangle from c to b
-        slope_x = np.where(is_upper, b - c, b - a) / self.edges[0]
-        slope_y = np.where(is_upper, c - a, c - b) / self.edges[1]
-        up = np.column_stack([-slope_x, -slope_y, np.ones(len(corners))])
-        return Triangles(corners, points, up / np.sqrt((up * up).sum(axis=1))[:, None], is_upper)
+        up = np.ones((len(rows), 3))
+        up[:, 0] = np.where(is_upper, c - b, a - b) / self.edges[0]
+        up[:, 1] = np.where(is_upper, a - c, b - c) / self.edges[1]
+        up /= np.sqrt((up * up).sum(axis=1))[:, None]
+        return Triangles(rows * self.heights.shape[1] + columns, points, up, is_upper)
 
-    def _cells(self, place: np.ndarray) -> np.ndarray:
+    def _cell(self, place: np.ndarray) -> tuple[int, int]:
         """Column and row of the cell of a place, or of the nearest one."""
-        last = np.array(self.heights.shape[::-1]) - 2
-        return np.clip(np.floor((place[:2] - self.start) / self.edges), 0, last).astype(int)
+        column, row = ((place[:2] - self.start) / self.edges).tolist()
+        rows, columns = self.tops.shape
+        return min(max(int(column), 0), columns - 1), min(max(int(row), 0), rows - 1)
+
+    def _places(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Places of vertices by their rows and columns [m]."""
+        found = np.empty((*rows.shape, 3))
+        found[..., 0] = self.start[0] + columns * self.edges[0]
+        found[..., 1] = self.start[1] + rows * self.edges[1]
+        found[..., 2] = self.heights[rows, columns]
+        return found
 
     def vertices(self, numbers: np.ndarray) -> np.ndarray:
         """Places of vertices by their numbers [m]."""
-        i, j = np.divmod(numbers, self.heights.shape[1])
-        return np.stack([self.start[0] + j * self.edges[0], self.start[1] + i * self.edges[1], self.heights[i, j]], axis=-1)
+        return self._places(*np.divmod(numbers, self.heights.shape[1]))
 
     def height(self, place: np.ndarray) -> float:
         """Height of the surface over or under a place [m]; −inf beside the field."""
         if (place[:2] < self.start).any() or (place[:2] > self.end).any():
             return -np.inf
-        j, i = self._cells(place)
+        j, i = self._cell(place)
         u, v = (place[:2] - self.start) / self.edges - (j, i)
         (a, b), (d, c) = self.heights[i : i + 2, j : j + 2].tolist()
         return float(a + u * (b - a) + v * (c - b) if u >= v else a + v * (d - a) + u * (c - d))

@@ -113,6 +113,8 @@ class SolidOnTerrain:
         R, x = other.R.T @ one.R, other.R.T @ (one.x - other.x)
         extents = self.first.extent(np.concatenate([R, -R]))
         near = self.terrain.under(x - extents[3:] - reach, x + extents[:3] + reach)
+        if not len(near.corners):
+            return []
         heights = np.einsum("ij,ij->i", near.normals, x - near.points[:, 0]) - self.first.extent(-near.normals @ R)
         near = near.where(heights <= reach)
         found: list[ContactPoint] = []

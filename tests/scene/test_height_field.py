@@ -159,17 +159,19 @@ def test_what_is_no_grid_is_refused_by_name(heights, size, options, words):
     assert words in str(error.value)
 
 
-def test_points_and_planes_have_no_rule():
+def test_planes_have_no_rule_and_points_need_a_radius():
     scene = gauss.Scene("land")
     scene.height_field("land", "ground", HEIGHTS, (5, 4))
     scene.body("A", 1.0, (1, 1, 1))
-    scene.points("feet", "A", [(0, 0, 0)])
     scene.half_space("floor", "A")
-    scene.sphere("ball", "A", 0.1)
-    for name in ("feet", "floor"):
-        with pytest.raises(SceneError, match=name):
-            scene.contact(f"{name} on land", name, "land")
-    assert [contact.name for contact in scene.contacts_all()] == ["ball on land"]
+    with pytest.raises(SceneError, match="floor"):
+        scene.contact("floor on land", "floor", "land")
+    scene.points("feet", "A", [(0, 0, 0)])
+    with pytest.raises(SceneError, match="feet.*radius"):
+        scene.contact("feet on land", "feet", "land")
+    scene.points("round feet", "A", [(0, 0, 0), (0, 1, 0)], radius=0.1)
+    contact = scene.contact("round feet on land", "round feet", "land")
+    assert len(contact.sides(scene)) == 2 * SLOTS
 
 
 def test_a_field_comes_back_from_a_file(tmp_path):

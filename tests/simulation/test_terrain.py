@@ -47,6 +47,29 @@ def test_a_level_field_is_a_plane(kind):
     assert ends[0].v[-1] == pytest.approx(ends[1].v[-1], abs=AS_ON_A_PLANE / STEP)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_feet_are_balls_at_their_points(turned):
+    places, ends = np.array([(0.2, 0.1, -0.2), (0.2, -0.1, -0.2), (-0.2, 0.0, -0.2)]), []
+    x, y = np.meshgrid(np.linspace(-1, 1, 15), np.linspace(-1, 1, 13))
+    for feet in (True, False):
+        scene = gauss.Scene("tripod")
+        scene.height_field("land", "ground", 0.05 * np.sin(3 * x) * np.cos(2 * y), (2.0, 2.0))
+        free_body(scene, "A", 0.4 * RADIUS**2, (0.013, 0.021, 0.4), rate=(0.6, 0.2, 0, 0, 0, 0))
+        if feet:
+            scene.points("feet", "A", places, radius=0.05)
+        for k, place in enumerate(places):
+            scene.sphere(f"foot {k}", "A", 0.05, at=place)
+        pairs = ["feet"] if feet else [f"foot {k}" for k in range(3)]
+        for name in pairs:
+            shapes = ("land", name) if turned else (name, "land")
+            scene.contact(name, *shapes, friction=FRICTION)
+        end = moved(scene, 0.4)
+        ends.append((end.q[-1], np.concatenate([np.ravel(gauss.contact_forces(end, name)[-1]) for name in pairs])))
+    assert ends[0][0] == pytest.approx(ends[1][0], abs=AS_ON_A_PLANE)
+    assert ends[0][1] == pytest.approx(ends[1][1], abs=1e-6 * G)
+    assert np.count_nonzero(ends[0][1]) >= 2
+
+
 def test_a_ball_in_a_valley_presses_on_both_sides():
     slope, scene = 0.5, gauss.Scene("valley")
     x = np.linspace(-1, 1, 5)

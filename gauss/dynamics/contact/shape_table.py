@@ -157,5 +157,6 @@ class ShapeTable:
         first, second = self.pair(key)
         turned = self.sides(key) < 0.0
         one, other = np.where(turned, second, first), np.where(turned, first, second)
-        place, count = self.number
-        return self.gaps[self.law[first, second] - 1] + place[one] * count[other] + place[other] + key % MOST_FEATURES
+        (place, count), law = self.number, self.law[first, second]
+        features = (self.gaps[law] - self.gaps[law - 1]) // (count[one] * count[other])  # of each pair of parts
+        return self.gaps[law - 1] + (place[one] * count[other] + place[other]) * features + key % MOST_FEATURES
