@@ -84,6 +84,8 @@ class SolidPair:
         The solids; the second may be a half-space, None.
     """
 
+    farthest = inf  # distance at which points are found [m]
+
     def __init__(self, first: Solid, second: Solid | None):
         self.first, self.second = first, second
         self.given: tuple | None = None

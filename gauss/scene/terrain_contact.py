@@ -19,6 +19,9 @@ SAME = 1e-9  # relative to the size of a solid: places and planes that are the s
 LEAST_DEPTH = 4.0  # sizes of the solid that prisms reach below their triangles at least, where the field does
 NEAR_SIDE = 1e-5  # of the size of the solid: a place is at the sides or the bottom of the field
 ODD = np.array([(0.31, 0.57, 0.76), (0.76, -0.31, 0.57)])  # along which no edges are expected: ties are sorted by rounding
+LOOKED_AT = 0.1  # of the size of a solid: up to this distance points are found where no step says how far they may move
+BESIDE = 0.05  # of the size of a solid: points that are no farther from the nearest one are at its place
+CLOSED = 1e-5  # of the size of a solid: gaps that differ less have one place in the order of points
 FLUSH = 0.9998  # cosine of the angle of two faces that lie on each other
 MOST_PRISMS = 4096  # that are kept
 TINY = 1e-12  # relative to the size of the field: distance of a centre from the surface that has no direction
@@ -37,6 +40,7 @@ class BallOnTerrain:
 
     def __init__(self, ball: Segment, terrain: Terrain):
         self.radius, self.terrain = ball.radius, terrain
+        self.farthest = LOOKED_AT * ball.size
 
     def may_touch(self, one: list[float], other: list[float], reach: float) -> bool:
         """Whether the balls around both, at centres (3,), are nearer than ``reach`` [m]."""
@@ -65,7 +69,7 @@ class BallOnTerrain:
                 key = tuple(np.rint(places[k] / (SAME * (self.radius or terrain.size))).tolist())
                 gap = float(distances[k]) - self.radius
                 found.setdefault(key, ContactPoint(gap, other.x + other.R @ places[k], other.R @ up))
-        return _chosen(list(found.values()))
+        return _chosen(list(found.values()), self.radius or terrain.size)
 
 
 def nearest_places(point: np.ndarray, triangles: Triangles, cell: np.ndarray) -> np.ndarray:
@@ -96,6 +100,7 @@ class SolidOnTerrain:
 
     def __init__(self, first: Solid, terrain: Terrain):
         self.first, self.terrain = first, terrain
+        self.farthest = LOOKED_AT * first.size
         self.prisms: dict[tuple[int, ...], tuple[SolidPair, np.ndarray]] = {}
 
     def may_touch(self, one: list[float], other: list[float], reach: float) -> bool:
@@ -127,7 +132,7 @@ class SolidOnTerrain:
                 continue
             place, direction = other.R.T @ (nearest.place - other.x), other.R.T @ nearest.normal
             if self.terrain.has_normal(corners, points, normal, place, direction):
-                found += _beside(pair.around(nearest, one, pose, reach), nearest, reach)
+                found += _beside(pair.around(nearest, one, pose, reach), nearest, min(reach, BESIDE * self.first.size))
             elif nearest.gap > 0.0:  # another triangle is nearer; the faces that meet here may touch next
                 patch = pair.patch(one, pose, nearest.normal, reach)[0]
                 found += [point for point in patch if point.normal @ other.R[:, 2] > ALIGNED]
@@ -135,7 +140,7 @@ class SolidOnTerrain:
                 within += pair.patch(one, pose, other.R @ normal, reach)[0]
         if all(point.gap > 0.0 for point in found):
             found += within
-        return _chosen(_outlines(found, SAME * self.first.size))
+        return _chosen(_outlines(found, SAME * self.first.size), self.first.size)
 
     def _prism(self, corners: np.ndarray, points: np.ndarray) -> tuple[SolidPair, np.ndarray]:
         """Solid and prism under a triangle, and the middle of the prism."""
@@ -150,16 +155,19 @@ class SolidOnTerrain:
         return self.prisms[key]
 
 
-def _beside(points: list[ContactPoint], nearest: ContactPoint, reach: float) -> list[ContactPoint]:
+def _beside(points: list[ContactPoint], nearest: ContactPoint, near: float) -> list[ContactPoint]:
     """Points without those of other normals at the place of the nearest one: an edge on an edge has one normal."""
-    return [p for p in points if p.normal @ nearest.normal >= FLUSH or dist(p.place, nearest.place) > reach]
+    return [p for p in points if p.normal @ nearest.normal >= FLUSH or dist(p.place, nearest.place) > near]
 
 
-def _chosen(points: list[ContactPoint]) -> list[ContactPoint]:
-    """The nearest points, and those farthest out, where there are too many."""
-    if len(points) <= SLOTS:
-        return points
-    near = sorted(points, key=lambda point: point.gap)
+def _chosen(points: list[ContactPoint], size: float) -> list[ContactPoint]:
+    """The nearest points, and those farthest out, where there are too many; closed ones first, in the order of their places.
+
+    So a contact keeps its number from step to step, whatever the distance up to which points are looked for.
+    """
+    near = sorted(points, key=lambda point: (round(point.gap / (CLOSED * size)), *point.place.tolist()))
+    if len(near) <= SLOTS:
+        return near
     kept = near[: SLOTS // 2]
     return kept + spread(near[SLOTS // 2 :])[: SLOTS - len(kept)]
 
