@@ -31,6 +31,8 @@ def places(first: Collider, second: Collider) -> list[FeaturePair]:
         return [Turned(place) for place in RULES[kinds[::-1]](second, first)]
     if set(kinds) == {HalfSpace}:
         raise SceneError(f"{first.what} and {second.what}: two half-spaces meet almost everywhere, so they make no contact.")
+    if set(kinds) <= {HalfSpace, HeightField}:
+        raise SceneError(f"{first.what} and {second.what} make no contact; give the one that moves a mesh or a box.")
     raise SceneError(f"{first.what} and {second.what} have no rule of contact; use spheres in place of points.")
 
 
