@@ -9,6 +9,7 @@ from gauss.scene.curved_shapes import Cone, Cylinder, Ellipsoid
 from gauss.scene.elastic import Elastic, ElasticLink
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
+from gauss.scene.height_field import HeightField
 from gauss.scene.inputs import Input, Output
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start, StateLaw
@@ -55,6 +56,7 @@ __all__ = [
     "Guard",
     "Guided",
     "HalfSpace",
+    "HeightField",
     "Input",
     "Joint",
     "JointFriction",

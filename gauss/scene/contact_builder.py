@@ -47,6 +47,12 @@ class ContactBuilder(SceneBuilder):
         """Make everything behind a plane solid: a floor, a wall; see :class:`gauss.scene.HalfSpace`."""
         return self.add(elements.HalfSpace(name, name_of(body), at, normal))
 
+    def height_field(
+        self, name: str, body, heights, size, at=(0, 0, 0), rotation=(0, 0, 0), depth: float = 1.0
+    ) -> "elements.HeightField":
+        """Give a body or the ground terrain: heights [m] on a grid; see :class:`gauss.scene.HeightField`."""
+        return self.add(elements.HeightField(name, name_of(body), at, heights, size, rotation, depth))
+
     def contact(self, name: str, shape, other, restitution: float = 0.0, friction: float = 0.0) -> "elements.Contact":
         """Add a contact of two shapes; see :class:`gauss.scene.Contact`."""
         return self.add(elements.Contact(name, name_of(shape), name_of(other), restitution, friction))

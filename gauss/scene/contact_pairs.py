@@ -10,7 +10,8 @@ from gauss.scene.contact_distances import Balls, Capsules, FeaturePair, OnCapsul
 from gauss.scene.convex_mesh import ConvexMesh
 from gauss.scene.curved_distances import ApexOnHalfSpace, EllipsoidOnHalfSpace, rim
 from gauss.scene.curved_shapes import Cone, ConvexCollider, Cylinder, Ellipsoid
-from gauss.scene.patch_distances import patch_points
+from gauss.scene.height_field import HeightField
+from gauss.scene.patch_distances import feet_points, patch_points
 
 BOTH_SIDES = (-1, 1)
 
@@ -30,6 +31,8 @@ def places(first: Collider, second: Collider) -> list[FeaturePair]:
         return [Turned(place) for place in RULES[kinds[::-1]](second, first)]
     if set(kinds) == {HalfSpace}:
         raise SceneError(f"{first.what} and {second.what}: two half-spaces meet almost everywhere, so they make no contact.")
+    if set(kinds) <= {HalfSpace, HeightField}:
+        raise SceneError(f"{first.what} and {second.what} make no contact; give the one that moves a mesh or a box.")
     raise SceneError(f"{first.what} and {second.what} have no rule of contact; use spheres in place of points.")
 
 
@@ -116,4 +119,7 @@ RULES |= {
     (first, second): patch_points
     for first, second in combinations_with_replacement(SOLIDS, 2)
     if (first, second) not in RULES and (issubclass(first, ConvexCollider) or issubclass(second, ConvexCollider))
+}
+RULES |= {(kind, HeightField): patch_points for kind in SOLIDS if kind is not HalfSpace} | {
+    (Points, HeightField): feet_points
 }

@@ -7,13 +7,12 @@ GJK and EPA: Gilbert, Johnson, Keerthi, IEEE J. Robot. Autom. 4, 1988; van den B
 IEEE Trans. Robot. 40, 2024). Clipping: Sutherland, Hodgman, Comm. ACM 17, 1974.
 """
 
-from functools import cache
 from math import dist, inf
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Sphere
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.convex_mesh import ConvexMesh
 from gauss.scene.curved_shapes import Cone, Cylinder, Ellipsoid
 from gauss.scene.support_faces import Face, Oval, Polytope, Revolved, Segment
@@ -56,7 +55,7 @@ def solid_of(shape: Collider) -> Solid | None:
         return _box(0.5 * np.array(shape.size))
     if isinstance(shape, Ellipsoid):
         return Oval(shape.half_edges)
-    if isinstance(shape, Sphere | Capsule):
+    if isinstance(shape, Sphere | Capsule | Points):  # each of several points alone
         return Segment(0.5 * getattr(shape, "length", 0.0), shape.radius)
     assert isinstance(shape, Cylinder | Cone)
     return Revolved(shape.radius, float(shape.half_edges[2]), isinstance(shape, Cone))
@@ -85,6 +84,8 @@ class SolidPair:
         The solids; the second may be a half-space, None.
     """
 
+    farthest = inf  # distance at which points are found [m]
+
     def __init__(self, first: Solid, second: Solid | None):
         self.first, self.second = first, second
         self.given: tuple | None = None
@@ -111,17 +112,19 @@ class SolidPair:
         """
         if self.second is None:
             assert isinstance(self.first, Polytope)
-            return _spread(_below(self.first.vertices @ one.R.T + one.x, other.x, other.R[:, 2], reach))
-        nearest = self._nearest(one, other)
-        if nearest.gap > reach:
-            return []
-        found, across = self._patch(one, other, nearest.normal, reach)
+            return spread(_below(self.first.vertices @ one.R.T + one.x, other.x, other.R[:, 2], reach))
+        nearest = self.nearest(one, other)
+        return [] if nearest.gap > reach else self.around(nearest, one, other, reach)
+
+    def around(self, nearest: ContactPoint, one: SolidPose, other: SolidPose, reach: float) -> list[ContactPoint]:
+        """Contact points of the faces that meet at the nearest points, with these; see :meth:`points`."""
+        found, across = self.patch(one, other, nearest.normal, reach)
         near = SAME_DEPTH * self.size
         if across >= nearest.gap - near and found and min(point.gap for point in found) <= across + near:
-            return _spread(found)
-        return _spread([nearest, *(point for point in found if point.gap > nearest.gap)])
+            return spread(found)
+        return spread([nearest, *(point for point in found if point.gap > nearest.gap)])
 
-    def _nearest(self, one: SolidPose, other: SolidPose) -> ContactPoint:
+    def nearest(self, one: SolidPose, other: SolidPose) -> ContactPoint:
         """Nearest points, or those of the least way out.
 
         Raises
@@ -161,7 +164,7 @@ class SolidPair:
             height -= float((face.points @ direction).max()) + face.radius
         return height
 
-    def _patch(self, one: SolidPose, other: SolidPose, normal: np.ndarray, reach: float) -> tuple[list[ContactPoint], float]:
+    def patch(self, one: SolidPose, other: SolidPose, normal: np.ndarray, reach: float) -> tuple[list[ContactPoint], float]:
         """Corners of one face over the other, and the distance of the solids along its normal [m]."""
         assert self.second is not None
         poses, solids = (one, other), (self.first, self.second)
@@ -219,7 +222,7 @@ def _cut(points: list[list[float]], side: list[float], closed: bool) -> list[lis
     return kept
 
 
-def _spread(points: list[ContactPoint]) -> list[ContactPoint]:
+def spread(points: list[ContactPoint]) -> list[ContactPoint]:
     """The deepest point and those farthest out in the plane of contact, where there are too many."""
     if len(points) <= SLOTS:
         return points
@@ -229,16 +232,3 @@ def _spread(points: list[ContactPoint]) -> list[ContactPoint]:
     for angle in 2.0 * np.pi / (SLOTS - 1) * np.arange(SLOTS - 1):
         kept.add(int(np.argmax(places @ (np.cos(angle) * flat[0] + np.sin(angle) * flat[1]))))
     return [points[k] for k in sorted(kept)]
-
-
-@cache
-def _solid_at(shape: Collider) -> Solid | None:
-    return solid_of(shape)
-
-
-@cache
-def solid_pair(first: Collider, second: Collider) -> SolidPair:
-    """Contact points of two shapes in their own axes, made once."""
-    solid = _solid_at(first)
-    assert solid is not None
-    return SolidPair(solid, _solid_at(second))

@@ -12,8 +12,8 @@ from gauss.scene import values
 from gauss.scene.collision import Collider
 
 
-class ConvexCollider(Collider, ABC):
-    """Convex shape within a box around its centre, ``half_edges`` (3,) along its ``axes`` (3, 3) [m]."""
+class BoundedCollider(Collider, ABC):
+    """Shape within a box around its centre, ``half_edges`` (3,) along its ``axes`` (3, 3) [m]."""
 
     @property
     @abstractmethod
@@ -40,6 +40,10 @@ class ConvexCollider(Collider, ABC):
         """Corners (8, 3) of that box in the frame of the body [m]."""
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij")).reshape(3, -1).T
         return self.centre + signs * self.half_edges @ self.axes.T
+
+
+class ConvexCollider(BoundedCollider):
+    """Convex shape within a box around its centre."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
-"""Gap functions of two convex solids without a closed form, in numbers: points of their patch of contact."""
+"""Gap functions of two solids without a closed form, in numbers: points of their patch of contact."""
 
 from dataclasses import dataclass
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -9,15 +10,18 @@ from gauss.errors import SceneError
 from gauss.rotations import along
 from gauss.scene import values
 from gauss.scene.box_distances import far
-from gauss.scene.collision import Box, Capsule, Collider, HalfSpace
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points
 from gauss.scene.contact_distances import FeaturePair, Touch
-from gauss.scene.contact_patch import SLOTS, SolidPose, solid_pair
-from gauss.scene.curved_shapes import ConvexCollider
+from gauss.scene.contact_patch import SLOTS, ContactPoint, SolidPose
+from gauss.scene.curved_shapes import BoundedCollider
+from gauss.scene.solid_pairs import solid_pair
+
+KEPT = 4096  # patches: all points of one are asked for, also for the pictures of a motion one after the other
 
 
 @dataclass(frozen=True)
 class PatchPoint(FeaturePair):
-    """A point of the patch of contact of two solids; far where the patch has fewer.
+    """A point of the patch of contact of two solids; far where the patch has fewer, and from terrain that is not near.
 
     Parameters
     ----------
@@ -25,11 +29,14 @@ class PatchPoint(FeaturePair):
         The shapes.
     index : int
         Which point.
+    corner : int
+        Which ball of the first shape, where it is a set of points.
     """
 
     shape: Collider
     other: Collider
     index: int
+    corner: int = 0
 
     @property
     def is_traced(self) -> bool:
@@ -44,13 +51,23 @@ class PatchPoint(FeaturePair):
         SceneError
             If the view is in symbols: the distance is found by iteration.
         """
-        poses = _pose(self.shape, at), _pose(self.other, at)
+        poses = _pose(self.shape, at, self.corner), _pose(self.other, at)
         if any(isinstance(entry, Expression) for pose in poses for entry in (*np.ravel(pose.R), *pose.x)):
             raise SceneError(f"{no_closed_form(self.shape, self.other)}; use integrator='time_stepping'.")
-        found = solid_pair(self.shape, self.other).points(*poses, far(at))
+        one, other = (np.array([*pose.R.flat, *pose.x], dtype=float).tobytes() for pose in poses)
+        found = _patch(self.shape, self.other, one, other, far(at))
         if self.index < len(found):
             return Touch(*found[self.index])
         return Touch(far(at), poses[0].x, np.array([0.0, 0.0, 1.0]))
+
+
+@lru_cache(maxsize=KEPT)
+def _patch(first: Collider, second: Collider, one: bytes, other: bytes, reach: float) -> list[ContactPoint]:
+    """Contact points of two shapes by rotations and centres of their solids; those of terrain near the solid alone."""
+    pair = solid_pair(first, second)
+    a, b = np.frombuffer(one), np.frombuffer(other)
+    poses = SolidPose(a[:9].reshape(3, 3), a[9:]), SolidPose(b[:9].reshape(3, 3), b[9:])
+    return pair.points(poses[0], poses[1], min(reach, pair.farthest))
 
 
 def no_closed_form(one: Collider, other: Collider) -> str:
@@ -63,14 +80,35 @@ def patch_points(first: Collider, second: Collider) -> list[FeaturePair]:
     return [PatchPoint(first, second, k) for k in range(SLOTS)]
 
 
-def _pose(shape: Collider, at) -> SolidPose:
-    centre = shape.centre if isinstance(shape, ConvexCollider) else shape.at
-    return SolidPose(at.rotation(shape.body) @ axes_of(shape), at.position(shape.body, centre))
+def feet_points(first: Points, second: Collider) -> list[FeaturePair]:
+    """Points of the patches of balls around points and a shape.
+
+    Raises
+    ------
+    SceneError
+        If the points have no radius.
+    """
+    if not first.is_round:
+        raise SceneError(f"{first.what} and {second.what}: points touch it as balls; give them a radius [m].")
+    return [PatchPoint(first, second, k, corner) for corner in range(len(first.corners)) for k in range(SLOTS)]
+
+
+def _pose(shape: Collider, at, corner: int = 0) -> SolidPose:
+    axes, centre = _own_pose(shape, corner)
+    return SolidPose(at.rotation(shape.body) @ axes, at.position(shape.body, centre))
+
+
+@cache
+def _own_pose(shape: Collider, corner: int) -> SolidPose:
+    """Axes and centre of a shape, or of one of its balls, in the frame of its body."""
+    if isinstance(shape, Points):
+        return SolidPose(np.eye(3), shape.corners[corner])
+    return SolidPose(axes_of(shape), np.array(shape.centre if isinstance(shape, BoundedCollider) else shape.at))
 
 
 def axes_of(shape: Collider) -> np.ndarray:
     """Rotation (3, 3) from the axes of a shape to the frame of its body."""
-    if isinstance(shape, ConvexCollider | Box):
+    if isinstance(shape, BoundedCollider | Box):
         return shape.axes
     if isinstance(shape, Capsule):
         return along(values.unit(shape.axis))

@@ -59,6 +59,10 @@ class Polytope:
         """Face most nearly across a direction."""
         return self.faces[int(np.argmax(self.normals @ direction))]
 
+    def extent(self, directions: np.ndarray) -> np.ndarray:
+        """Farthest that it reaches along directions (k, 3) from its centre [m]."""
+        return (directions @ self.vertices.T).max(axis=1)
+
     def in_coal(self, coal):
         """Convex hull of its vertices."""
         points = coal.StdVec_Vec3s()
@@ -79,6 +83,10 @@ class Segment:
         """The edge or point itself."""
         return Face(self.points, None, radius=self.radius)
 
+    def extent(self, directions: np.ndarray) -> np.ndarray:
+        """Farthest that it reaches along unit vectors (k, 3) from its centre [m]."""
+        return self.half * np.abs(directions[:, 2]) + self.radius
+
     def in_coal(self, coal):
         """Sphere or capsule."""
         return coal.Capsule(self.radius, 2.0 * self.half) if self.half else coal.Sphere(self.radius)
@@ -94,6 +102,10 @@ class Oval:
         """Farthest point along the direction."""
         stretched = self.radii * direction
         return Face((self.radii * stretched / np.sqrt(stretched @ stretched + TINY))[None], None)
+
+    def extent(self, directions: np.ndarray) -> np.ndarray:
+        """Farthest that it reaches along directions (k, 3) from its centre [m]."""
+        return np.linalg.norm(self.radii * directions, axis=1)
 
     def in_coal(self, coal):
         """Ellipsoid."""
@@ -129,6 +141,11 @@ class Revolved:
         turn = np.array([[out[0], out[1], 0.0], [-end * out[1], end * out[0], 0.0], [0.0, 0.0, end]])
         sides = np.column_stack([self.end.sides[:, :3] @ turn, self.end.sides[:, 3]])  # type: ignore[index]
         return Face(self.end.points @ turn, turn[2], sides)
+
+    def extent(self, directions: np.ndarray) -> np.ndarray:
+        """Farthest that it reaches along directions (k, 3) from its centre [m]."""
+        along, rim = self.half * directions[:, 2], self.radius * np.hypot(directions[:, 0], directions[:, 1])
+        return np.maximum(along, rim - along) if self.pointed else np.abs(along) + rim
 
     @cached_property
     def end(self) -> Face:

@@ -38,6 +38,7 @@ CLASSES = {
     "cone": "Cone",
     "mesh": "ConvexMesh",
     "half_space": "HalfSpace",
+    "height_field": "HeightField",
     "contact": "Contact",
     "stop": "Stop",
     "rope": "Rope",

@@ -202,6 +202,22 @@ def test_every_body_has_a_form(name):
 
 
 @pytest.mark.slow
+def test_terrain_is_drawn_and_lies_above_the_floor():
+    scene = gauss.Scene("land")
+    heights = np.array([[0.3, 0.0, 0.2], [-0.4, 0.1, 0.0]])
+    field = scene.height_field("land", "ground", heights, (2, 1), at=(0.1, 0.2, 0.3))
+    scene.body("ball", 1.0, (0.1, 0.1, 0.1))
+    scene.free("F", "ground", "ball")
+    scene.sphere("round", "ball", 0.1)
+    scene.start("F", position=(0, 0, 2, 1, 0, 0, 0))
+    motion = gauss.simulate(scene, 0.1)
+    (drawn,) = [form.mesh for form in forms(motion.system) if form.body == "ground" and form.role == "contact"]
+    assert drawn.bounds == pytest.approx(np.array([[-0.9, -0.3, -0.1], [1.1, 0.7, 0.6]]))
+    assert len(drawn.faces) == 4
+    assert (drawn.face_normals[:, 2] > 0.0).all()
+    assert framing(motion).floor[2] < np.array(field.heights).min() + 0.3
+
+
 def test_meshes_of_a_robot_are_in_place():
     from gauss.io.visuals import read_visuals
 

@@ -16,7 +16,8 @@ from gauss.codegen.kernels.near_pairs import DISTANCE_INPUTS, MOVED, ROW_INPUTS
 from gauss.dynamics.contact.pair_kernels import ROWS, Feature
 from gauss.scene import Collider
 from gauss.scene.contact import STEEP_NORMAL
-from gauss.scene.contact_patch import SLOTS, ContactPoint, SolidPair, SolidPose, solid_pair
+from gauss.scene.contact_patch import SLOTS, ContactPoint, SolidPose
+from gauss.scene.solid_pairs import PairOfSolids, solid_pair
 
 COM = 28  # first place of the centre of mass in a column of a shape
 FAR = 1e300  # distance of a point that a patch has not [m]
@@ -39,7 +40,7 @@ class PatchKernels:
 
     def __init__(self, shapes: Callable[[int], tuple[Collider, Collider]], count: np.ndarray, settings: np.ndarray):
         self.shapes, self.count, self.settings = shapes, count, settings
-        self.pairs: dict[int, SolidPair] = {}
+        self.pairs: dict[int, PairOfSolids] = {}
         self.patch: list[ContactPoint] = []
         self.features = [Feature(0, signs=(k,)) for k in range(SLOTS)]
         unknown = np.array([-1.0, *[FAR] * (SLOTS - 1)])  # a contact whose row, asked next, is NaN: it is refused by name

@@ -7,12 +7,25 @@ import numpy as np
 
 from gauss.dynamics.contact.pair_kernels import SIZES
 from gauss.rotations import along
-from gauss.scene import Box, Capsule, Collider, Cone, Contact, ConvexMesh, Cylinder, Ellipsoid, HalfSpace, Points, Sphere
-from gauss.scene.curved_shapes import ConvexCollider
+from gauss.scene import (
+    Box,
+    Capsule,
+    Collider,
+    Cone,
+    Contact,
+    ConvexMesh,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    HeightField,
+    Points,
+    Sphere,
+)
+from gauss.scene.curved_shapes import BoundedCollider
 from gauss.scene.values import unit
 from gauss.system import System
 
-KINDS = (Sphere, Capsule, Box, Ellipsoid, Cylinder, Cone, ConvexMesh, HalfSpace)
+KINDS = (Sphere, Capsule, Box, Ellipsoid, Cylinder, Cone, ConvexMesh, HalfSpace, HeightField)
 MOST_FEATURES = 64  # pairs of features of one pair of parts, for keys of contacts
 RANK = {kind: k for k, kind in enumerate(KINDS)}  # the order of kinds in a rule of contacts
 
@@ -53,9 +66,9 @@ def convex_parts(system: System, shape: Collider) -> list[ConvexPart]:
         axes, half = along(unit(shape.axis)), np.array([0.0, 0.0, 0.5 * shape.length])
     elif isinstance(shape, HalfSpace):
         axes = along(unit(shape.normal))
-    elif isinstance(shape, ConvexCollider):
+    elif isinstance(shape, BoundedCollider):
         axes, half, centres = shape.axes, shape.half_edges, shape.centre[None]
-    sizes = np.append(half, 0.0 if isinstance(shape, ConvexCollider) else shape.radius)
+    sizes = np.append(half, 0.0 if isinstance(shape, BoundedCollider) else shape.radius)
     places = [(frame.R @ axes, frame.p + frame.R @ centre) for centre in centres]
     return [ConvexPart(shape.name, kind, frame.body, *place, sizes) for place in places]
 
@@ -144,5 +157,6 @@ class ShapeTable:
         first, second = self.pair(key)
         turned = self.sides(key) < 0.0
         one, other = np.where(turned, second, first), np.where(turned, first, second)
-        place, count = self.number
-        return self.gaps[self.law[first, second] - 1] + place[one] * count[other] + place[other] + key % MOST_FEATURES
+        (place, count), law = self.number, self.law[first, second]
+        features = (self.gaps[law] - self.gaps[law - 1]) // (count[one] * count[other])  # of each pair of parts
+        return self.gaps[law - 1] + (place[one] * count[other] + place[other]) * features + key % MOST_FEATURES

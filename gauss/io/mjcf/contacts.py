@@ -21,6 +21,7 @@ from gauss.scene import (
     Cylinder,
     Ellipsoid,
     HalfSpace,
+    HeightField,
     JointFriction,
     Points,
     Rope,
@@ -108,6 +109,9 @@ def _geoms(shape, document) -> list[str]:
     if isinstance(shape, HalfSpace) and document.on_body(shape.body, np.zeros(3), np.eye(3))[0] != GROUND:
         raise FileError(f"{shape.what}: planes of MuJoCo do not move; use a box.")
     axes = np.eye(3)
+    if isinstance(shape, HeightField):
+        at = np.array(shape.at) + shape.axes @ (0.0, 0.0, np.min(shape.heights))
+        return [_geom(document, shape, shape.name, at, _field(document, shape), shape.axes)]
     if isinstance(shape, ConvexCollider):
         return [_geom(document, shape, shape.name, shape.at, _convex(document, shape), shape.axes)]
     if isinstance(shape, Sphere):
@@ -119,6 +123,17 @@ def _geoms(shape, document) -> list[str]:
     else:
         geom, axes = {"type": "plane", "size": [SHOWN, SHOWN, SHOWN]}, rotations.along(unit(shape.normal))
     return [_geom(document, shape, shape.name, shape.at, geom, axes)]
+
+
+def _field(document, shape: HeightField) -> dict:
+    """Type and asset of a geom; MuJoCo takes elevations from the greatest y down, from 0 to 1 whatever their numbers."""
+    heights = np.array(shape.heights)
+    if ("hfield", shape.name) not in document.taken:
+        grid = {"nrow": str(heights.shape[0]), "ncol": str(heights.shape[1]), "elevation": heights[::-1].ravel()}
+        rise = float(np.ptp(heights)) or shape.depth  # which is to be > 0, also where the field is flat
+        size = [0.5 * shape.size[0], 0.5 * shape.size[1], rise, shape.depth]
+        document.add(document.section("asset"), "hfield", name=shape.name, **grid, size=size)
+    return {"type": "hfield", "hfield": shape.name}
 
 
 def _convex(document, shape: ConvexCollider) -> dict:

@@ -26,6 +26,7 @@ NUMERIC |= {
 NUMERIC |= {"actuatorfrcrange", "kp", "kv", "dampratio", "polycoef", "coef", "anchor", "relpose", "gravity", "viscosity"}
 NUMERIC |= {"wind", "scale", "refpos", "refquat", "friction", "gravcomp", "cranklength", "timeconst", "qpos", "qvel"}
 NUMERIC |= {"settotalmass", "boundmass", "boundinertia", "inertiagrouprange", "divisor", "offset", "margin", "gap"}
+NUMERIC |= {"elevation"}
 RANGES = {"range", "ctrlrange", "forcerange", "actuatorfrcrange"}  # which may be infinite
 FORBIDDEN = ("plugin", "extension")
 

@@ -52,8 +52,8 @@ def read_mjcf(
     limits : str
         "start": limits of joints are kept where a start is assembled; "stops": joints run against them, too.
     contacts : bool
-        Whether planes, spheres, capsules, boxes, cylinders, ellipsoids and hulls of meshes become shapes, and contacts where
-        they may touch; see :mod:`gauss.io.mjcf.touching`.
+        Whether planes, spheres, capsules, boxes, cylinders, ellipsoids, hulls of meshes and height fields become shapes, and
+        contacts where they may touch; see :mod:`gauss.io.mjcf.touching`.
     root_folder : str or Path, optional
         Folder in which meshes and included files may lie, beside that of the file.
     keyframe : str, optional

@@ -14,12 +14,13 @@ from gauss.errors import SceneError
 from gauss.io.mjcf.names import SCALAR, Named
 from gauss.io.mjcf.switches import is_off
 from gauss.io.numbers import add_stop
-from gauss.scene import Box, Capsule, ConvexMesh, Cylinder, Ellipsoid, HalfSpace, Scene, Sphere
+from gauss.scene import Box, Capsule, ConvexMesh, Cylinder, Ellipsoid, HalfSpace, HeightField, Scene, Sphere
 
-PLANE, SPHERE, CAPSULE, BOX, CYLINDER, ELLIPSOID, MESH = (
+PLANE, SPHERE, CAPSULE, BOX, CYLINDER, ELLIPSOID, MESH, FIELD = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
-    for name in ("PLANE", "SPHERE", "CAPSULE", "BOX", "CYLINDER", "ELLIPSOID", "MESH")
+    for name in ("PLANE", "SPHERE", "CAPSULE", "BOX", "CYLINDER", "ELLIPSOID", "MESH", "HFIELD")
 )
+GROUNDS = PLANE, FIELD  # two of which never touch in MuJoCo
 
 
 def add_stops(scene: Scene, named: Named):
@@ -32,7 +33,9 @@ def add_stops(scene: Scene, named: Named):
 def add_contacts(scene: Scene, named: Named) -> list[str]:
     """Add shapes and contacts of all geoms that may touch; names of those without a counterpart."""
     model, unlike = named.model, set()
-    pairs = [(int(a), int(b), *_of_pair(model, i)) for i, (a, b) in enumerate(_pairs(model))]
+    pairs = [
+        (int(a), int(b), *_of_pair(model, i)) for i, (a, b) in enumerate(_pairs(model)) if not _are_grounds(model, a, b)
+    ]
     pairs += [(a, b, *_of_geoms(model, a, b)) for a, b in _matching(model)]
     for first, second, dimension, friction in pairs:
         shapes = [_shape(scene, named, geom) for geom in (first, second)]
@@ -74,12 +77,16 @@ def _matching(model) -> list[tuple[int, int]]:
     found = []
     for a, b in combinations(range(model.ngeom), 2):
         masks = model.geom_contype[a] & model.geom_conaffinity[b] or model.geom_contype[b] & model.geom_conaffinity[a]
-        planes = model.geom_type[a] == model.geom_type[b] == PLANE
         bodies = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
         apart = frozenset(bodies) not in excluded and frozenset((a, b)) not in named
-        if masks and apart and not planes and not _are_bound(model, bodies):
+        if masks and apart and not _are_grounds(model, a, b) and not _are_bound(model, bodies):
             found.append((a, b))
     return found
+
+
+def _are_grounds(model, a: int, b: int) -> bool:
+    """Whether both geoms are planes or height fields."""
+    return model.geom_type[a] in GROUNDS and model.geom_type[b] in GROUNDS
 
 
 def _are_bound(model, bodies: tuple[int, int]) -> bool:
@@ -114,4 +121,16 @@ def _shape(scene: Scene, named: Named, geom: int):
     if kind == MESH:
         start, count = (int(of[model.geom_dataid[geom]]) for of in (model.mesh_vertadr, model.mesh_vertnum))
         return scene.add(ConvexMesh(name, body, at, model.mesh_vert[start : start + count].astype(float), R))
+    if kind == FIELD:
+        return scene.add(_field(model, int(model.geom_dataid[geom]), name, body, at, R))
     return scene.add(HalfSpace(name, body, at, tuple(R[:, 2]))) if kind == PLANE else None
+
+
+def _field(model, asset: int, name: str, body: str, at: tuple, R) -> HeightField:
+    """Height field of an asset: elevations from 0 to 1, half edges, height of elevation 1, depth below elevation 0."""
+    rows, columns, start = (int(of[asset]) for of in (model.hfield_nrow, model.hfield_ncol, model.hfield_adr))
+    half_x, half_y, top, base = model.hfield_size[asset].tolist()
+    share = model.hfield_data[start : start + rows * columns].astype(float).reshape(rows, columns)
+    depth = base + top * float(share.min())
+    heights = tuple(map(tuple, (top * share).tolist()))
+    return HeightField(name, body, at, heights, (2.0 * half_x, 2.0 * half_y), R, depth)

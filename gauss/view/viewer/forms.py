@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 import trimesh
 
-from gauss.scene import GROUND, Box, Capsule, Cone, ConvexMesh, Cylinder, Ellipsoid, Points, Sphere
+from gauss.scene import GROUND, Box, Capsule, Cone, ConvexMesh, Cylinder, Ellipsoid, HeightField, Points, Sphere
 from gauss.system import System
 from gauss.view.skeleton import lines, skeleton
 
@@ -165,6 +165,8 @@ def _solid(shape, com=(0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
         return trimesh.creation.box(extents=shape.size, transform=_pose(shape.axes, shape.at))
     if isinstance(shape, ConvexMesh):
         return trimesh.convex.convex_hull(shape.corners)
+    if isinstance(shape, HeightField):
+        return trimesh.Trimesh(*shape.surface, process=False)
     if isinstance(shape, Cylinder | Cone | Ellipsoid):
         return _curved(shape).apply_transform(_pose(shape.axes, shape.at))
     if isinstance(shape, Points):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.scene import GROUND, HalfSpace, Scene
+from gauss.scene import GROUND, HalfSpace, HeightField, Scene
 from gauss.scene.values import unit
 from gauss.simulation import Trajectory
 from gauss.view.skeleton import placed
@@ -52,7 +52,7 @@ def framing(trajectory: Trajectory) -> Framing:
     middle, reach = (low + high) / 2, max(float(np.linalg.norm(high - low)), length)
     direction = VIEW @ np.stack([right, away, up])
     eye = middle + reach / 2 / np.sin(FIELD / 2) / FILLED * direction / np.linalg.norm(direction)
-    lowest = _ground(trajectory.system.scene, up, middle)
+    lowest = _ground(trajectory.system.scene, up, middle, BELOW * length)
     lowest = ((seen - middle) @ up).min() - BELOW * length if lowest is None else lowest
     return Framing(middle, eye, right, away, up, middle + lowest * up, reach)
 
@@ -64,12 +64,14 @@ def joined(view: Framing, other: Framing, displacement: np.ndarray) -> Framing:
     return view._replace(middle=middle, eye=eye, reach=reach)
 
 
-def _ground(scene: Scene, up: np.ndarray, middle: np.ndarray) -> float | None:
-    """Height of a level half-space of the scene over the middle [m]; None if there is none."""
-    for shape in scene.shapes.values():
-        if isinstance(shape, HalfSpace) and shape.body == GROUND and unit(shape.normal) @ up > LEVEL:
+def _ground(scene: Scene, up: np.ndarray, middle: np.ndarray, below: float) -> float | None:
+    """Height over the middle of a level half-space, or of a place below the terrain of the ground [m]; None without both."""
+    own = [shape for shape in scene.shapes.values() if shape.body == GROUND]
+    for shape in own:
+        if isinstance(shape, HalfSpace) and unit(shape.normal) @ up > LEVEL:
             return float((np.array(shape.at) - middle) @ up)
-    return None
+    fields = [float(((shape.surface[0] - middle) @ up).min()) for shape in own if isinstance(shape, HeightField)]
+    return min(fields) - below if fields else None
 
 
 def _beside(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.analysis import contact_forces, friction_forces
 from gauss.errors import NonUniqueReactionWarning
-from gauss.scene import Contact
+from gauss.scene import Contact, FeaturePair
 from gauss.simulation import Trajectory
 
 NEAR = 1e-3  # of the size of a mechanism: what is no farther apart is drawn as touching
@@ -45,21 +45,20 @@ def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[Touch
     for contact in scene.contacts.values():
         if not isinstance(contact, Contact):
             continue
-        pressing = _forces(motion, contact)
-        for number, force in enumerate(pressing.transpose(1, 0, 2)):
-            here = [contact.touch(at, number) for at in pictures.motions]
+        places = contact.places(scene)
+        for place, force in zip(places, _forces(motion, contact, places).transpose(1, 0, 2), strict=True):
+            here = [place.touch(at) for at in pictures.motions]
             gap = np.array([touch.gap for touch in here], dtype=float)
             smooth = np.stack([np.interp(pictures.t, motion.t, part) for part in force.T], axis=1)
             found.append(TouchingPoint(np.array([touch.place for touch in here], dtype=float), smooth, gap < NEAR * size))
     return found
 
 
-def _forces(motion: Trajectory, contact: Contact) -> np.ndarray:
+def _forces(motion: Trajectory, contact: Contact, places: list[FeaturePair]) -> np.ndarray:
     """Forces on the first body of a contact (samples, places, 3) [N]."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NonUniqueReactionWarning)  # a picture sizes nothing
         normal = contact_forces(motion, contact.name)
-        places = range(normal.shape[1])
-        along = np.array([[contact.touch(at, k).normal for k in places] for at in motion.motions], dtype=float)
+        along = np.array([[place.touch(at).normal for place in places] for at in motion.motions], dtype=float)
         sliding = friction_forces(motion, contact.name) if motion.step is not None else 0.0
     return normal[..., None] * along + sliding
