@@ -29,7 +29,7 @@ import numpy as np  # noqa: E402
 import pinocchio as pin  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.command import command, load_at_the_end  # noqa: E402
+from benchmarks.command import chosen, command, load_at_the_end  # noqa: E402
 from benchmarks.latency.scenes import FEET, biped  # noqa: E402
 from gauss.analysis.crosscheck.pinocchio_ import Configuration, Twin, twin  # noqa: E402
 from gauss.bench.contest import OURS, Competitor, difference, duration, interleaved  # noqa: E402
@@ -293,11 +293,10 @@ def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
     """Rows of the table, and the conditions."""
     conditions, found = header("numpy", "pin", "mujoco"), []
     warnings.simplefilter("ignore")  # of robots whose files hold more than is read
-    for name, make in MECHANISMS.items():
-        if only in name:
-            for line in rows(name, gauss.compile_scene(make()), rounds):
-                print(name, line["function"], flush=True)
-                found.append(line)
+    for name in chosen(only, MECHANISMS):
+        for line in rows(name, gauss.compile_scene(MECHANISMS[name]()), rounds):
+            print(name, line["function"], flush=True)
+            found.append(line)
     conditions.append(f"a product of matrices of {DGEMM_SIZE}: {_dgemm() / 1e9:.0f} operations/ns")
     return found, [*conditions, load_at_the_end()]
 
