@@ -64,7 +64,7 @@ def apply(load, laws, motion: Kinematics, applied: Applied):
     raise SceneError(f"no rule to apply a load of type {type(load).__name__}.")
 
 
-def values_of_laws(system: System, load: Drive | Force) -> tuple[str, int]:
+def values_of_laws(system: System, load) -> tuple[str, int]:
     """Name of a drive or a force in messages, and number of values of each of its laws."""
     if isinstance(load, Drive):
         return f"drive {load.name!r}", system.joint(load.joint).pair.n_v

@@ -112,8 +112,8 @@ def _sampled(bound: BoundLoad, laws: Laws, motion, begin: float, end: float) -> 
     """Jumps of the opaque laws of a load."""
     what, given = f"the law of {bound.load.name!r}", getattr(bound.load, "breaks", ())
     uses_time = laws.fails(bound.load.name) and not needs_poses(bound.load) and not given
-    laws = [law for law in bound.laws if not isinstance(law, ConstantLaw)]
-    return NO_TIMES.join(*(sampled_times(law, motion, begin, end, what, uses_time) for law in laws))
+    varying = [law for law in bound.laws if not isinstance(law, ConstantLaw)]
+    return NO_TIMES.join(*(sampled_times(law, motion, begin, end, what, uses_time) for law in varying))
 
 
 def _given_times(system: System, breaks, begin: float, end: float) -> Timetable:
