@@ -25,6 +25,7 @@ import pinocchio as pin  # noqa: E402
 import gauss  # noqa: E402
 from benchmarks.command import command, load_at_the_end  # noqa: E402
 from benchmarks.latency.scenes import FEET, biped  # noqa: E402
+from benchmarks.loop_contacts import LoopContacts  # noqa: E402
 from gauss.analysis.crosscheck.pinocchio_ import twin  # noqa: E402
 from gauss.bench.contest import Competitor, interleaved, repeated  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
@@ -32,7 +33,6 @@ from gauss.bench.markdown import formatted_table, head, in_time  # noqa: E402
 
 STEP, STEPS, CALLS = 1e-3, 1000, 200
 MOTIONS = 1024  # of a rollout
-PROXIMAL = (1e-12, 1e-8, 10)  # absolute accuracy, μ and iterations of Pinocchio's constraint dynamics
 POSE = np.array([0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.7, 0.02, 0.02])  # of a Panda that is held
 
 
@@ -180,26 +180,12 @@ def derivatives() -> Iterator[Row]:
 
 
 def _by_pinocchio(system: gauss.System, state: gauss.State) -> Callable:
-    """Call of Pinocchio's derivatives of the accelerations; joints that close loops are welds."""
+    """Call of Pinocchio's derivatives of the accelerations."""
     pair = twin(system)
     model, data, at = pair.model, pair.model.createData(), pair.configuration(state)
-    load = np.zeros(model.nv)
     if system.is_tree:
-        return lambda: pin.computeABADerivatives(model, data, at.q, at.v, load)
-    welds, states = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
-    for joint in (system.joints[index] for index in system.structure.closures):
-        one, other = pair.parent_side(joint), pair.child_side(joint)
-        sides = one.joint, one.central, other.joint, other.central
-        welds.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_6D, model, *sides, pin.ReferenceFrame.LOCAL))
-        states.append(welds[-1].createData())
-    pin.initConstraintDynamics(model, data, welds, states)
-    settings = pin.ProximalSettings(*PROXIMAL)
-
-    def run():
-        pin.constraintDynamics(model, data, at.q, at.v, load, welds, states, settings)
-        pin.computeConstraintDynamicsDerivatives(model, data, welds, states, settings)
-
-    return run
+        return lambda: pin.computeABADerivatives(model, data, at.q, at.v, np.zeros(model.nv))
+    return LoopContacts(pair, at).derivatives
 
 
 def measure(rounds: int) -> tuple[list[dict], list[str]]:

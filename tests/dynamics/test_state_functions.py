@@ -108,7 +108,7 @@ def test_robots_agree_with_pinocchio(name):
     check_against_pinocchio(gauss.load(f"robot:{name}", mimic=False), ["local"])
 
 
-@pytest.mark.parametrize("name", ["panda", pytest.param("ur5", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", [*QUICK_ROBOTS, *(pytest.param(name, marks=pytest.mark.slow) for name in ROBOTS)])
 def test_robots_agree_with_mujoco(name):
     mujoco = pytest.importorskip("mujoco")
     from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
