@@ -4,8 +4,10 @@ import inspect
 import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -178,19 +180,17 @@ def _when(t) -> str:
     return f"t = {t:.6g} s" if isinstance(t, Real) else "any time"
 
 
+@dataclass(frozen=True, slots=True)
 class ConstantLaw:
     """Function of (t, motion) with the same value at all times.
 
     Parameters
     ----------
     value : float or tuple of float
-        The value.
+        The value; expressions where parameters are.
     """
 
-    __slots__ = ("value",)
-
-    def __init__(self, value):
-        self.value = value
+    value: Any
 
     def __call__(self, t, motion):
         """The value."""
