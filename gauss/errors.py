@@ -174,7 +174,7 @@ def extra(name: str = ""):
     Raises
     ------
     MissingPackageError
-        If one of them is not installed; the message says how to get it, and all else that the extra lacks.
+        If one of them is not installed; the message says how to get it, and what else of the extra is absent.
     """
     try:
         yield
