@@ -23,6 +23,7 @@ from gauss.scene.values import ConstantLaw, evaluated
 from gauss.system import BoundLoad, State, System
 
 ENDS = "body", "other"  # fields of loads on bodies that name these
+ASKED = Drive, Force  # kinds of loads that are known by the values of their laws
 
 
 def generalised_forces(motion: Kinematics, applied: Applied) -> np.ndarray:
@@ -62,12 +63,10 @@ class LoadForces:
     def __init__(self, system: System, called: Sequence[BoundLoad] = (), laws: Laws | None = None):
         self.system, self.called = system, list(called)
         self._traced = None if laws is None or not laws.traced else _traced(system, laws)
-        self._asked = [bound for bound in self.called if isinstance(bound.load, Drive | Force)]
-        self._values = [(law, *values_of_laws(system, one.load)) for one in self._asked for law in one.laws if _varies(law)]
-        self._applied = [bound for bound in self.called if not isinstance(bound.load, Drive | Force)]
-        on_bodies = [bound for bound in self._applied if not bound.on_coordinates]
-        self._loaded = sorted({body for bound in on_bodies for body in _bodies(system, bound)})
-        self._posed = bool(on_bodies) or any(needs_poses(bound.load) for bound in self.called)
+        self._asked = [bound for bound in self.called if isinstance(bound.load, ASKED)]
+        self._applied = [bound for bound in self.called if not isinstance(bound.load, ASKED)]
+        self._values, self._loaded = _values(system, self._asked), _loaded(system, self._applied)
+        self._posed = bool(self._loaded) or any(needs_poses(bound.load) for bound in self.called)
         self._places = system.structure.n_bodies + 1  # with the ground
 
     def __call__(self, state: State) -> tuple[np.ndarray, np.ndarray]:
@@ -156,6 +155,16 @@ class LoadForces:
 
 def _varies(law: Callable) -> bool:
     return not isinstance(law, ConstantLaw)
+
+
+def _values(system: System, asked: Sequence[BoundLoad]) -> list[tuple[Callable, str, int]]:
+    """Laws of loads, with their names in messages and numbers of values."""
+    return [(law, *values_of_laws(system, one.load)) for one in asked for law in one.laws if _varies(law)]
+
+
+def _loaded(system: System, applied: Sequence[BoundLoad]) -> list[int]:
+    """Bodies that loads may act on."""
+    return sorted({body for one in applied if not one.on_coordinates for body in _bodies(system, one)})
 
 
 def _at(kernel: Kernel, inputs: np.ndarray) -> np.ndarray:
