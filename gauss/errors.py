@@ -127,6 +127,10 @@ class SwitchingWarning(UserWarning):
     """A law may have switched between two evaluations without effect on the motion."""
 
 
+class LimitWarning(UserWarning):
+    """An optimal motion is beyond a limit between the points at which it is asked for."""
+
+
 class TimeDependenceWarning(UserWarning):
     """Laws depend on time, but the result holds for one time only, which was not named."""
 
