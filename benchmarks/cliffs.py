@@ -21,7 +21,7 @@ from statistics import median
 import numpy as np
 
 import gauss
-from benchmarks.command import command, load_at_the_end
+from benchmarks.command import chosen, command, load_at_the_end
 from gauss import math
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, in_time, table
@@ -133,8 +133,9 @@ def measured(only: str) -> tuple[list[dict], list[str]]:
     """Rows and conditions of the table."""
     warnings.simplefilter("ignore")
     rows = []
-    for name, (make, elements) in SCENES.items():
-        for element in elements if only in name else ():
+    for name in chosen(only, SCENES):
+        make, elements = SCENES[name]
+        for element in elements:
             rows.append({"scene": name, "element": element, **_measured(make, element)})
             print(rows[-1], flush=True)
     return rows, [*header("numpy", "llvmlite"), load_at_the_end()]

@@ -2,10 +2,11 @@
 
 import argparse
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from gauss.bench.table import header_of, read_table, write_table
+from gauss.errors import did_you_mean
 
 RESULTS = Path(__file__).parent / "results"
 Options = Mapping[str, tuple[object, str]]  # name: default, help
@@ -52,6 +53,21 @@ def command(
     (RESULTS / f"{name}.md").write_text(written, encoding="utf-8")
     print(written)
     return given
+
+
+def chosen(only: str, names: Iterable[str]) -> list[str]:
+    """Names that hold a part in upper or lower case; all of them if it is empty.
+
+    Raises
+    ------
+    SystemExit
+        If there are none: the message lists the names.
+    """
+    names = list(names)
+    found = [name for name in names if only.lower() in name.lower()]
+    if not found:
+        raise SystemExit(f"--only: nothing is called {only!r}. {did_you_mean(only, names)}")
+    return found
 
 
 def load_at_the_end() -> str:

@@ -20,10 +20,13 @@ from statistics import median  # noqa: E402
 from typing import Any, NamedTuple  # noqa: E402
 
 import numpy as np  # noqa: E402
+import pinocchio as pin  # noqa: E402
 
 import gauss  # noqa: E402
 from benchmarks.command import command, load_at_the_end  # noqa: E402
 from benchmarks.latency.scenes import FEET, biped  # noqa: E402
+from benchmarks.loop_contacts import LoopContacts  # noqa: E402
+from gauss.analysis.crosscheck.pinocchio_ import twin  # noqa: E402
 from gauss.bench.contest import Competitor, interleaved, repeated  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head, in_time  # noqa: E402
@@ -162,18 +165,33 @@ def forces() -> Iterator[Row]:
 
 
 def derivatives() -> Iterator[Row]:
-    """Derivatives of accelerations."""
-    for name, scene, goal in (("Panda", panda(inputs=False), 5e-6), ("biped with two loops", biped(FEET), 60e-6)):
+    """Derivatives of accelerations, beside Pinocchio's."""
+    for name, scene, goal, theirs in (
+        ("Panda", panda(inputs=False), 5e-6, "`computeABADerivatives`"),
+        ("biped with two loops", biped(FEET), 60e-6, "`constraintDynamics` and `computeConstraintDynamicsDerivatives`"),
+    ):
         system = gauss.compile_scene(scene)
         state, load = system.initial_state(), np.zeros(system.n_v)
         call = lambda f=system.acceleration_derivatives, s=state, u=load: f(s.q, s.v, u)  # noqa: E731
-        yield Row(f"`acceleration_derivatives` of a {name}, one call", goal, repeated(call, CALLS), CALLS)
+        what, ours = f"`acceleration_derivatives` of a {name}", repeated(call, CALLS)
+        yield Row(f"{what}, one call", goal, ours, CALLS)
+        peer = repeated(_by_pinocchio(system, state), CALLS)
+        yield Row(f"{what}, over {theirs} of Pinocchio", 1.0, ours, CALLS, peer, is_ratio=True)
+
+
+def _by_pinocchio(system: gauss.System, state: gauss.State) -> Callable:
+    """Call of Pinocchio's derivatives of the accelerations."""
+    pair = twin(system)
+    model, data, at = pair.model, pair.model.createData(), pair.configuration(state)
+    if system.is_tree:
+        return lambda: pin.computeABADerivatives(model, data, at.q, at.v, np.zeros(model.nv))
+    return LoopContacts(pair, at).derivatives
 
 
 def measure(rounds: int) -> tuple[list[dict], list[str]]:
     """Rows of the table, and the conditions."""
     warnings.simplefilter("ignore")  # of laws that are seldom evaluated, and robots whose files hold more than is read
-    conditions = header("numpy")
+    conditions = header("numpy", "pin")
     rows = []
     for row in (*stepping(), *laws_and_motions(), *rollouts(), *forces(), *derivatives()):
         tasks = {"run": row.run} | ({} if row.without is None else {"without": row.without})

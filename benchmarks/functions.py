@@ -5,7 +5,8 @@ Run it with:
     python -m benchmarks.functions [--rounds 15] [--only Panda]
 
 Pinocchio and MuJoCo give these functions to Python one state at a time: their time stands beside each of ours. Where
-joints close loops, the functions are those of the spanning tree, for all engines. The difference is the largest one to
+joints close loops, the functions are those of the spanning tree, for all engines, but for forward dynamics, beside
+Pinocchio's constraint dynamics (derivatives with loops: benchmarks.control). The difference is the largest one to
 Pinocchio's results, in the rates of gauss, relative to the largest number. CPU time of the process; medians of rounds.
 Beside the rows below the goals of 4 × and 20 × stand the operations of the function, the bytes of its result, and the time
 to fill the result of the batch with zeros. Writes benchmarks/results/functions.csv and .md.
@@ -29,8 +30,9 @@ import numpy as np  # noqa: E402
 import pinocchio as pin  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.command import command, load_at_the_end  # noqa: E402
+from benchmarks.command import chosen, command, load_at_the_end  # noqa: E402
 from benchmarks.latency.scenes import FEET, biped  # noqa: E402
+from benchmarks.loop_contacts import LoopContacts  # noqa: E402
 from gauss.analysis.crosscheck.pinocchio_ import Configuration, Twin, twin  # noqa: E402
 from gauss.bench.contest import OURS, Competitor, difference, duration, interleaved  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
@@ -70,6 +72,8 @@ class Peers:
         The state there.
     data : pinocchio.Data
         Its workspace.
+    loops : LoopContacts
+        Its constraint dynamics; None of a tree.
     frame : int
         The frame of kinematics.
     model, state : mujoco.MjModel, mujoco.MjData
@@ -81,6 +85,7 @@ class Peers:
     pair: Twin
     at: Configuration
     data: pin.Data
+    loops: LoopContacts | None
     frame: int
     model: Any = None
     state: Any = None
@@ -151,6 +156,7 @@ OF_TREES = {
         None,
     ),
 }
+OF_LOOPS: dict[str, tuple[Callable, None]] = {"forward_dynamics": (lambda p: p.loops.dynamics(), None)}
 
 
 def _placed(p: Peers, *more: Callable):
@@ -197,8 +203,8 @@ def peers(system: System, state: State, body: str) -> Peers:
             data = mujoco.MjData(model)
             limbs = [limb(system, *edge) for edge in spanning_tree(system.scene)[0]]
             data.qpos, data.qvel = mujoco_state(system, limbs, kinematics(system, state))
-            return Peers(pair, at, pair.model.createData(), index, model, data, data.body(body).id)
-    return Peers(pair, at, pair.model.createData(), index)
+            return Peers(pair, at, pair.model.createData(), None, index, model, data, data.body(body).id)
+    return Peers(pair, at, pair.model.createData(), None if system.is_tree else LoopContacts(pair, at), index)
 
 
 def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
@@ -212,7 +218,7 @@ def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
     body = system.structure.bodies[-1]
     others, given = peers(system, state, body), {"q": state.q, "v": state.v}
     given |= {"acceleration": np.zeros(system.n_v), "load": np.zeros(system.n_v)}
-    for function, (theirs, result) in (BY_PINOCCHIO | (OF_TREES if not system.has_closures else {})).items():
+    for function, (theirs, result) in (BY_PINOCCHIO | (OF_LOOPS if system.has_closures else OF_TREES)).items():
         full = f"{function}:{body}" if function in ("forward_kinematics", "jacobian", "jacobian_rate") else function
         ours: Any = system.forward_dynamics if function == "forward_dynamics" else system.function(full)
         wrapper = ours.__self__.fallback
@@ -293,11 +299,10 @@ def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
     """Rows of the table, and the conditions."""
     conditions, found = header("numpy", "pin", "mujoco"), []
     warnings.simplefilter("ignore")  # of robots whose files hold more than is read
-    for name, make in MECHANISMS.items():
-        if only in name:
-            for line in rows(name, gauss.compile_scene(make()), rounds):
-                print(name, line["function"], flush=True)
-                found.append(line)
+    for name in chosen(only, MECHANISMS):
+        for line in rows(name, gauss.compile_scene(MECHANISMS[name]()), rounds):
+            print(name, line["function"], flush=True)
+            found.append(line)
     conditions.append(f"a product of matrices of {DGEMM_SIZE}: {_dgemm() / 1e9:.0f} operations/ns")
     return found, [*conditions, load_at_the_end()]
 

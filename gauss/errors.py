@@ -119,6 +119,10 @@ class BalanceWarning(UserWarning):
     """The energy balance of a motion does not close: its integration is inaccurate."""
 
 
+class DivergenceWarning(UserWarning):
+    """Some motions of a batch do not reach the end: they diverged, or cannot continue."""
+
+
 class SwitchingWarning(UserWarning):
     """A law may have switched between two evaluations without effect on the motion."""
 

@@ -22,7 +22,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.command import RESULTS, command
+from benchmarks.command import RESULTS, chosen, command
 from benchmarks.latency.report import chart, page
 from benchmarks.latency.scenes import scenes
 from gauss.bench.machine import header
@@ -44,7 +44,8 @@ SCALE = {"Python": "pass", "numpy": "import numpy", "Pinocchio": PINOCCHIO}
 def measure(rounds: int, only: str) -> tuple[list[dict], list[str]]:
     """Rows of all processes, and the conditions."""
     tasks = [(name, "motion") for name in scenes()] + [(BIPED, function) for function in FUNCTIONS]
-    tasks = [task for task in tasks if only in task[0]]
+    named = chosen(only, dict.fromkeys(scene for scene, _ in tasks))
+    tasks = [task for task in tasks if task[0] in named]
     rows: list[dict] = []
     for number in range(rounds):
         for scene, answer in tasks:

@@ -231,10 +231,11 @@ def _aligned(shape: Shape) -> np.ndarray:
 
 
 def _target(out, shape: Shape) -> np.ndarray:
-    """Writeable array of doubles of a shape; memory of other libraries is taken as it is (DLPack)."""
+    """Writeable array of doubles of a shape, each in a place of its own; memory of other libraries is shared (DLPack)."""
     array = _as_array(out)
     fits = isinstance(array, np.ndarray) and array.dtype == float and array.dtype.isnative and array.shape == shape
-    if not fits or not array.flags.writeable:
+    repeats = fits and any(length > 1 and not stride for length, stride in zip(shape, array.strides, strict=True))
+    if not fits or repeats or not array.flags.writeable:
         words = f"{shape[0]}" if len(shape) == 1 else f"shape {shape} of"
         raise StateError(f"out: expected a writeable array of {words} doubles, got {described(out)}.")
     return array

@@ -133,7 +133,8 @@ class KinematicsOnAccess(Kinematics):
     state : State
         The state.
     poses : callable
-        () → rotations (n, 3, 3), centres of mass, angular velocities and velocities (n, 3) of the bodies.
+        () → rotations (n + 1, 3, 3), centres of mass, angular velocities and velocities (n + 1, 3) of the bodies, then of
+        the ground.
     """
 
     def __init__(self, system: System, state: State, poses: Callable[[], tuple[np.ndarray, ...]]):
@@ -142,7 +143,8 @@ class KinematicsOnAccess(Kinematics):
     def __getattr__(self, name: str):
         if name not in FOUND:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        self._take(_of_bodies(self.system, self.state, *self._bodies()))
+        R, x, W, u = self._bodies()
+        self.__dict__.update(R=R, x=x, W=W, u=u, joints=[None] * len(self.system.joints))
         return self.__dict__[name]
 
 

@@ -1,25 +1,29 @@
 """Loads of a system as generalised forces: Q = P + Σ Jᵀ (F, M), without the equations of motion.
 
 Forces and moments on bodies are carried inward along the spanning tree
-(:func:`gauss.dynamics.inverse_dynamics_residual.along_rates`). Traced loads become machine code; opaque laws are called by
-Python between two kernels, of the poses of all bodies and of Jᵀ.
+(:func:`gauss.dynamics.inverse_dynamics_residual.along_rates`). Traced loads become machine code. Opaque laws are called by
+Python. What follows from the values of drives and of forces on bodies is machine code, too; the poses of bodies are so
+where a law asks for them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
 
 from gauss.codegen import Kernel, write
+from gauss.codegen.kernels import address
 from gauss.dynamics.inverse_dynamics_residual import along_rates
-from gauss.dynamics.kinematics import Kinematics, KinematicsOnAccess, kinematics
+from gauss.dynamics.kinematics import AXES, ORIGIN, Kinematics, KinematicsOnAccess, kinematics
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses
-from gauss.dynamics.loads import Applied
+from gauss.dynamics.loads import Applied, values_of_laws
 from gauss.dynamics.store import cached_on_disk
-from gauss.scene import GROUND
+from gauss.scene import GROUND, Drive, Force
+from gauss.scene.values import ConstantLaw, evaluated
 from gauss.system import BoundLoad, State, System
 
 ENDS = "body", "other"  # fields of loads on bodies that name these
+ASKED = Drive, Force  # kinds of loads that are known by the values of their laws
 
 
 def generalised_forces(motion: Kinematics, applied: Applied) -> np.ndarray:
@@ -59,35 +63,48 @@ class LoadForces:
     def __init__(self, system: System, called: Sequence[BoundLoad] = (), laws: Laws | None = None):
         self.system, self.called = system, list(called)
         self._traced = None if laws is None or not laws.traced else _traced(system, laws)
-        on_bodies = [bound for bound in self.called if not bound.on_coordinates]
-        self._loaded = sorted({body for bound in on_bodies for body in _bodies(system, bound)})
-        self._posed = bool(on_bodies) or any(needs_poses(bound.load) for bound in self.called)
+        self._asked = [bound for bound in self.called if isinstance(bound.load, ASKED)]
+        self._applied = [bound for bound in self.called if not isinstance(bound.load, ASKED)]
+        self._values, self._loaded = _values(system, self._asked), _loaded(system, self._applied)
+        self._posed = bool(self._loaded) or any(needs_poses(bound.load) for bound in self.called)
+        self._places = system.structure.n_bodies + 1  # with the ground
 
     def __call__(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces, and power [W]."""
-        system, n_v = self.system, self.system.n_v
-        Q, power = np.zeros(n_v), np.zeros(3)
-        if self._posed or self._traced is not None:
-            inputs = np.concatenate([[state.t], state.q, state.v])
+        found = self.packed(state, np.concatenate([[state.t], state.q, state.v]))
+        return found[: self.system.n_v], found[self.system.n_v :]
+
+    def packed(self, state: State, inputs: np.ndarray) -> np.ndarray:
+        """Generalised forces and power (n_v + 3,) of a state; ``inputs`` are its numbers in one array."""
+        parts = []
         if self.called:
-            motion = self._placed(state, inputs) if self._posed else Kinematics(system, state)
-            applied = Applied(motion, self.called)
-            Q, power = applied.P, np.array([applied.driven, applied.loaded, applied.dissipated])
-            if self._loaded:
-                wrenches = [part[body] for body in self._loaded for part in (applied.F, applied.M)]
-                Q = Q + self._transposed(np.concatenate([inputs, *wrenches]))
+            motion = self._placed(state, inputs) if self._posed else Kinematics(self.system, state)
+        if self._asked:
+            given = state.t, motion
+            values = [evaluated(law, given, what, size) for law, what, size in self._values]
+            parts.append(_at(self._of_values, np.concatenate([inputs, *values])))
+        if self._applied:
+            parts.append(self._of_others(motion, inputs))
         if self._traced is not None:
-            found = self._traced(inputs)
-            Q, power = Q + found[:n_v], power + found[n_v:]
-        return Q, power
+            parts.append(_at(self._traced, inputs))
+        return parts[0] if len(parts) == 1 else sum(parts, np.zeros(self.system.n_v + 3))
+
+    def _of_others(self, motion: Kinematics, inputs: np.ndarray) -> np.ndarray:
+        """The same of loads that are neither drives nor forces."""
+        applied = Applied(motion, self._applied)
+        Q = applied.P
+        if self._loaded:
+            wrenches = [part[body] for body in self._loaded for part in (applied.F, applied.M)]
+            Q = Q + _at(self._transposed, np.concatenate([inputs, *wrenches]))
+        return np.concatenate([Q, [applied.driven, applied.loaded, applied.dissipated]])
 
     def _placed(self, state: State, inputs: np.ndarray) -> Kinematics:
         """Kinematics with poses by machine code, at the first access: many laws need coordinates and rates only."""
 
         def poses() -> tuple[np.ndarray, ...]:
-            places = self.system.structure.n_bodies
-            R, x, W, u = np.split(self._poses(inputs), np.cumsum([9 * places, 3 * places, 3 * places]))
-            return R.reshape(places, 3, 3), *(part.reshape(places, 3) for part in (x, W, u))
+            found, n = _at(self._poses, inputs), self._places
+            R, x, W, u = found[: 9 * n], found[9 * n : 12 * n], found[12 * n : 15 * n], found[15 * n :]
+            return R.reshape(n, 3, 3), x.reshape(n, 3), W.reshape(n, 3), u.reshape(n, 3)
 
         return KinematicsOnAccess(self.system, state, poses)
 
@@ -97,11 +114,28 @@ class LoadForces:
 
         def poses(t, q, v):
             motion, places = kinematics(system, State(t[0], q, v)), range(system.structure.n_bodies)
-            parts = motion.R, motion.x, motion.W, motion.u
-            return tuple(np.concatenate([np.ravel(part[body]) for body in places]) for part in parts)
+            parts = (motion.R, AXES), (motion.x, ORIGIN), (motion.W, ORIGIN), (motion.u, ORIGIN)
+            return tuple(np.concatenate([*(np.ravel(part[body]) for body in places), end.ravel()]) for part, end in parts)
 
         make = lambda: Kernel(write(poses, 1, system.n_q, system.n_v, name="poses"), batch=False)  # noqa: E731
         return cached_on_disk(system, (LoadForces, "poses"), make)
+
+    @cached_property
+    def _of_values(self) -> Kernel:
+        """Machine code of drives and forces by the values of their laws: generalised forces, and power."""
+        system, ends = self.system, np.cumsum([size for *_, size in self._values])
+
+        def of_values(t, q, v, values):
+            motion, parts = Kinematics(system, State(t[0], q, v)), iter(np.split(values, ends[:-1]))
+            laws = [[ConstantLaw(next(parts)) if _varies(law) else law for law in one.laws] for one in self._asked]
+            bound = [BoundLoad(one.load, tuple(own)) for one, own in zip(self._asked, laws, strict=True)]
+            applied = Applied(motion, bound)
+            return generalised_forces(motion, applied), [applied.driven, applied.loaded, applied.dissipated]
+
+        sizes = 1, system.n_q, system.n_v, int(ends[-1])
+        names = tuple((one.load.name, tuple(map(_varies, one.laws))) for one in self._asked)
+        make = lambda: Kernel(write(of_values, *sizes, name="loads"), batch=False)  # noqa: E731
+        return cached_on_disk(system, (LoadForces, "values", names), make)
 
     @cached_property
     def _transposed(self) -> Kernel:
@@ -117,6 +151,27 @@ class LoadForces:
         sizes = 1, system.n_q, system.n_v, 6 * len(loaded)
         make = lambda: Kernel(write(transposed, *sizes, name="transposed"), batch=False)  # noqa: E731
         return cached_on_disk(system, (LoadForces, "transposed", tuple(loaded)), make)
+
+
+def _varies(law: Callable) -> bool:
+    return not isinstance(law, ConstantLaw)
+
+
+def _values(system: System, asked: Sequence[BoundLoad]) -> list[tuple[Callable, str, int]]:
+    """Laws of loads, with their names in messages and numbers of values."""
+    return [(law, *values_of_laws(system, one.load)) for one in asked for law in one.laws if _varies(law)]
+
+
+def _loaded(system: System, applied: Sequence[BoundLoad]) -> list[int]:
+    """Bodies that loads may act on."""
+    return sorted({body for one in applied if not one.on_coordinates for body in _bodies(system, one)})
+
+
+def _at(kernel: Kernel, inputs: np.ndarray) -> np.ndarray:
+    """Outputs of a kernel in one state, without the checks of its arguments."""
+    found = np.empty(kernel.n_out)
+    kernel.at(address(inputs), address(found))
+    return found
 
 
 def _bodies(system: System, bound: BoundLoad) -> list[int]:

@@ -30,18 +30,15 @@ class LoadReceiver(Receiver):
     def __init__(self, forces: LoadForces):
         self.forces, system = forces, forces.system
         self.n_q, self.given = 1 + system.n_q, np.empty(1 + system.n_q + system.n_v)
-        self.found = np.empty(system.n_v + 3)
-        self.places = address(self.given), address(self.found)
-        self.sizes = NUMBER * self.given.size, NUMBER * self.found.size
+        self.place, self.sizes = address(self.given), (NUMBER * self.given.size, NUMBER * (system.n_v + 3))
 
     def __call__(self, given: int, found: int):
         """Evaluate the loads of a state."""
-        own, results = self.places
-        ctypes.memmove(own, given, self.sizes[0])
+        ctypes.memmove(self.place, given, self.sizes[0])
         numbers = self.given.copy()  # a law may keep it
         state = State(float(numbers[0]), numbers[1 : self.n_q], numbers[self.n_q :])
-        self.found[:-3], self.found[-3:] = self.forces(state)
-        ctypes.memmove(found, results, self.sizes[1])
+        loads = self.forces.packed(state, numbers)
+        ctypes.memmove(found, address(loads), self.sizes[1])
 
 
 def received(function: Callable[..., T], receiver: LoadReceiver) -> Callable[..., T]:

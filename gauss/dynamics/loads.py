@@ -11,6 +11,7 @@ from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import GROUND, Drive, ElasticLink, Force, Input, JointSpring, Slipping, Spring
 from gauss.scene.values import as_function, evaluated
+from gauss.system import System
 
 NO_FORCE = np.zeros(3)
 NO_FORCE.flags.writeable = False  # one array for all bodies without loads
@@ -63,6 +64,13 @@ def apply(load, laws, motion: Kinematics, applied: Applied):
     raise SceneError(f"no rule to apply a load of type {type(load).__name__}.")
 
 
+def values_of_laws(system: System, load) -> tuple[str, int]:
+    """Name of a drive or a force in messages, and number of values of each of its laws."""
+    if isinstance(load, Drive):
+        return f"drive {load.name!r}", system.joint(load.joint).pair.n_v
+    return f"force {load.name!r}", 3
+
+
 def _evaluate(law, motion: Kinematics, what: str, size: int):
     return evaluated(law, (motion.state.t, motion), what, size)
 
@@ -70,7 +78,7 @@ def _evaluate(law, motion: Kinematics, what: str, size: int):
 @apply.register
 def _(load: Drive, laws, motion: Kinematics, applied: Applied):
     joint = motion.system.joint(load.joint)
-    effort = _evaluate(laws[0], motion, f"drive {load.name!r}", joint.pair.n_v)
+    effort = _evaluate(laws[0], motion, *values_of_laws(motion.system, load))
     if load.limit is not None:
         effort = math.clip(effort, -load.limit, load.limit)
     if joint.pair.n_v == 1:  # the usual case, without arrays
@@ -104,7 +112,7 @@ def _(load: Force, laws, motion: Kinematics, applied: Applied):
 
 def _push(load: Force, laws, motion: Kinematics, applied: Applied, factor=None):
     """Add a force and a moment, times a factor if there is one; their power [W]."""
-    force, moment = (_evaluate(f, motion, f"force {load.name!r}", 3) for f in laws)
+    force, moment = (_evaluate(law, motion, *values_of_laws(motion.system, load)) for law in laws)
     if factor is not None:
         force, moment = factor * force, factor * moment
     if load.axes == "body":

@@ -13,14 +13,13 @@ import numpy as np
 
 from gauss.codegen import Scalar, forward, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
-from gauss.dynamics.given_link_frames import with_moved_joint
-from gauss.dynamics.inverse_dynamics_residual import along_rates, inverse_dynamics_residual, outward_accelerations
+from gauss.dynamics.inverse_dynamics_residual import along_rates, outward_accelerations
+from gauss.dynamics.joint_places import accelerations_by_place, inverse_dynamics_by_place
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.load_forces import generalised_forces
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.parameters import changed
-from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import ArgumentError, StateError, did_you_mean, require
 from gauss.rotations import cross
 from gauss.scene import Force, Slipping
@@ -75,7 +74,7 @@ def inverse_dynamics_by_parameter(
     """Derivative (n_v, k) of inverse dynamics by a parameter of k values, over symbols."""
     kind, _, name = parameter.partition(":")
     if kind in OF_JOINTS:
-        columns = _by_place(system, loads, t, q, v, rates, kind, name)
+        columns = inverse_dynamics_by_place(system, loads, State(t, q, v), rates, parameter)
     elif parameter == GRAVITY or kind in OF_BODIES:
         motion = kinematics(system, State(t, q, v))
         wrenches = _by_gravity(system) if parameter == GRAVITY else _by_inertia(motion, loads, rates, kind, name)
@@ -90,9 +89,9 @@ def accelerations_by_parameter(
     system: System, loads: Sequence[BoundLoad], t: Scalar, q, v, load, parameter: str
 ) -> np.ndarray:
     """Derivative (n_v, k) of the accelerations by a parameter of k values, over symbols."""
-    kind, _, name = parameter.partition(":")
+    kind = parameter.partition(":")[0]
     if kind in OF_JOINTS and system.has_closures:
-        return _accelerations_by_place(system, loads, t, q, v, load, kind, name)
+        return accelerations_by_place(system, loads, State(t, q, v), load, parameter)
     loaded = LoadedMechanism(system, loads, t, q, v, load)
     rates, multipliers = loaded.motion()
     still = np.zeros(multipliers.size)
@@ -147,51 +146,3 @@ def _by_constant(system: System, loads, t: Scalar, q, v, kind: str, name: str) -
 
     written = write(change, 1, q.size, v.size, 1, name="by_constant")
     return [written.inlined([t], q, v, [getattr(bound.load, kind)])]
-
-
-def _moved(system: System, kind: str, name: str, place) -> tuple[System, int, int, np.ndarray]:
-    """System with a joint displaced in the frame of its parent or child; the joint, the body, the central displacement."""
-    index, joint = next((i, joint) for i, joint in enumerate(system.joints) if joint.name == name)
-    field, body = ("p_parent", joint.parent) if kind == "parent_at" else ("p_child", joint.child)
-    shift = (system.frames[system.structure.bodies[body]].R if body >= 0 else np.eye(3)) @ place
-    moved = changed(joint, {field: getattr(joint, field) + shift})
-    joints = (*system.joints[:index], moved, *system.joints[index + 1 :])
-    return changed(system, {"joints": joints}), index, body, shift
-
-
-def _by_place(system: System, loads, t: Scalar, q, v, rates, kind: str, name: str) -> list[np.ndarray]:
-    """Change of inverse dynamics, with loops cut, by the place of a joint in the frame of its parent or child."""
-
-    def changes(t, q, v, rates, place):
-        motion = kinematics(_moved(system, kind, name, place)[0], State(t[0], q, v))
-        residual = inverse_dynamics_residual(motion, Applied(motion, loads), rates)
-        return tuple(-forward(residual, place, unit) for unit in np.eye(3))
-
-    written = write(changes, 1, q.size, v.size, v.size, 3, name="by_place")
-    return np.split(written.inlined([t], q, v, rates, np.zeros(3)), 3)
-
-
-def _accelerations_by_place(system: System, loads, t: Scalar, q, v, load, kind: str, name: str) -> np.ndarray:
-    """Change (n_v, 3) of the accelerations by the place of a joint of a system with loops, at fixed q and v.
-
-    With the residuals r of the equations of motion and g of the constraints, which leave them as the joint moves, at fixed
-    accelerations and multipliers, of the loops of the whole system: its reductions hold for present places. What redundant
-    rows contradict is left out.
-    """
-    own, forces, _ = applied_loads(system, loads, State(t, q, v))
-    mechanism = Mechanism(system, q, v, t, (whole(system),))
-    rates, multipliers = mechanism.motion(own + load, forces)
-    n, m = system.n_v, multipliers.size
-
-    def changes(t, q, v, load, rates, multipliers, place):
-        other, index, body, shift = _moved(system, kind, name, place)
-        own, forces, _ = applied_loads(other, loads, State(t[0], q, v))
-        moved = Mechanism(other, q, v, t[0], (with_moved_joint(whole(system), index, body, shift),))
-        motion, violation = moved.residual(rates, multipliers, own + load, forces)
-        parts = np.concatenate([motion, violation, moved.dependent_accelerations(rates)])
-        return tuple(forward(parts, place, unit) for unit in np.eye(3))
-
-    written = write(changes, 1, q.size, n, n, n, m, 3, name="by_place")
-    columns = np.split(written.inlined([t], q, v, load, rates, multipliers, np.zeros(3)), 3)
-    parts = (np.split(column, [n, n + m]) for column in columns)
-    return np.array([mechanism.response(motion, violation)[0] + following for motion, violation, following in parts]).T

@@ -103,7 +103,7 @@ def _requested(system: System, names: Sequence[str], reference: str, independent
     requests = tuple(_request(system, name, reference) for name in names)
     if not requests:
         raise ArgumentError(f"function: expected names of functions. {did_you_mean('', TERMS)}")
-    columns = None if independent is None else _columns(system, requests, independent)
+    columns = None if independent is None else _columns(system, independent)
     if columns is None and "null_space" in names:
         raise ArgumentError("null_space: expected the names of independent joints, independent=(…).")
     if columns is not None or "loop_constraints" in names:
@@ -155,11 +155,8 @@ def _request(system: System, name: str, reference: str) -> Request:
     return Request(own, frame, reference if term.has_reference else "")
 
 
-def _columns(system: System, requests, independent) -> tuple[int, ...]:
+def _columns(system: System, independent) -> tuple[int, ...]:
     """Places of independent coordinates in v."""
-    for one in requests:
-        if not TERMS[one.name].is_reduced:
-            raise ArgumentError(f"{one.name} does not exist for independent coordinates; call it without independent=.")
     names = (independent,) if isinstance(independent, str) else tuple(independent)
     columns = fixed_columns(system, names)
     freedoms = cached(system, (mobility,), lambda: mobility(system)).nearby

@@ -8,7 +8,9 @@ from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.independent_derivatives import (
     efforts,
     independent_acceleration_derivatives,
+    independent_accelerations_by_parameter,
     independent_effort_derivatives,
+    independent_efforts_by_parameter,
 )
 from gauss.dynamics.inertial_regressor import inertial_regressor
 from gauss.dynamics.laws.traced_laws import Laws
@@ -30,9 +32,9 @@ class Term(NamedTuple):
         of the parameter; i: standard inertial parameters of all bodies.
     trace : callable
         (terms, request, acceleration or load) → its results.
-    of_frame, has_reference, is_reduced, has_loads, of_parameter : bool
-        Whether it is a function of a frame; in axes to be chosen; whether it exists for independent coordinates; whether it
-        depends on the loads of the scene; whether it is the derivative by a parameter.
+    of_frame, has_reference, has_loads, of_parameter : bool
+        Whether it is a function of a frame; in axes to be chosen; whether it depends on the loads of the scene; whether it
+        is the derivative by a parameter.
     """
 
     arguments: str
@@ -40,7 +42,6 @@ class Term(NamedTuple):
     trace: Callable
     of_frame: bool = False
     has_reference: bool = False
-    is_reduced: bool = True
     has_loads: bool = False
     of_parameter: bool = False
 
@@ -76,14 +77,19 @@ def _slopes(function: Callable, of_independent: Callable) -> Callable:
     return trace
 
 
-def _by_parameter(function: Callable) -> Callable:
-    """Derivatives of a function of the loaded system by a parameter."""
-    return lambda terms, one, given: function(
-        terms.system, traced_loads(terms.system).traced, terms.t, terms.q, terms.v, given, one.frame
-    )
+def _by_parameter(function: Callable, of_independent: Callable) -> Callable:
+    """Derivatives of a function of the loaded system by a parameter, of all coordinates or of independent ones."""
+
+    def trace(terms, one, given):
+        loads = traced_loads(terms.system).traced
+        if isinstance(terms, ConstrainedTerms):
+            return of_independent(terms, loads, given, one.frame)
+        return function(terms.system, loads, terms.t, terms.q, terms.v, given, one.frame)
+
+    return trace
 
 
-BY_PARAMETER = {"is_reduced": False, "has_loads": True, "of_parameter": True}
+BY_PARAMETER = {"has_loads": True, "of_parameter": True}
 TERMS = {
     "mass_matrix": Term("q", ("vv",), lambda terms, *_: terms.mass_matrix),
     "bias_forces": Term("qv", ("v",), lambda terms, *_: terms.bias_forces),
@@ -111,7 +117,11 @@ TERMS = {
         _slopes(acceleration_derivatives, independent_acceleration_derivatives),
         has_loads=True,
     ),
-    "inverse_dynamics_by": Term("qva", ("Vp",), _by_parameter(inverse_dynamics_by_parameter), **BY_PARAMETER),
-    "accelerations_by": Term("qvl", ("Vp",), _by_parameter(accelerations_by_parameter), **BY_PARAMETER),
+    "inverse_dynamics_by": Term(
+        "qva", ("vp",), _by_parameter(inverse_dynamics_by_parameter, independent_efforts_by_parameter), **BY_PARAMETER
+    ),
+    "accelerations_by": Term(
+        "qvl", ("vp",), _by_parameter(accelerations_by_parameter, independent_accelerations_by_parameter), **BY_PARAMETER
+    ),
     "loop_constraints": Term("qv", ("r", "rv", "r"), lambda terms, *_: terms.loop_constraints),
 }

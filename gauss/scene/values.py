@@ -4,8 +4,10 @@ import inspect
 import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -178,10 +180,27 @@ def _when(t) -> str:
     return f"t = {t:.6g} s" if isinstance(t, Real) else "any time"
 
 
+@dataclass(frozen=True, slots=True)
+class ConstantLaw:
+    """Function of (t, motion) with the same value at all times.
+
+    Parameters
+    ----------
+    value : float or tuple of float
+        The value; expressions where parameters are.
+    """
+
+    value: Any
+
+    def __call__(self, t, motion):
+        """The value."""
+        return self.value
+
+
 def as_function(law_or_constant) -> Callable:
     """Function of (t, motion), whatever form the law was given in."""
     if not callable(law_or_constant):
-        return lambda t, motion: law_or_constant
+        return ConstantLaw(law_or_constant)
     if arguments(law_or_constant) == 1:
         return lambda t, motion: law_or_constant(t)
     return law_or_constant

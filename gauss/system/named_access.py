@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from gauss.system.system import System
 
 
+ORIGIN = (0.0, 0.0, 0.0)  # of a frame
+
+
 class ByBody(Protocol):
     """An array of each body, by its index."""
 
@@ -67,10 +70,11 @@ class View:
         """All rates of a placed joint."""
         return self.state.v[joint.v]
 
-    def position(self, frame: str, point=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def position(self, frame: str, point=ORIGIN) -> np.ndarray:
         """Position (3,) in world [m] of a point given in the frame of a body, or of a named frame."""
         placed = self.system.frame(frame)
-        return self.x[placed.body] + self.R[placed.body] @ (placed.p + placed.R @ np.asarray(point))
+        own = placed.p if point is ORIGIN else placed.p + placed.R @ np.asarray(point)  # the usual case, quickly
+        return self.x[placed.body] + self.R[placed.body] @ own
 
     def rotation(self, frame: str) -> np.ndarray:
         """Rotation (3, 3) from the frame of a body, or a named frame, to world."""
@@ -86,7 +90,7 @@ class View:
         central = frames.compose(frames.relative(scene, GROUND, body), frames.central(scene, body))
         return frames.compose(central, (placed.R, placed.p))
 
-    def velocity(self, frame: str, point=(0.0, 0.0, 0.0)) -> np.ndarray:
+    def velocity(self, frame: str, point=ORIGIN) -> np.ndarray:
         """Velocity (3,) in world [m/s] of a point fixed in a body."""
         return self.velocity_at(frame, self.position(frame, point))
 

@@ -178,7 +178,7 @@ class StateFunctions:
         """
         return self.function("inverse_dynamics_derivatives")
 
-    def parameter_derivatives(self, *parameters: str) -> Callable:
+    def parameter_derivatives(self, *parameters: str, independent=None) -> Callable:
         """Compiled function ``f(q, v, load, out=None, t=0.0)``: derivatives of the accelerations by parameters.
 
         Parameters
@@ -187,21 +187,23 @@ class StateFunctions:
             "mass:body" (1), "com:body" (3) in the body frame, "inertia:body" (6: xx, yy, zz, xy, xz, yz) about the centre of
             mass in the axes of the body frame, "gravity" (3); any number of a load, as "stiffness:spring" (1); lengths:
             "parent_at:joint" and "child_at:joint" (3), the joint point in the frame of either body.
+        independent : str or sequence of str, optional
+            Independent coordinates: the derivatives of their accelerations, at fixed independent coordinates and rates.
 
         Returns
         -------
         callable
             An array (…, n_v, k) for each parameter of k values, at fixed coordinates and rates; with loops along the
             constraints. A length that changes opens its loops: where coordinates and rates follow, ∂q̈/∂q dq + ∂q̈/∂v dv of
-            :attr:`acceleration_derivatives` is to be added. Those of inverse dynamics, the regressor, are
-            ``function("inverse_dynamics_by:mass:body", …)``.
+            :attr:`acceleration_derivatives` is to be added; ``independent`` does so. Those of inverse dynamics, the
+            regressor, are ``function("inverse_dynamics_by:mass:body", …)``.
 
         Raises
         ------
         ArgumentError, StateError
             If there is no such parameter, or no derivative.
         """
-        return self.function(*(f"accelerations_by:{parameter}" for parameter in parameters))
+        return self.function(*(f"accelerations_by:{parameter}" for parameter in parameters), independent=independent)
 
     def function(
         self, *names: str, reference: str = LOCAL_WORLD_ALIGNED, independent=None, device: str | Sequence[str] | None = None

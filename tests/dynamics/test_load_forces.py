@@ -36,6 +36,8 @@ def _loaded(scene: gauss.Scene) -> gauss.Scene:
     scene.spring("between", middle, last, at=(0.0, 0.3, 0.1), other_at=(0.5, 0.0, 0.7), stiffness=1.0)
     scene.force("wind", middle, force=lambda t: (math.sin(t), 0.2, 0.0), at=(0.2, 0.1, 0.0))
     scene.force("jet", last, force=lambda t: (np.cos(float(t)), 0.0, 0.3), moment=(0.1, 0.2, 0.0), axes="body")
+    slowed = lambda t, at: -0.1 * np.asarray(at.velocity(middle), dtype=float)  # noqa: E731
+    scene.force("gust", middle, force=slowed, moment=lambda t: [0.0, 0.1 + float(t), 0.2], at=(0.1, 0.0, 0.3))
     scene.drive(hinge, torque=lambda t, at: 0.3 * float(at.position(last)[0]) - 0.1 * float(at.velocity(last)[1]))
     return scene
 

@@ -157,6 +157,67 @@ def test_parameters_of_a_loop(parameter):
     assert np.abs(found - expected).max() <= OF_STEPS * max(np.abs(expected).max(), 1.0)
 
 
+BY_INDEPENDENT = {"A": ("mass:coupler", "com:coupler", "inertia:rocker", "gravity"), "D": ("com:rocker", "mass:crank")}
+
+
+@pytest.mark.parametrize("joint", BY_INDEPENDENT)
+def test_parameters_for_independent_coordinates(joint):
+    """Accelerations and efforts of the independent coordinate, against scenes with other parameters."""
+    scene = replace(gauss.load("four_bar"), gravity=(0.3, -9.81, 0.0))
+    bodies = {name: replace(one, inertia=(0.02, 0.03, 0.04)) for name, one in scene.bodies.items()}
+    scene = replace(scene, bodies=bodies)
+    system, which = gauss.compile_scene(scene), {"independent": (joint,)}
+    start, given = system.initial_state(), np.linspace(-1.0, 1.0, system.n_v)
+    place = [system.column(joint)]
+    for parameter in BY_INDEPENDENT[joint]:
+        accelerations = lambda other: other.forward_dynamics(start.q, start.v, given)[place]  # noqa: E731
+        efforts = lambda other: other.function("inverse_dynamics", **which)(start.q, start.v, given)  # noqa: E731
+        found = system.parameter_derivatives(parameter, **which)(start.q, start.v, given)
+        expected = by_difference(scene, parameter, found.shape[1], accelerations, 1e-5)
+        assert relative(found, expected) <= OF_STEPS
+        found = system.function(f"inverse_dynamics_by:{parameter}", **which)(start.q, start.v, given)
+        assert relative(found, by_difference(scene, parameter, found.shape[1], efforts, 1e-5)) <= OF_STEPS
+
+
+@pytest.mark.parametrize("joint", ["A", "B"])
+@pytest.mark.parametrize("parameter", ["child_at:A", "parent_at:B", "parent_at:C", "child_at:D"])
+def test_lengths_of_a_loop_for_independent_coordinates(joint, parameter):
+    """The other coordinates and rates follow the length: against linkages that are assembled with other lengths."""
+    scene = gauss.load("four_bar")
+    scene.spring("S", "crank", "rocker", (0.1, 0.0, 0.0), (0.0, 0.2, 0.0), stiffness=20.0, length=0.3)
+    system, (where, _, name), step = gauss.compile_scene(scene), parameter.partition(":"), 1e-5
+    which, place = {"independent": (joint,)}, system.column(joint)
+    start, given = system.initial_state(), np.linspace(-1.0, 1.0, system.n_v)
+    v = system.null_space(start.q, **which)[:, 0] * 1.3
+    by_place = system.parameter_derivatives(parameter, **which)(start.q, v, given)
+    of_efforts = system.function(f"inverse_dynamics_by:{parameter}", **which)(start.q, v, given)
+    for axis in range(2):
+        ends = []
+        for sign in (1.0, -1.0):
+            other = with_moved_joint(system, where, name, sign * step * np.eye(3)[axis])
+            state = other.initial_state(start.q, v, keep=[joint])
+            effort = other.function("inverse_dynamics", **which)(state.q, state.v, given)
+            ends.append((other.forward_dynamics(state.q, state.v, given)[place], effort[0]))
+        accelerations, efforts = ((plus - minus) / (2.0 * step) for plus, minus in zip(*ends, strict=True))
+        assert by_place[0, axis] == pytest.approx(accelerations, rel=OF_STEPS, abs=OF_STEPS)
+        assert of_efforts[0, axis] == pytest.approx(efforts, rel=OF_STEPS, abs=OF_STEPS)
+    assert not by_place[:, 2].any()  # across the plane: the rows that it would contradict are redundant
+
+
+def test_all_coordinates_of_a_tree_are_independent():
+    system = gauss.compile_scene(sprung_tree())
+    state, a = random_state(system, np.random.default_rng(6)), np.linspace(-1.0, 1.0, system.n_v)
+    which = {"independent": system.coordinates}
+    for parameter in ("mass:" + system.structure.bodies[1], "stiffness:S", "child_at:" + system.joints[2].name):
+        names = f"accelerations_by:{parameter}", f"inverse_dynamics_by:{parameter}"
+        for found, expected in zip(
+            system.function(*names, **which)(state.q, state.v, a, a),
+            system.function(*names)(state.q, state.v, a, a),
+            strict=True,
+        ):
+            assert relative(found, expected) <= EXACT
+
+
 @pytest.mark.parametrize("joint", ["B", "D"])
 @pytest.mark.parametrize("parameter", ["stiffness:S", "damping:S"])
 def test_constants_of_loads_along_joints_of_a_loop(joint, parameter):

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import gauss
 from gauss.dynamics.rules import Plan
-from gauss.errors import SimulationError
+from gauss.errors import SimulationError, SwitchingWarning
 
 BY_PYTHON = Plan("Python loop", "compiled")
 DURATION = 0.4  # s
@@ -134,3 +135,15 @@ def test_a_new_process_with_a_warm_cache_moves_the_same(tmp_path):
     run = [sys.executable, "-W", "ignore", "-c", PROGRAM]
     said = [subprocess.run(run, env=environment, capture_output=True, text=True, check=True).stdout for _ in range(2)]
     assert said[0] == said[1] and said[0].startswith("callbacks")
+
+
+@pytest.mark.parametrize(
+    "given", [{"force": lambda t: (np.sin(float(t)), 0.0, 0.0)}, {"moment": lambda t: [0.0, float(t), 1.0]}]
+)
+def test_the_constant_part_of_an_opaque_force_is_not_taken_for_a_law_of_time(given):
+    scene = gauss.load("pendulum")
+    scene.force("push", next(iter(scene.bodies)), **given)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SwitchingWarning)
+        motion = gauss.simulate(scene, 0.1, step=5e-4, progress=False)
+    assert motion.stats.steps >= 200

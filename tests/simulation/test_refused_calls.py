@@ -76,7 +76,10 @@ def test_frames(frame):
     refused(lambda: SYSTEM.jacobian(PAIR, frame))
 
 
-@pytest.mark.parametrize("out", [np.zeros(3), np.zeros((2, 2), dtype=np.float32), [1], "x"])
+SAME_PLACE = np.lib.stride_tricks.as_strided(np.zeros(2), (2, 2), (0, 8))  # both rows lie in one
+
+
+@pytest.mark.parametrize("out", [np.zeros(3), np.zeros((2, 2), dtype=np.float32), [1], "x", SAME_PLACE])
 def test_destinations(out):
     refused(lambda: SYSTEM.mass_matrix(PAIR, out=out))
 

@@ -7,11 +7,12 @@ import pytest
 
 import gauss
 from gauss.codegen.kernels import FixedStepBatchLoop
-from gauss.errors import SimulationError, StateError
+from gauss.errors import DivergenceWarning, SimulationError, StateError
 from gauss.system import random_state
 from tests.support import mechanisms
 
 ROUNDING = 1e-11  # of 50 steps, compiled against certified
+LARGEST = 0.35  # rad, of a law that raises beyond
 SCENES = {
     "arm": lambda: mechanisms.chain([1.0, 2.0, 0.5]),
     "ball": lambda: mechanisms.two_bodies("ball", 3),
@@ -171,7 +172,52 @@ def test_starts_that_contradict_what_is_not_stepped_are_refused(build, q, v, wor
         gauss.rollout(system, [good.q, q], [good.v, v], steps=2, step=1e-3)
 
 
-def test_a_motion_that_leaves_all_bounds_is_counted():
+DIVERGING = {
+    "rk4": {"steps": 5, "step": 1e-3},
+    "time_stepping": {"steps": 5, "step": 1e-3},
+    "dop853": {"times": [0.0, 1e-3, 5e-3]},
+}
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("integrator", DIVERGING)
+def test_motions_that_diverge_are_marked_and_the_others_are_not_affected(integrator, threads):
+    system, which, rng = gauss.compile_scene(mechanisms.rods(2)), (1, 6), np.random.default_rng(0)
+    q, v = rng.normal(size=(2, 9, 2))
+    run = {"integrator": integrator, "threads": threads} | DIVERGING[integrator]
+    right = gauss.rollout(system, q, v, **run)
+    v[which, :] = 1e200
+    with np.errstate(all="ignore"), pytest.warns(DivergenceWarning, match="2 of 9 motions .*: 1, 6. Number 1: "):
+        found = gauss.rollout(system, q, v, **run)
+    assert found.diverged == which and sorted(found.reasons) == list(which)
+    for part, of_right in ((found.q, right.q), (found.v, right.v)):
+        np.testing.assert_array_equal(np.delete(part, which, axis=0), np.delete(of_right, which, axis=0))
+    for k in which:
+        assert np.isnan(found.q[k, -1]).any()
+        so_far = found.trajectory(k)
+        assert so_far.t[0] == 0.0 and np.isfinite(so_far.q).all() and so_far.t[-1] < right.t[-1]
+
+
+@pytest.mark.parametrize("integrator", DIVERGING)
+def test_no_motion_that_reaches_the_end_is_an_error(integrator):
     system = gauss.compile_scene(mechanisms.rods(2))
-    with pytest.raises(SimulationError, match="motions diverged, the first is number 1"):
-        gauss.rollout(system, np.zeros((3, 2)), [[0.0, 0.0], [1e200, 1e200], [0.0, 0.0]], steps=5, step=1e-3)
+    with np.errstate(all="ignore"), pytest.raises(SimulationError, match="motion 0: "):
+        gauss.rollout(system, np.zeros((3, 2)), np.full((3, 2), 1e200), integrator=integrator, **DIVERGING[integrator])
+
+
+def test_a_motion_whose_law_ends_keeps_its_samples_so_far():
+    def law(t, motion):
+        if float(motion.coordinate("J")) > LARGEST:
+            raise ValueError("out of range")
+        return 0.0
+
+    scene = gauss.Scene("ends", gravity=(0, 0, 0))
+    scene.revolute("J", "ground", scene.body("arm", 1.0, (0.1, 0.1, 0.1)))
+    scene.drive("J", torque=law)
+    run = {"steps": 10, "step": 0.1}
+    with pytest.warns(DivergenceWarning, match="1 of 2 motions .*out of range"):
+        found = gauss.rollout(gauss.compile_scene(scene), np.zeros((2, 1)), [[0.0], [1.0]], **run)
+    assert found.diverged == (1,) and "out of range" in found.reasons[1] and not found.q[0].any()
+    reached = np.isfinite(found.q[1, :, 0])
+    np.testing.assert_allclose(found.q[1, reached, 0], found.t[reached], rtol=0.0, atol=1e-14)  # at a constant rate
+    assert found.t[reached][-1] == pytest.approx(LARGEST, abs=0.1)

@@ -40,10 +40,8 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law", us
     def values(times) -> np.ndarray:
         """Values (k, n) at times (k,)."""
         try:
-            found = [law(t, at_time(motion, t) if of_motion else motion) for t in times]
-            if any(isinstance(one, np.ndarray | list | tuple) for one in found):
-                found = [np.ravel(np.asarray(one, dtype=float)) for one in found]
-            return np.array(found, dtype=float).reshape(len(found), -1)
+            found = [law(t, at_time(motion, t) if of_motion else motion) for t in np.asarray(times).tolist()]
+            return _rows(found)
         except Exception as error:  # a law may fail in any way at other times
             raise _NoValueError from error
 
@@ -53,6 +51,14 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law", us
             return _located(values, begin, end, what, count, CONSTANT if uses_time else "")
     except _NoValueError:  # the motion reports this failure by name
         return NO_TIMES
+
+
+def _rows(values: list) -> np.ndarray:
+    """Values (k, n) of k results of a law: numbers, or arrays of any shapes with n entries."""
+    try:
+        return np.array(values, dtype=float).reshape(len(values), -1)
+    except ValueError:  # their shapes differ
+        return np.array([np.ravel(np.asarray(one, dtype=float)) for one in values])
 
 
 def _count(motion, duration: float) -> int:

@@ -14,7 +14,7 @@ from gauss.dynamics.laws.switching_functions import watch_of
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable, timetable
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_law
 from gauss.integrators import Point
-from gauss.scene.values import as_function
+from gauss.scene.values import ConstantLaw, as_function
 from gauss.system import BoundLoad, Relations, State, System
 from gauss.system.contact_gaps import has_own_gaps
 
@@ -112,7 +112,8 @@ def _sampled(bound: BoundLoad, laws: Laws, motion, begin: float, end: float) -> 
     """Jumps of the opaque laws of a load."""
     what, given = f"the law of {bound.load.name!r}", getattr(bound.load, "breaks", ())
     uses_time = laws.fails(bound.load.name) and not needs_poses(bound.load) and not given
-    return NO_TIMES.join(*(sampled_times(law, motion, begin, end, what, uses_time) for law in bound.laws))
+    varying = [law for law in bound.laws if not isinstance(law, ConstantLaw)]
+    return NO_TIMES.join(*(sampled_times(law, motion, begin, end, what, uses_time) for law in varying))
 
 
 def _given_times(system: System, breaks, begin: float, end: float) -> Timetable:

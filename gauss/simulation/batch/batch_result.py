@@ -48,7 +48,7 @@ class Rollout:
     steps, rejected : ndarray, shape (batch,)
         Accepted and rejected steps of each motion.
     diverged : tuple of int
-        Motions under ``control`` that diverged or cannot continue: some of their samples are not finite.
+        Motions that diverged or cannot continue: some of their samples are not finite.
     control : ndarray, shape (batch, rows, n_u), optional
         Inputs of each motion, each row held for an equal share of the steps.
     work : ndarray, shape (batch, k, 3), optional
@@ -58,9 +58,9 @@ class Rollout:
     settings : dict
         Arguments of the simulation by name.
     reasons : dict of int to str
-        Why motions of ``diverged`` cannot continue, where a step or a law says it.
+        Why motions of ``diverged`` cannot continue.
     again : dict of int to Trajectory
-        The repeated motions.
+        The repeated motions, those of ``diverged`` up to where they cannot continue.
     """
 
     system: System = field(repr=False)  # as long as a scene

@@ -1,9 +1,11 @@
 """Motions of a batch that are repeated one by one: those that a check of the batch does not confirm."""
 
+import warnings
+
 import numpy as np
 
-from gauss.errors import SimulationError
-from gauss.simulation.energy_balance import imbalances, warn_of_many
+from gauss.errors import DivergenceWarning, SimulationError, user_level
+from gauss.simulation.energy_balance import SHOWN, imbalances, warn_of_many
 from gauss.simulation.simulate import simulate
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
@@ -14,18 +16,13 @@ def repeat(
 ) -> tuple[dict[int, str], dict[int, Trajectory]]:
     """Repeat motions by :func:`gauss.simulate` with the settings ``run``, and warn of energy balances.
 
-    Samples and imbalances are changed. Returned are why motions with inputs cannot continue, whose samples are NaN, and the
-    trajectories of the others.
+    Samples and imbalances are changed. Returned are why motions cannot continue, whose samples are NaN from there on, and
+    the trajectories of all that have any.
 
     Warns
     -----
     BalanceWarning
         If there are any.
-
-    Raises
-    ------
-    SimulationError
-        If a motion without inputs cannot continue.
     """
     failed: dict[int, str] = {}
     trajectories: dict[int, Trajectory] = {}
@@ -36,12 +33,43 @@ def repeat(
             with imbalances() as found:
                 again = simulate(system, duration, state=start, progress=False, **run, **held)
         except SimulationError as error:
-            if control is None:
-                raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
-            failed[k] = str(error)
+            failed[k], again = str(error), error.trajectory
             samples[k], share[k] = np.nan, 0.0
+            samples[k, run["times"] == 0.0] = starts[:, k]
+            if again is not None and len(again):
+                reached = np.searchsorted(again.t, run["times"]).clip(max=len(again) - 1)
+                rows = np.flatnonzero(again.t[reached] == run["times"])
+                samples[k, rows] = np.concatenate([again.q, again.v], axis=1)[reached[rows]]
+                trajectories[k] = again
             continue
         samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share
         trajectories[k] = again
     warn_of_many(system, share, lambda k: f"number {k}", run)
     return failed, trajectories
+
+
+def tell_of_divergence(system: System, batch: int, reasons: dict[int, str], trajectories: dict[int, Trajectory]):
+    """Warn of motions that cannot continue, by their number and reason.
+
+    Warns
+    -----
+    DivergenceWarning
+        If there are some, and others reach the end.
+
+    Raises
+    ------
+    SimulationError
+        If none reaches the end; its ``trajectory`` is the first motion so far.
+    """
+    if not reasons:
+        return
+    first = min(reasons)
+    if len(reasons) == batch:
+        raise SimulationError(f"motion {first}: {reasons[first]}", trajectories.get(first))
+    more = ", …" if len(reasons) > SHOWN else ""
+    warnings.warn(
+        f"scene {system.scene.name!r}: {len(reasons)} of {batch} motions do not reach the end: "
+        f"{', '.join(map(str, sorted(reasons)[:SHOWN]))}{more}. Number {first}: {reasons[first]}",
+        DivergenceWarning,
+        stacklevel=user_level(),
+    )

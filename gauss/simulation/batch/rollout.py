@@ -24,7 +24,7 @@ from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, batch_program, fixed_step_code, machine_code, one_by_one
-from gauss.simulation.batch.repeated_motions import repeat
+from gauss.simulation.batch.repeated_motions import repeat, tell_of_divergence
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
 from gauss.simulation.held_inputs import real_numbers
@@ -62,7 +62,8 @@ def rollout(
     output. Contacts, stops and friction take "time_stepping", whose motions follow one another in scalar code; with many
     contacts of shapes, or with opaque laws, each of them is made by :func:`gauss.simulate`. The
     accelerations are checked on the way by inverse dynamics, and loops by their constraint residuals. A motion that fails a
-    check, or with a contact problem that machine code does not solve, is repeated by :func:`gauss.simulate`.
+    check, or with a contact problem that machine code does not solve, is repeated by :func:`gauss.simulate`. Motions that
+    diverge, or cannot continue, are marked in the result, with the reasons; the others are not affected.
 
     Parameters
     ----------
@@ -102,12 +103,13 @@ def rollout(
     BalanceWarning
         If the residual of the energy balance of some exceeds a thousandth of their largest energy; it names the worst of
         them.
+    DivergenceWarning
+        If some motions without ``control`` do not reach the end.
 
     Raises
     ------
     SimulationError
-        If the system cannot be compiled, with the reasons, or a motion without ``control`` diverges; with it, motions that
-        diverge are marked in the result, and the others are not affected.
+        If the system cannot be compiled, with the reasons, or no motion without ``control`` reaches the end.
     DeviceError, MissingPackageError
         If there is no such device, no driver or no cuda-bindings, or a function has no code for a GPU.
     StateError
@@ -168,8 +170,6 @@ def _fixed(
         return _singly(system, starts, run, settings, control)
     samples = batch.run(steps, step, every, threads, control)
     finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
-    if control is None:
-        _refuse_divergence(solved & ~finite)
     is_right = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
     doubtful = np.flatnonzero((finite & ~is_right) | ~solved)
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
@@ -177,11 +177,11 @@ def _fixed(
         share = shares(system, batch.energies, starts, samples, steps * step)
     share = np.where(finite & solved, share, 0.0)
     failed, again = repeat(system, starts, samples, share, doubtful, steps * step, run, control)
-    finite[doubtful] = True
-    finite[list(failed)] = False
+    reasons = failed | _left_all_bounds(samples, t, np.flatnonzero(solved & ~finite))
+    if control is None:
+        tell_of_divergence(system, batch.size, reasons, again)
     counts = {"steps": np.full(batch.size, steps), "rejected": np.zeros(batch.size, int)}
-    lost, repeated = tuple(map(int, np.flatnonzero(~finite))), tuple(map(int, doubtful))
-    marks = {"repeated": repeated, "diverged": lost, "errors": batch.error.copy(), "again": again, "reasons": failed}
+    marks = _marks(doubtful, reasons, again) | {"errors": batch.error.copy()}
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
 
 
@@ -206,13 +206,17 @@ def _begun(system: System, starts: np.ndarray, method: FixedStep, held: bool, de
     return batch
 
 
-def _refuse_divergence(diverged: np.ndarray):
-    """Raise a SimulationError where motions without inputs diverged."""
-    broken = np.flatnonzero(diverged)
-    if broken.size:
-        raise SimulationError(
-            f"{broken.size} of {diverged.size} motions diverged, the first is number {broken[0]}; shorten the step."
-        )
+def _left_all_bounds(samples: np.ndarray, t: np.ndarray, which: np.ndarray) -> dict[int, str]:
+    """Reasons of motions whose numbers are not finite at the end."""
+    finite = np.isfinite(samples[which]).all(axis=2)
+    last = np.where(finite.all(axis=1), len(t), np.argmin(finite, axis=1)) - 1  # the start is finite
+    return {int(k): f"diverged after t = {t[row]:.6g} s; shorten the step." for k, row in zip(which, last, strict=True)}
+
+
+def _marks(doubtful, reasons: dict[int, str], again: dict) -> dict:
+    """Fields of a rollout that say what became of its motions."""
+    repeated, diverged = tuple(map(int, doubtful)), tuple(sorted(reasons))
+    return {"repeated": repeated, "diverged": diverged, "reasons": reasons, "again": again}
 
 
 def _result(system: System, t: np.ndarray, samples: np.ndarray, **fields) -> Rollout:
@@ -275,10 +279,13 @@ def _adaptive(
     switched = _switching(system, starts, t[-1])
     found = batch.run(t, step, threads, switched.times)
     doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(switched.jumps))
-    share = shares(system, found.energies, starts, found.samples[:, :, : len(starts)], t[-1])
-    _, again = repeat(system, starts, found.samples[:, :, : len(starts)], share, doubtful, t[-1], run)
-    counts = {"repeated": tuple(map(int, doubtful)), "steps": found.steps, "rejected": found.rejected}
-    marks = {"errors": found.error, "work": found.samples[:, :, len(starts) :], "again": again}
+    with np.errstate(invalid="ignore"):  # of motions that are repeated
+        share = shares(system, found.energies, starts, found.samples[:, :, : len(starts)], t[-1])
+    failed, again = repeat(system, starts, found.samples[:, :, : len(starts)], share, doubtful, t[-1], run)
+    found.samples[list(failed), :, len(starts) :] = np.nan
+    tell_of_divergence(system, starts.shape[1], failed, again)
+    counts = {"steps": found.steps, "rejected": found.rejected}
+    marks = _marks(doubtful, failed, again) | {"errors": found.error, "work": found.samples[:, :, len(starts) :]}
     return _result(system, t, found.samples[:, :, : len(starts)], settings=settings, **counts, **marks)
 
 
@@ -303,9 +310,11 @@ def _singly(system: System, starts: np.ndarray, run: dict, settings: dict, contr
         refuse_inconsistent(system, starts, np.array([constraint_residual(system, state) for state in states]))
     samples, share = np.empty((batch, t.size, len(starts))), np.zeros(batch)
     failed, again = repeat(system, starts, samples, share, np.arange(batch), settings["duration"], run, control)
+    if control is None:
+        tell_of_divergence(system, batch, failed, again)
     stats = [again[k].stats if k in again else None for k in range(batch)]
     counts = {name: np.array([0 if one is None else getattr(one, name) for one in stats]) for name in ("steps", "rejected")}
-    marks = {"repeated": tuple(range(batch)), "diverged": tuple(failed), "reasons": failed, "again": again}
+    marks = _marks(range(batch), failed, again)
     return _result(system, t, samples, control=control, settings=settings, **counts, **marks)
 
 
