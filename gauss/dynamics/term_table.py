@@ -30,9 +30,10 @@ class Term(NamedTuple):
         of the parameter; i: standard inertial parameters of all bodies.
     trace : callable
         (terms, request, acceleration or load) → its results.
-    of_frame, has_reference, is_reduced, has_loads, of_parameter : bool
+    of_frame, has_reference, is_reduced, has_loads, of_parameter, of_loops : bool
         Whether it is a function of a frame; in axes to be chosen; whether it exists for independent coordinates; whether it
-        depends on the loads of the scene; whether it is the derivative by a parameter.
+        depends on the loads of the scene; whether it is the derivative by a parameter; whether accelerations in it are those
+        of the closed loops, so that loops that cannot move are rigid bodies in it.
     """
 
     arguments: str
@@ -43,6 +44,7 @@ class Term(NamedTuple):
     is_reduced: bool = True
     has_loads: bool = False
     of_parameter: bool = False
+    of_loops: bool = False
 
 
 def traced_loads(system: System) -> Laws:
@@ -110,8 +112,9 @@ TERMS = {
         ("vv", "vv", "vv"),
         _slopes(acceleration_derivatives, independent_acceleration_derivatives),
         has_loads=True,
+        of_loops=True,
     ),
     "inverse_dynamics_by": Term("qva", ("Vp",), _by_parameter(inverse_dynamics_by_parameter), **BY_PARAMETER),
-    "accelerations_by": Term("qvl", ("Vp",), _by_parameter(accelerations_by_parameter), **BY_PARAMETER),
+    "accelerations_by": Term("qvl", ("Vp",), _by_parameter(accelerations_by_parameter), **BY_PARAMETER, of_loops=True),
     "loop_constraints": Term("qv", ("r", "rv", "r"), lambda terms, *_: terms.loop_constraints),
 }
