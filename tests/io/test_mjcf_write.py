@@ -179,6 +179,10 @@ def planar_link(*rates):
 
 REFUSED = {
     "a law in Python": (lambda s: s.drive("B", torque=lambda t: t), "drive of B"),
+    "springs that cancel": (
+        lambda s: [s.joint_spring(f"k{k}", "B", stiffness=k, rest=0.1 * k) for k in (30.0, -30.0)],
+        "'k-30.0': the springs of joint 'B' cancel",
+    ),
     "a plane": (lambda s: s.on_plane("floor", "b", "ground"), "floor"),
     "a prescribed speed": (lambda s: s.drive("B", speed=1.0), "drive of B"),
     "a loop of cylindrical joints": (

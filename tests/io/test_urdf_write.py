@@ -283,3 +283,31 @@ def test_what_another_name_would_change_is_refused(name):
     AMBIGUOUS[name](scene)
     with pytest.raises(FileError, match="get this name in URDF|chain of joints in URDF"):
         to_urdf(scene)
+
+
+PARTLY = {  # joints that become loops in the file, and a start of them alone
+    "screw": ({"pitch": 0.3, "axis": (1, 1, 0)}, (0.2, 1.0)),
+    "ball": ({}, ((0.5, 0.5, 0.5, 0.5), (1.0, 2.0, 3.0))),
+    "free": ({}, ((0.1, 0.2, 0.3, 0.6, 0.0, 0.8, 0.0), (1.0, 2.0, 3.0, 3.0, 2.0, 1.0))),
+    "cylindrical": ({"axis": (1, 1, 0)}, ((0.1, 0.2), (0.3, 0.4))),
+}
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
+@pytest.mark.parametrize("kind", PARTLY)
+def test_starts_of_some_joints_leave_the_others_where_they_were(tmp_path, kind, turned):
+    """The loops that URDF needs for a joint do not move the joints that the scene gives no start."""
+    options, (position, rate) = PARTLY[kind]
+    scene = two_bodies("revolute")
+    scene.body("c", 1.0, (0.1, 0.2, 0.2), position=(0.5, 0.5, 0.5), rotation=(0.3, 0.1, 0.2))
+    ends = ("c", "b") if turned else ("b", "c")
+    scene.joint("P", kind, *ends, at=(0.2, 0.1, 0.3), **options)
+    scene.start("P", position, rate)
+    read = again(scene, tmp_path)
+    instants = [gauss.Kinematics(system, system.initial_state()) for system in map(gauss.compile_scene, (scene, read))]
+    for body in scene.bodies:
+        expected, found = (
+            np.concatenate([one.position(body, com), one.velocity(body, com), one.angular_velocity(body)])
+            for one, com in zip(instants, (scene.bodies[body].com, read.bodies[body].com), strict=True)
+        )
+        assert found == pytest.approx(expected, rel=SAME, abs=SAME)

@@ -20,6 +20,7 @@ from gauss.io.mjcf.tree import ElementaryJoint, Limb, joint_frame, limb, spannin
 from gauss.io.urdf.numbers import roll_pitch_yaw, text_of
 from gauss.io.urdf.plus_write import write_coupling, write_loop
 from gauss.io.urdf.side import ENDS, side_file
+from gauss.io.urdf.starts import whole_start
 from gauss.rotations import from_quaternion
 from gauss.scene import GROUND, Coupling, Drive, Joint, Output, Scene, Start
 from gauss.scene.inputs import SENSORS
@@ -280,9 +281,22 @@ def _keep_loads(document: UrdfDocument):
     for name, load in scene.loads.items():
         for number, part in enumerate(_split(document, load) if isinstance(load, Drive) else [load]):
             rest.loads[f"{name}{number or ''}"] = _moved(part, document.shifts)
-    for start in scene.starts.values():
-        for part in _split(document, start):
-            rest.starts[part.joint] = part
+    for part in _starts(document):
+        rest.starts[part.joint] = part
+
+
+def _starts(document: UrdfDocument) -> list[Start]:
+    """Starts of the joints of the file: those of the scene, or all where the file has loops that the scene has not."""
+    scene, floating = document.scene, {}
+    for one in document.limbs:
+        if _floats(scene, one):
+            floating[one.body] = one.joint.name if _is_plain(document.system, one) else f"{one.body} floats"
+    closes = any(
+        one.joint.kind == "screw" or floating.get(one.body, one.joint.name) != one.joint.name for one in document.limbs
+    )
+    if scene.starts and closes:
+        return list(whole_start(document.system, document.limbs, floating))
+    return [part for start in scene.starts.values() for part in _split(document, start)]
 
 
 def _in_file(document: UrdfDocument, coupling: Coupling) -> bool:
