@@ -71,6 +71,7 @@ from gauss.analysis.inverse_kinematics import InverseKinematics, differential_in
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.linear_modes import LinearModes
 from gauss.analysis.mode_motion import mode_motion
+from gauss.analysis.modes import modes
 from gauss.analysis.motion_fit import fit_motion
 from gauss.analysis.optimal import (
     FeedbackMotion,
@@ -205,6 +206,7 @@ __all__ = [
     "load_sweep",
     "mobility",
     "mode_motion",
+    "modes",
     "motion_gradient",
     "optimal_hybrid_motion",
     "optimal_motion",

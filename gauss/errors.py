@@ -123,6 +123,10 @@ class SwitchingWarning(UserWarning):
     """A law may have switched between two evaluations without effect on the motion."""
 
 
+class LimitWarning(UserWarning):
+    """An optimal motion is beyond a limit between the points at which it is asked for."""
+
+
 class TimeDependenceWarning(UserWarning):
     """Laws depend on time, but the result holds for one time only, which was not named."""
 
@@ -170,7 +174,7 @@ def extra(name: str = ""):
     Raises
     ------
     MissingPackageError
-        If one of them is not installed; the message says how to get it, and all else that the extra lacks.
+        If one of them is not installed; the message says how to get it, and what else of the extra is absent.
     """
     try:
         yield

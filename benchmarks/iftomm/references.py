@@ -11,7 +11,7 @@ import numpy as np
 import gauss
 from benchmarks.iftomm.problems import TABLES, BenchmarkProblem, problems
 from benchmarks.work_precision.heyoka_ import HeyokaTaylor
-from gauss.simulation.trajectory import Stats
+from gauss.simulation.motion_records import Stats
 
 TOLERANCE = 1e-18
 NEWTON = 4  # steps to where the rates vanish

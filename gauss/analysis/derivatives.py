@@ -58,7 +58,8 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     Derivatives
         Three matrices. With loops, changes of coordinates and rates are along the constraints. With joint friction and
         limited drives they are those of the contact mode of this state: slipping elements are loads of constant sign,
-        sticking ones are constraints, and changes of rates are along these.
+        sticking ones are constraints, and changes of rates are along these. Where loop constraints are redundant, sums along
+        the constraints have eight digits; those of :func:`gauss.linearise` have all.
 
     Raises
     ------
@@ -70,36 +71,83 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     """
     require(system, (System,), "derivatives")
     require(state, (State,), "derivatives: state")
-    refuse_changed(system)
-    refuse_other_pose(system, state.q)
-    if not system.n_v:
-        return Derivatives(*np.zeros((3, 0, 0)))
-    if has_joint_modes(system) and not (system.contacts.placed or system.losses):
-        held = active_mode(system, state, load)
-        if between := on_boundary(system, state, held):
-            names = ", ".join(map(repr, between))
+    changes = AccelerationChanges(system, state, load)
+    return Derivatives(*np.split(changes.along(np.eye(3 * system.n_v)), 3, axis=1))
+
+
+class AccelerationChanges:
+    """Changes of the accelerations of a system in one state.
+
+    Parameters
+    ----------
+    system, state, load
+        As for :func:`derivatives`.
+
+    Attributes
+    ----------
+    system : System
+        The system of the contact mode in this state, in which sticking elements are constraints.
+
+    Raises
+    ------
+    SimulationError, StateError
+        As :func:`derivatives`.
+    """
+
+    def __init__(self, system: System, state: State, load=None):
+        refuse_changed(system)
+        refuse_other_pose(system, state.q)
+        if has_joint_modes(system) and not (system.contacts.placed or system.losses):
+            system = _of_mode(system, state, load)
+        self.system, self.state, self.load = system, state, load
+        self.laws = Laws(system)
+        if not system.n_v:
+            return
+        DERIVATIVES.plan(Question(system, self.laws))
+        if kinked := kinked_laws(system, self.laws, state):
             raise SimulationError(
-                f"t = {state.t:.6g} s: {names}: between sticking and slipping accelerations have a kink, no derivatives; "
-                "take a state that slides, or a load within the limits."
+                f"t = {state.t:.6g} s: the law of {', '.join(map(repr, kinked))} has a kink or a jump in this state, and "
+                "accelerations have no derivatives; take a state beside it, or a smooth law, as with gauss.math.tanh."
             )
-        return derivatives(held.system, state, load)
-    laws = Laws(system)
-    DERIVATIVES.plan(Question(system, laws))
-    if kinked := kinked_laws(system, laws, state):
+
+    def along(self, directions: np.ndarray) -> np.ndarray:
+        """Changes (n_v, k) along directions (3 n_v, k) of displacements, rates and generalised forces.
+
+        Where rows are redundant, directions along the constraints keep their digits; along others these rows contradict each
+        other, and their multipliers are large.
+
+        Raises
+        ------
+        SimulationError
+            If the changes are not determined.
+        """
+        system, laws, state = self.system, self.laws, self.state
+        if not system.n_v:
+            return np.zeros((0, directions.shape[1]))
+        solve, slope = cached_on_disk(system, (_kernels, laws.key), lambda: _kernels(system, laws.traced))
+        load = np.zeros(system.n_v) if self.load is None else self.load
+        given = np.concatenate([[state.t], state.q, state.v, load])
+        with judged_later():
+            fixed = np.tile(np.concatenate([given, solve(given)])[:, None], directions.shape[1])
+            found = slope(np.concatenate([fixed, directions]))
+        if not np.isfinite(found).all():
+            system.accelerations(state, self.load)  # raises where accelerations are not determined
+            raise SimulationError(
+                f"scene {system.scene.name!r}: the accelerations have no finite derivatives in this state."
+            )
+        return found
+
+
+def _of_mode(system: System, state: State, load) -> System:
+    """System of the contact mode of joint friction and limited drives in a state."""
+    held = active_mode(system, state, load)
+    if between := on_boundary(system, state, held):
+        names = ", ".join(map(repr, between))
         raise SimulationError(
-            f"t = {state.t:.6g} s: the law of {', '.join(map(repr, kinked))} has a kink or a jump in this state, and "
-            "accelerations have no derivatives; take a state beside it, or a smooth law, as with gauss.math.tanh."
+            f"t = {state.t:.6g} s: {names}: between sticking and slipping accelerations have a kink, no derivatives; "
+            "take a state that slides, or a load within the limits."
         )
-    solve, slope = cached_on_disk(system, (_kernels, laws.key), lambda: _kernels(system, laws.traced))
-    given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
-    directions = np.eye(3 * system.n_v)
-    with judged_later():
-        fixed = np.tile(np.concatenate([given, solve(given)])[:, None], len(directions))
-        found = slope(np.concatenate([fixed, directions]))
-    if not np.isfinite(found).all():
-        system.accelerations(state, load)  # raises where accelerations are not determined
-        raise SimulationError(f"scene {system.scene.name!r}: the accelerations have no finite derivatives in this state.")
-    return Derivatives(*np.split(found, 3, axis=1))
+    return held.system
 
 
 def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:

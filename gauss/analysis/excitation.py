@@ -5,25 +5,32 @@
 is periodic, so that samples of periods average out noise (Swevers, Ganseman, Tükel, De Schutter, Van Brussel, Optimal robot
 excitation and identification, IEEE Trans. Robotics and Automation 13(5), 1997). The factor s scales each coordinate to its
 limits; the condition number of the base columns in their units is minimised (Gautier and Khalil, Exciting trajectories for
-the identification of base inertial parameters of robots, IJRR 11(4), 1992).
+the identification of base inertial parameters of robots, IJRR 11(4), 1992). With loops the series are those of independent
+coordinates; the others follow, and the regressor is projected.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
 
 from gauss.analysis.base_parameters import base_of, random_matrix
+from gauss.analysis.closed_samples import ClosedSamples
 from gauss.analysis.regressor import RegressorModel
 from gauss.arguments import generator, named_arguments, table
-from gauss.errors import ArgumentError, SimulationError, did_you_mean, require
+from gauss.dynamics.projection import limits as joint_limits
+from gauss.errors import ArgumentError, SimulationError, StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation.tolerances import check_tolerances
 from gauss.system import System
 
 SAMPLES = 10  # of a period, for each harmonic: they resolve its extremes to 5 % of the limits, which are kept by MARGIN
 MARGIN = 1.0 / 0.95
+NOT_CLOSED = 690.0  # value of series along which loops do not close: near the logarithm of the largest number
+LARGEST_TRANSMISSION = (
+    100.0  # rate of a dependent coordinate over that of an independent one, in units: beyond, near-singular
+)
 LIMITS = (1.0, 2.0, 10.0)  # of coordinates about their centre, rates and accelerations where none are given [rad or m, s]
 
 
@@ -34,7 +41,7 @@ class Excitation:
     Parameters
     ----------
     coordinates : tuple of str
-        Names of the coordinates.
+        Names of the coordinates: all, or the independent ones.
     centre : ndarray, shape (n,)
         Constant parts q̄ [rad, m].
     sines, cosines : ndarray, shape (n, harmonics)
@@ -72,6 +79,7 @@ def excitation(
     period: float,
     *,
     harmonics: int = 5,
+    independent: Sequence[str] | None = None,
     limits: Mapping[str, tuple[tuple[float, float], float, float]] | None = None,
     friction=(),
     trials: int = 20,
@@ -82,14 +90,16 @@ def excitation(
     Parameters
     ----------
     system : System or Scene
-        A system without loops, of joints of one freedom.
+        A system without ball joints and free bodies; with loops, among its independent coordinates.
     period : float
         Period [s].
     harmonics : int
         Number of harmonics of each coordinate.
+    independent : sequence of str, optional
+        Independent coordinates of a system with loops, as of :func:`gauss.regressor`; poses are on the branch of its start.
     limits : mapping of str to ((float, float), float, float), optional
         Least and largest coordinate, largest rate and acceleration of each joint [rad, m, s]; those of the joint, or one
-        about the reference configuration, with 2/s and 10/s² when not given.
+        about the reference configuration, with loops about the start, with 2/s and 10/s² when not given.
     friction : sequence of str
         Joints whose friction is to be found, see :func:`gauss.identify`.
     trials : int
@@ -107,7 +117,9 @@ def excitation(
     ArgumentError
         If an argument does not fit.
     SimulationError
-        If the system has loops or joints of several freedoms, by name, or the duration is no positive number.
+        If joints turn about any axis, by name, the duration is no positive number, or loops do not close within the limits.
+    StateError
+        If independent coordinates do not determine the others.
 
     Examples
     --------
@@ -121,15 +133,20 @@ def excitation(
     for name, value in (("harmonics", harmonics), ("trials", trials)):
         if not isinstance(value, int) or value < 1:
             raise ArgumentError(f"excitation: {name}: expected a number ≥ 1, got {value!r}.")
-    model = RegressorModel(system, None, friction)
+    model = RegressorModel(system, independent, friction)
     problem = _SeriesProblem(model, period, harmonics, limits)
     rng = generator(seed, "excitation")
     starts = rng.normal(size=(trials, 2 * harmonics * problem.n))
-    found = [problem.value(start) for start in starts]
+    found = np.array([problem.value(start) for start in starts])
+    if found.min() >= NOT_CLOSED:
+        raise SimulationError(
+            f"excitation: the loops of scene {model.system.scene.name!r} do not close, or are near-singular, within the "
+            f"limits of {', '.join(problem.names)}; narrow them by limits=."
+        )
     first = starts[int(np.argmin(found))]
     best = minimize(problem.value, first, method="L-BFGS-B", options={"maxiter": 15 * problem.n}).x
     sines, cosines = problem.scaled(best)
-    condition, usual = float(np.exp(problem.value(best))), float(np.exp(np.median(found)))
+    condition, usual = float(np.exp(problem.value(best))), float(np.exp(np.median(found[found < NOT_CLOSED])))
     return Excitation(problem.names, problem.centre, sines, cosines, problem.frequency, condition, usual)
 
 
@@ -138,11 +155,14 @@ class _SeriesProblem:
 
     def __init__(self, model: RegressorModel, period: float, harmonics: int, limits):
         system = model.system
-        if system.has_closures or system.n_q != system.n_v:
-            wide = [joint.name for joint in system.joints if joint.pair.n_v > 1]
-            what = f"joints of several freedoms, {', '.join(wide)}" if wide else "loops"
-            raise SimulationError(f"excitation: scene {system.scene.name!r} has {what}; give motions of your own.")
-        self.model, self.names, self.n = model, tuple(system.coordinates), system.n_v
+        wide = [joint.name for joint in system.joints if joint.pair.quaternion is not None and _moves(joint, model.places)]
+        if wide:
+            raise SimulationError(
+                f"excitation: scene {system.scene.name!r} turns about any axis in {', '.join(wide)}, whose angles are no "
+                "series; give motions of your own."
+            )
+        self.model, self.names, self.n = model, model.rows, len(model.rows)
+        self.samples = ClosedSamples(system, system.initial_state(), model.places) if system.has_closures else None
         self.base = list(base_of(model, random_matrix(model, 0)).base)
         self.frequency = 2.0 * np.pi / period
         self.t = np.linspace(0.0, period, SAMPLES * harmonics, endpoint=False)
@@ -152,14 +172,15 @@ class _SeriesProblem:
 
     def _limits(self, given: dict) -> tuple[np.ndarray, np.ndarray]:
         """Centres (n,), and largest displacements, rates and accelerations (3, n)."""
-        system = self.model.system
+        system, samples = self.model.system, self.samples
+        middles = system.reference.q if samples is None else samples.start.q[samples.entries]
         for name in given:
             if name not in self.names:
                 raise ArgumentError(f"excitation: limits of {name!r}. {did_you_mean(name, self.names)}")
         centre, largest = np.zeros(self.n), np.zeros((3, self.n))
         for k, name in enumerate(self.names):
             own = getattr(system.scene.joints.get(name), "limits", None)
-            middle = system.reference.q[k]
+            middle = middles[k]
             (low, high), rate, acceleration = given.get(
                 name, (own or (middle - LIMITS[0], middle + LIMITS[0]), LIMITS[1], LIMITS[2])
             )
@@ -179,10 +200,41 @@ class _SeriesProblem:
     def value(self, x: np.ndarray) -> float:
         """Logarithm of the condition number."""
         q, v, a = _series(self.t, self.frequency, *self.scaled(x))
-        rows = self.model.matrix(self.centre + q, v, a)[:, :, self.base] * self.model.units[self.base]
+        try:
+            matrix = self._matrix(self.centre + q, v, a)
+        except StateError:  # the independent coordinates do not determine the others
+            return NOT_CLOSED
+        if matrix is None:
+            return NOT_CLOSED
+        rows = matrix[:, :, self.base] * self.model.units[self.base]
         rows = rows / self.model.row_units[:, None]
         sizes = np.linalg.svd(rows.reshape(-1, len(self.base)), compute_uv=False)
         return float(np.log(sizes[0] / max(sizes[-1], 1e-300)))
+
+    def _matrix(self, *motion: np.ndarray) -> np.ndarray | None:
+        """Regressors (k, n, p) of samples (k, n); None where loops do not close, or are near-singular."""
+        if self.samples is None:
+            return self.model.matrix(*motion)
+        system, places = self.model.system, self.model.places
+        q, closed = self.samples.poses(motion[0])
+        if not closed.all() or not self._within(q):
+            return None
+        v, a = (np.zeros((len(q), system.n_v)) for _ in range(2))
+        v[:, places], a[:, places] = motion[1:]
+        scale = system.scale.coordinates
+        N = system.null_space(q, independent=self.model.independent) / scale[:, None] * scale[places]
+        return None if np.abs(N).max() > LARGEST_TRANSMISSION else self.model.matrix(q, v, a)
+
+    def _within(self, q: np.ndarray) -> bool:
+        """Whether dependent joints of one freedom keep their limits."""
+        (least, largest), joints = joint_limits(self.model.system), self.model.system.joints
+        plain = [(one.q.start, one.v.start) for one in joints if one.pair.n_v == 1]
+        return all((least[k] <= q[:, entry]).all() and (q[:, entry] <= largest[k]).all() for entry, k in plain)
+
+
+def _moves(joint, places) -> bool:
+    """Whether rates of a joint are among some places in v."""
+    return any(joint.v.start <= place < joint.v.stop for place in places)
 
 
 def _series(t: np.ndarray, frequency: float, sines: np.ndarray, cosines: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -61,11 +61,8 @@ class FitProblem:
         lengths = np.diff(self.t) / counts
         nodes = [t + h * np.arange(m) for t, h, m in zip(self.t[:-1], lengths, counts, strict=True)]
         start, every = replace(self.system.initial_state(), t=float(self.t[0])), np.append(np.concatenate(nodes), self.t[-1])
-        found, ends = (
-            timed_steps(self.system, Laws(self.system), start, every, np.repeat(lengths, counts)),
-            np.cumsum(counts),
-        )
-        return [list(chain(*found[end - m : end])) for end, m in zip(ends, counts, strict=True)]
+        found = timed_steps(self.system, Laws(self.system), start, every, np.repeat(lengths, counts))
+        return [list(chain(*found[end - m : end])) for end, m in zip(np.cumsum(counts), counts, strict=True)]
 
     def _measured(self, measured) -> np.ndarray:
         """Columns (k, n) of numbers."""

@@ -1,10 +1,12 @@
 """Result of a fit of a whole motion: values with confidence intervals, residuals, a table and a figure."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gauss.analysis.report import widths_figure, write_report
 from gauss.errors import extra
 from gauss.scene import Scene
 
@@ -104,3 +106,28 @@ class MotionFit:
         if path is not None:
             figure.savefig(path)
         return figure
+
+    def report(self, path) -> Path:
+        """Write a report as one HTML file: the table, motions, and the widths of the confidence intervals.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to: .html.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ArgumentError
+            If the path does not end with .html, or its folder does not exist.
+        MissingPackageError
+            If matplotlib is not installed.
+        """
+        names = list(self.values)
+        widths = widths_figure(names, [self.values[name] for name in names], [self.half_widths[name] for name in names])
+        figures = [("Measured and fitted motion", self.plot()), ("Confidence intervals", widths)]
+        return write_report(path, f"Fit of {self.scene.name}", str(self), figures)

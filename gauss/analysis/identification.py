@@ -9,6 +9,7 @@ fit needs in a triangle. Standard parameters are those nearest to the scene that
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from gauss.analysis.consistent_inertias import is_consistent, nearest_consistent
 from gauss.analysis.identified_scene import identified_scene
 from gauss.analysis.measured_motion import MeasuredMotion, measured_motion
 from gauss.analysis.regressor import RegressorModel
+from gauss.analysis.report import widths_figure, write_report
 from gauss.arguments import generator, named_arguments, real_array
 from gauss.errors import ArgumentError, StateError, extra
 from gauss.scene import Scene
@@ -145,6 +147,30 @@ class Identification:
         if path is not None:
             figure.savefig(path)
         return figure
+
+    def report(self, path) -> Path:
+        """Write a report as one HTML file: the table, forces, and the widths of the confidence intervals.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to: .html.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ArgumentError
+            If the path does not end with .html, or its folder does not exist.
+        MissingPackageError
+            If matplotlib is not installed.
+        """
+        widths = widths_figure(self.base.shown, self.base_values, self.half_widths)
+        figures = [("Measured and identified forces", self.plot()), ("Confidence intervals", widths)]
+        return write_report(path, f"Identification of {self.model.system.scene.name}", str(self), figures)
 
 
 @named_arguments

@@ -11,8 +11,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import qr
 
-from gauss.analysis.derivatives import derivatives
+from gauss.analysis.derivatives import AccelerationChanges
 from gauss.analysis.frozen_time import state_at
 from gauss.analysis.linear_modes import LinearModes
 from gauss.analysis.regulator import gain, unreached, weights
@@ -182,7 +183,7 @@ def linearise(
 ) -> LinearModel:
     """Linear model about a state that meets the constraints, exact for loops and for rolling.
 
-    Laws of time have their values at the time of the state.
+    Laws of time have their values at the time of the state. Joint friction and limited drives that stick in it bind rates.
 
     Parameters
     ----------
@@ -232,20 +233,21 @@ def linearise(
     require(system, (System, Scene), "linearise")
     system = compile_scene(system) if isinstance(system, Scene) else system
     state = state_at(system, state, t, "linearise")
-    slopes, tangents = derivatives(system, state, load), Tangents(system, state)
+    changes = AccelerationChanges(system, state, load)
+    tangents = Tangents(changes.system, state)
     N, rate = tangents.position, tangents.rate
     if independent is not None:
-        N, rate = (_described_by(system, basis, independent) for basis in (N, rate))
-        chosen = fixed_columns(system, (independent,) if isinstance(independent, str) else independent)
-        tangents.__dict__.update(position=N, rate=rate, independent_coordinates=chosen, independent_rates=chosen)
+        chosen = fixed_columns(system, _names(independent, "independent"))
+        N, turning = _described_by(N, chosen, independent), _best_rows(rate / system.scale.rates[:, None], chosen)
+        rate = _described_by(rate, turning, independent)
+        tangents.__dict__.update(position=N, rate=rate, independent_coordinates=chosen, independent_rates=turning)
     k, D, free = N.shape[1], tangents.change, tangents.independent_rates
     places = tangents.independent_coordinates
     moving = D + tangents.turning @ N
-    by_q, by_v = slopes.q @ N + slopes.v @ D, slopes.v @ rate
+    forces, input_names = _input_columns(system, state, inputs)
+    by_q, by_v, response = _acceleration_changes(changes, tangents, forces)
     A = np.block([[moving[places], rate[places]], [by_q[free], by_v[free]]])
     names = system.coordinates
-    forces, input_names = _input_columns(system, state, inputs)
-    response = slopes.load @ forces
     B = np.concatenate([np.zeros((k, forces.shape[1])), response[free]])
     rows, direct, output_names = _output_rows(system, state, outputs, places, load)
     along_q = np.concatenate([N, np.zeros((system.n_v, rate.shape[1]))], axis=1)
@@ -257,6 +259,14 @@ def linearise(
         (np.abs(own) <= STEADY * unit).all() and (np.abs(state.v[places]) <= STEADY * system.scale.rates[places]).all()
     )
     return LinearModel(A, B, C, direct @ response, states, input_names, output_names, system, state, N, is_equilibrium)
+
+
+def _acceleration_changes(changes: AccelerationChanges, tangents: Tangents, forces: np.ndarray) -> list[np.ndarray]:
+    """Changes of the accelerations by independent displacements (n_v, k), by rates (n_v, l), and by forces (n_v, m)."""
+    N, D, rate, zeros = tangents.position, tangents.change, tangents.rate, np.zeros
+    (n, k), many, m = N.shape, rate.shape[1], forces.shape[1]
+    directions = np.block([[N, zeros((n, many + m))], [D, rate, zeros((n, m))], [zeros((n, k + many)), forces]])
+    return np.split(changes.along(directions), [k, k + many], axis=1)
 
 
 def _without_integrals(system: System, C, places, A, B, N, states):
@@ -274,15 +284,25 @@ def _without_integrals(system: System, C, places, A, B, N, states):
     return C[:, kept], left, A[np.ix_(kept, kept)], B[kept], N[:, moved], named
 
 
-def _described_by(system: System, N: np.ndarray, independent) -> np.ndarray:
+def _described_by(N: np.ndarray, chosen: list[int], independent) -> np.ndarray:
     """The same tangent in other independent coordinates."""
-    chosen = fixed_columns(system, (independent,) if isinstance(independent, str) else independent)
     square = N[chosen]
     if len(chosen) != N.shape[1] or np.linalg.cond(square) > 1e8:
         raise StateError(f"independent: expected {N.shape[1]} coordinates that determine the others, got {independent!r}.")
     found = np.linalg.solve(square.T, N.T).T
     found[chosen] = np.eye(len(chosen))
     return found
+
+
+def _best_rows(rate: np.ndarray, chosen: list[int]) -> list[int]:
+    """Of the independent coordinates those of independent rates (n_v, l), in shares of the units.
+
+    They are fewer where rolling or sticking binds rates alone.
+    """
+    if rate.shape[1] >= len(chosen):
+        return chosen
+    *_, order = qr(rate[chosen].T, mode="r", pivoting=True)
+    return sorted(chosen[k] for k in order[: rate.shape[1]])
 
 
 def _input_columns(system: System, state: State, inputs) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -204,9 +204,11 @@ def _refuse_prescribed(scene: Scene):
 
 def _independent(system: System, given) -> tuple[str, ...]:
     """Independent coordinates of a system with loops: the given ones, or those of its start."""
-    if given is not None:
-        return tuple(given)
     chosen = Tangents(system, system.initial_state()).independent_rates
+    if given is not None:
+        if len(given) != len(chosen):
+            raise StateError(f"independent: expected {len(chosen)} coordinates that determine the others, got {given!r}.")
+        return tuple(given)
     if not chosen:
         raise StateError(f"regressor: the loops of scene {system.scene.name!r} leave no degree of freedom.")
     return tuple(system.coordinates[k] for k in chosen)

@@ -34,7 +34,7 @@ def numbers_of(function: Callable, given: tuple, what: str, size: int | None = N
         found = np.concatenate([np.ravel(np.asarray(part, dtype=object)) for part in parts] or [np.zeros(0, dtype=object)])
     except GaussError:
         raise
-    except Exception as error:
+    except Exception as error:  # whatever a function of the user raises
         raise ArgumentError(f"{what} cannot be traced: it raised {type(error).__name__}: {error}.") from error
     if not all(map(_is_number, found)):
         raise ArgumentError(f"{what} cannot be traced: expected finite numbers, got {result!r:.80}.")

@@ -27,6 +27,8 @@ def show(
     ] = 5.0,
     start: Annotated[list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE; may be repeated.")] = None,
     speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE; may be repeated.")] = None,
+    integrator: Annotated[str, typer.Option(help="Integrator of a scene, as of `gauss run`.")] = "dop853",
+    step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
     root: Root = "fixed",
     read: Read = None,
     reactions: Annotated[
@@ -56,7 +58,7 @@ def show(
         found = found if isinstance(found, gauss.Scene) else found.system.scene
         visuals = import_module("gauss.io.visuals").read_visuals(scene, root)
         found = started(found, start, speed)
-        thing = gauss.simulate(found, duration) if duration > 0 else found
+        thing = gauss.simulate(found, duration, integrator=integrator, step=step) if duration > 0 else found
     viewer = import_module("gauss.view.viewer")  # its library takes long to import
     joints = _joints(thing, reactions)
     second = None if beside is None else gauss.load_motion(beside)

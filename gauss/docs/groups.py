@@ -72,7 +72,7 @@ GROUPS = (
         "Pinocchio.",
         _of("gauss", "mobility assembly_modes equilibrium equilibria StaticEquilibrium linearise LinearModel LinearModes")
         + _of("gauss", "derivatives crosscheck paradoxes resolve_overlaps friction_problem sensitivities Sensitivities")
-        + _of("gauss", "motion_gradient MotionGradient root_locus RootLocus mode_motion prepare_linear_model")
+        + _of("gauss", "motion_gradient MotionGradient root_locus RootLocus modes mode_motion prepare_linear_model")
         + _of("gauss", "torch_dynamics torch_motion jax_dynamics jax_motion"),
     ),
     Group(

@@ -172,7 +172,13 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
 
         general = replace(plan, dynamics=plan.fallback)
         further = to_roundoff if once is refined_once else partial(compiled, system, laws, general)
-        entry, rows = written(once, interface, traced), batched(once, interface, traced)
+
+        def single():
+            from gauss.dynamics.chain_lanes import in_chain_lanes
+
+            return in_chain_lanes(system, laws, once, sizes, NAME) or traced()
+
+        entry, rows = written(once, interface, single), batched(once, interface, traced)
         return fastcall(entry, interface, TieredFunction(last, further), NAME, DOC, rows)
 
     def written(what: Callable, interface: Interface, trace: Callable[[], Function | NativeFunction]) -> EntryCode:

@@ -8,8 +8,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 
+import numpy as np
+
 from gauss.codegen import callbacks_are_available
+from gauss.dynamics.composite_bodies import CompositeBodies
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.rnea import KinematicTree
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError
@@ -17,7 +21,7 @@ from gauss.integrators import ExplicitPair, FixedStep
 from gauss.scene import ClosedGap, Collider, Contact, Points
 from gauss.scene.contact_pairs import have_closed_form
 from gauss.scene.patch_distances import no_closed_form
-from gauss.system import System, build, phase_scene, sides
+from gauss.system import System, build, phase_scene, sides, whole
 from gauss.system.contact_gaps import of_shapes, slips
 from gauss.system.elimination_cost import MOST_WORK
 
@@ -44,6 +48,7 @@ CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordi
     ("Box", "HalfSpace"): 635,
     ("Box", "Box"): 42_787,
 }
+LEAST_EIGENVALUE = 1e-9  # of a mass matrix with a diagonal of ones: smaller ones are rounding
 MOST_CLOSED_GAPS = 24  # of a phase up to which its code is made before its first evaluation: that of more takes seconds
 WIDEST_MECHANISM = 128  # rates up to which the mass matrix of a mechanism is dense straight-line code
 MOST_ROWS = (
@@ -215,9 +220,18 @@ def few_closed_gaps(ask: Question) -> list[str]:
     return [f"{closed} closed gaps are more than {most}"] if closed > most else []
 
 
-def inertia_in_all_directions(ask: Question) -> list[str]:
-    """Every body has inertia in all directions: without it machine code may divide by zero, and numpy solves what it can."""
-    return ["a body has no inertia in some direction"] if not ask.system.Phi.all() else []
+def definite_mass_matrix(ask: Question) -> list[str]:
+    """The mass matrix of the tree is positive definite at the reference pose: else machine code may divide by zero."""
+    system = ask.system
+    if system.Phi.all():
+        return []
+    at_rest = np.zeros(system.n_v)
+    tree = KinematicTree(whole(system), system.reference.q, at_rest)
+    moved = np.concatenate([np.r_[tree.subsystem.joints[edge.constraint].v] for edge in tree.edges])
+    M = CompositeBodies(tree, at_rest).mass_matrix()[np.ix_(moved, moved)].astype(float)
+    size = np.sqrt(np.abs(np.diag(M)))
+    is_definite = size.all() and np.linalg.eigvalsh(M / np.outer(size, size))[0] > LEAST_EIGENVALUE
+    return [] if is_definite else ["a body has no inertia in a direction in which it moves"]
 
 
 def few_contact_operations(ask: Question) -> list[str]:

@@ -13,17 +13,14 @@ class EmbeddedProgram(Program):
     before.
     """
 
+    has_full_rank = True
+
     @cached_property
     def elimination(self) -> Embedding:
         """That whose fronts are regular."""
         return embedding_of(self.pattern)
 
-    @cached_property
-    def has_full_rank(self) -> bool:
-        """Whether no row is redundant."""
-        return not any(self.elimination.dependent)
-
     @property
     def may_lose_rank(self) -> bool:
         """Whether fronts without hubs tell where the loop constraints lose rank."""
-        return super().may_lose_rank and self.shared.monitors
+        return self.projects and self.shared.monitors

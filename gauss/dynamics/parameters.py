@@ -86,6 +86,18 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
     return changed(system, dict(zip(SYSTEM_FIELDS, moved, strict=True)) | others)
 
 
+def count(thing) -> int:
+    """Number of numbers of a part of a system."""
+    sizes = []
+
+    def take(array: np.ndarray) -> np.ndarray:
+        sizes.append(array.size)
+        return array
+
+    _mapped(thing, take, lambda word: None)
+    return sum(sizes)
+
+
 def _laws(load) -> tuple[Callable, ...]:
     if isinstance(load, Drive):
         return (as_function(load.effort),)

@@ -39,6 +39,7 @@ from gauss.dynamics.conditions import (
     closed_form_contacts,
     compilable,
     contacts_alone,
+    definite_mass_matrix,
     explicit,
     few_bodies,
     few_closed_gaps,
@@ -47,7 +48,6 @@ from gauss.dynamics.conditions import (
     few_loops,
     has_contacts,
     has_opaque_laws,
-    inertia_in_all_directions,
     large_loops,
     large_tree,
     named,
@@ -227,7 +227,7 @@ def _refused_state(ask: Question, why: str) -> str:
 
 
 _ACTIVE_SET = contacts_alone, smooth(compilable), smooth(traced_laws)
-_AT_ONCE = *_ACTIVE_SET, smooth(inertia_in_all_directions)
+_AT_ONCE = *_ACTIVE_SET, smooth(definite_mass_matrix)
 # Active set of frictionless contacts; "tiered": by numpy first, compiled above a threshold of evaluations.
 CONTACTS = RuleTable(
     (
@@ -244,7 +244,7 @@ MODES = RuleTable(
             "events",
             "compiled",
             "certified",
-            conditions=(own_backend, compilable, few_closed_gaps, inertia_in_all_directions),
+            conditions=(own_backend, compilable, few_closed_gaps, definite_mass_matrix),
         ),
         Rule("events", "tiered", "certified", conditions=(own_backend, compilable)),
         Rule("events", "certified"),

@@ -19,8 +19,8 @@ from gauss.rotors import RotorMotion
 from gauss.scene.toml import from_tables
 from gauss.servo import Tracking
 from gauss.simulation import Rollout, Trajectory
+from gauss.simulation.motion_records import Event, Stats
 from gauss.simulation.provenance import library
-from gauss.simulation.trajectory import Event, Stats
 from gauss.system import System
 
 MAKERS: dict[type, Callable] = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}

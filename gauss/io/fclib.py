@@ -4,7 +4,6 @@ Acary, Brémond, Koziara, Pérignon, FCLIB: a collection of discrete 3D friction
 Matrices are compressed columns, as in CSparse; the solution is the group "solution". Needs pip install h5py.
 """
 
-from importlib import import_module
 from os import PathLike
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
 from gauss.dynamics.contact.friction_problem import FrictionProblem
-from gauss.errors import ArgumentError, FileError, MissingPackageError, require
+from gauss.errors import ArgumentError, FileError, extra, require
 
 COLUMNS, ROWS = -1, -2  # of "nz": compressed columns, or rows; else the number of triplets
 ENTRIES = "p", "i", "x"
@@ -130,7 +129,6 @@ def _names(local, count: int) -> tuple[str, ...]:
 
 
 def _h5py():
-    try:
-        return import_module("h5py")
-    except ImportError as error:
-        raise MissingPackageError("contact problems of FCLIB need h5py; pip install h5py.") from error
+    with extra("results"):
+        import h5py
+    return h5py

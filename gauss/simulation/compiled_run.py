@@ -23,11 +23,12 @@ from gauss.errors import GaussError, SimulationError
 from gauss.integrators import ExplicitPair, FixedStep, Point, Rates, Taylor
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.compiled_steps.taylor_step import compensation_size
+from gauss.simulation.motion_records import EnergyRecord, Event, Stats
 from gauss.simulation.prescribed import AfterJump, crossed
 from gauss.simulation.problem import Problem
 from gauss.simulation.progress import Progress
 from gauss.simulation.step_limits import BUDGET, smallest_step
-from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
 recorded_energies = attrgetter(*ENERGY_RECORD)

@@ -11,8 +11,9 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep
 from gauss.simulation.grid import grid
+from gauss.simulation.motion_records import Stats
 from gauss.simulation.problem import Problem
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
 
 

@@ -20,9 +20,10 @@ from gauss.dynamics.laws.switching_functions import constraint_watch
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import GaussError, SimulationError
 from gauss.simulation.brent import brent
+from gauss.simulation.motion_records import Event
 from gauss.simulation.prescribed import booked, of_impact
 from gauss.simulation.problem import Problem
-from gauss.simulation.trajectory import Event, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
 BEYOND = 1e-12  # relative to the size of a condition: a state that is no further beyond its surface lies on it

@@ -20,7 +20,8 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.store import cached_on_disk
 from gauss.errors import BalanceWarning, require, user_level
 from gauss.simulation.advice import advice
-from gauss.simulation.trajectory import MANY, EnergyRecord, Trajectory
+from gauss.simulation.motion_records import EnergyRecord
+from gauss.simulation.trajectory import MANY, Trajectory
 from gauss.system import State, System, coordinate_units, rate_units
 
 WRONG = 1e-3  # residual relative to the largest energy above which a motion is taken to be wrong

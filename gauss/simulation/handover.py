@@ -8,8 +8,9 @@ from gauss.codegen.kernels import LoopStatus
 from gauss.errors import SimulationError
 from gauss.integrators import Point
 from gauss.simulation.compiled_run import CompiledRun
+from gauss.simulation.motion_records import Stats
 from gauss.simulation.step_limits import unsolved
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
 

@@ -14,9 +14,10 @@ from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import Library, LibrarySolution, Tolerance
+from gauss.simulation.motion_records import Event, Stats
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.problem import Problem
-from gauss.simulation.trajectory import Event, Stats, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, coordinate_rates
 
 

@@ -21,12 +21,13 @@ from gauss.errors import SimulationError, SwitchingWarning, user_level
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System
 
+CONTINUOUS = "let prescribed velocities be continuous, and prescribed positions smooth"  # a remedy
 HORIZON = 10_000  # steps of a stepping object, which has no end, in which switching is looked for at once
 RESOLVING_STEPS = 2.0  # steps that a feature of a law of time must last
 BESIDE = np.array([-2.0, -1.0, 1.0, 2.0])  # places of samples beside a switching time, in distances of ends of steps
 
 
-def smooth_timetable(system: System, laws: Laws, start: State, end: float, remedy: str) -> Timetable:
+def smooth_timetable(system: System, laws: Laws, start: State, end: float, remedy: str = CONTINUOUS) -> Timetable:
     """Switching times and mesh of laws of time, for steps without impacts.
 
     Parameters
@@ -39,7 +40,7 @@ def smooth_timetable(system: System, laws: Laws, start: State, end: float, remed
         State at the start.
     end : float
         End of the steps [s].
-    remedy : str
+    remedy : str, optional
         What to do about a jump.
 
     Raises

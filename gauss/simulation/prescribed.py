@@ -10,7 +10,8 @@ from gauss.dynamics.contact.impact import Impact
 from gauss.dynamics.laws.prescribed_jumps import Jumps
 from gauss.dynamics.laws.switching import Switching
 from gauss.errors import SimulationError
-from gauss.simulation.trajectory import Event, Trajectory
+from gauss.simulation.motion_records import Event
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
 

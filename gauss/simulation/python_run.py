@@ -27,6 +27,7 @@ from gauss.integrators import (
     first_step,
 )
 from gauss.simulation.grid import grid_of
+from gauss.simulation.motion_records import Event, Stats
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.progress import Progress
 from gauss.simulation.step_limits import (
@@ -39,7 +40,7 @@ from gauss.simulation.step_limits import (
     smallest_step,
     too_small,
 )
-from gauss.simulation.trajectory import Event, Stats, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.undetected_switching import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
 from gauss.system import State, System
 

@@ -6,7 +6,6 @@ from functools import cached_property
 from importlib import import_module
 from numbers import Integral
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,113 +16,10 @@ from gauss.dynamics.outputs import FORCES, INERTIAL, OF_JOINTS, joint_forces, me
 from gauss.dynamics.rules import Plan
 from gauss.errors import StateError, did_you_mean
 from gauss.shapes import Shaped
+from gauss.simulation.motion_records import EnergyRecord, Event, Stats
 from gauss.system import State, System
 
 MANY = 300  # samples above which machine code is compiled: numpy takes about as long for so many
-
-
-class Stats(NamedTuple):
-    """Statistics of a simulation.
-
-    Attributes
-    ----------
-    evaluations, steps, rejected : int
-        Evaluations of the accelerations, accepted and rejected steps.
-    factorisations : int
-        Matrices factored for the equations of implicit methods.
-    wall_time : float
-        Time taken [s].
-    worst_error : float
-        Largest relative error of the accelerations, from checks and certificates.
-    method : str
-        Source of the accelerations.
-    rescued : int
-        Solutions for which the first solver failed, and another one was certified.
-    global_error : tuple of float, optional
-        Largest error of coordinates [rad, m] and of rates [rad/s, m/s] in any sample, estimated on request.
-    unseen : int
-        Steps that may have passed a condition of a law undetected.
-    opaque : str
-        Names of loads with opaque laws that were evaluated too seldom to detect short features.
-    plan : Plan or None
-        Driver and dynamics of the motion.
-    handed_over : float or None
-        Time from which the fallback of the plan continued [s]; None if it was not needed.
-    """
-
-    evaluations: int
-    steps: int
-    rejected: int
-    factorisations: int
-    wall_time: float
-    worst_error: float
-    method: str
-    rescued: int = 0
-    global_error: tuple[float, float] | None = None
-    unseen: int = 0
-    opaque: str = ""
-    plan: Plan | None = None
-    handed_over: float | None = None
-
-
-@dataclass(frozen=True)
-class Event:
-    """Impact, or change of the contact mode: of closed unilateral constraints and of sticking elements.
-
-    Parameters
-    ----------
-    t : float
-        When [s].
-    kind : str
-        "impact": a gap closes with a velocity, or a prescribed velocity jumps; "opens" or "closes" without impact; "slips"
-        or "holds" of joint friction and limited drives; "power reversal", "starts", "stuck" of links with losses;
-        "contact" or "separate" of backlash sides.
-    gaps : tuple of str
-        Names of the gaps or elements, and of drives and constraints whose velocity jumps.
-    loss : float
-        Kinetic energy lost, the work of prescribed motions included [J].
-    impulses : dict of str to tuple of float
-        At an impact: impulses of prescribed motions and of all other constraints beyond the joints, along each residual [N
-        s, N m s], signed as :func:`gauss.drive_forces` and :func:`gauss.constraint_forces`.
-    """
-
-    t: float
-    kind: str
-    gaps: tuple[str, ...]
-    loss: float = 0.0
-    impulses: dict[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
-
-
-class EnergyRecord(NamedTuple):
-    """Energies along a motion, for its energy balance; numbers, or arrays (batch,) of a batch.
-
-    Parameters
-    ----------
-    kinetic, lowest, highest : float
-        Largest kinetic energy, least and largest potential energy [J].
-    magnitude : float
-        Size that the rounding of the potential energy is relative to [J], see
-        :func:`gauss.dynamics.energies.look_at_energies`.
-    initial, balance, off : float
-        T + V − work + dissipated at the start; its change up to the last point, and the largest change in size [J].
-    jump, when : float
-        Largest change of the balance from one point to the next [J], and the time of the latter [s].
-    """
-
-    kinetic: float
-    lowest: float
-    highest: float
-    magnitude: float
-    initial: float
-    balance: float
-    off: float
-    jump: float
-    when: float
-
-    @property
-    def scale(self):
-        """Energy that the balance is compared with [J]."""
-        return np.maximum(self.kinetic, self.highest - self.lowest)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Regressor, base parameters, identification: Pinocchio, closed forms, true parameters, consistency, refusals."""
 
+import html
 from dataclasses import replace
 
 import numpy as np
@@ -298,3 +299,16 @@ def test_the_figure_shows_each_coordinate():
     q, v, a = samples(system)
     figure = gauss.identify(system, q, v, a, system.inverse_dynamics(q, v, a)).plot()
     assert [axes.get_ylabel() for axes in figure.axes] == [f"{name} [N m]" for name in system.coordinates]
+
+
+def test_a_report_holds_table_and_figures(tmp_path):
+    pytest.importorskip("matplotlib")
+    system = gauss.compile_scene(gauss.load("double_pendulum"))
+    q, v, a = samples(system)
+    found = gauss.identify(system, q, v, a, system.inverse_dynamics(q, v, a))
+    text = found.report(tmp_path / "found.html").read_text(encoding="utf-8")
+    assert html.escape(str(found)) in text and text.count("<svg") == text.count("</svg>") == 2
+    assert "<?xml" not in text and "src=" not in text
+    for path in (tmp_path / "found.pdf", tmp_path / "nowhere" / "found.html", 3):
+        with pytest.raises(ArgumentError, match="report"):
+            found.report(path)

@@ -16,6 +16,7 @@ from tests.support import mechanisms
 STEP = 1e-5  # of central differences, in units of the scene
 DIFFERENCES = 1e-6  # relative to the largest entry of A: truncation h² and round-off ε / h
 EXACT = 1e-9  # closed forms
+ENERGY_STEP, ENERGY_SLOPE = 1e-3, 1e-5  # of second differences of energies, and what they leave: h², and round-off over h²
 RICCATI = 1e-8  # gains by two solvers of the Riccati equation, relative
 SCENES = {
     "open": lambda: gauss.load("double_pendulum"),
@@ -99,9 +100,48 @@ def test_freedoms_of_a_loop_with_redundant_rows_are_counted_once():
     assert model.A.shape == (2, 2)
 
 
+@pytest.mark.parametrize("name", ["pendulum", "four_bar", "bricard"])
+def test_modes_are_those_of_the_state_of_rest(name):
+    """ω² = V″ / M of one freedom, by energies along it."""
+    scene = gauss.load(name)
+    found, rest = gauss.modes(scene), gauss.equilibrium(scene)
+    system, N = rest.model.system, rest.model.displacements
+
+    def energy(share):
+        q = rest.state.q + share * ENERGY_STEP * N[:, 0]
+        return system.potential_energy(project_positions(system, replace(rest.state, q=q), 40, tuple(free)).q)
+
+    free = [list(system.coordinates).index(rest.model.states[0])]
+    slope = (energy(1) + energy(-1) - 2.0 * energy(0)) / ENERGY_STEP**2
+    M = N[:, 0] @ system.mass_matrix(rest.state.q) @ N[:, 0]
+    square = float(np.squeeze(slope)) / M
+    assert found.eigenvalues**2 == pytest.approx(np.full(len(found.eigenvalues), -square), rel=ENERGY_SLOPE)
+    assert gauss.modes(system, rest.state).shapes == pytest.approx(found.shapes)
+
+
+def test_what_sticks_binds_rates():
+    """A double pendulum whose upper joint sticks: the lower one swings as a pendulum about it."""
+    scene = gauss.load("double_pendulum")
+    scene.starts.clear()
+    stuck = replace(scene, set_valued=dict(scene.set_valued))
+    stuck.joint_friction("A", 1e3)
+    start = gauss.compile_scene(scene).state([-0.4, 0.4 - np.pi / 2.0], np.zeros(2))
+    model = gauss.linearise(stuck, start)
+    assert model.states == ("A", "B", "B rate") and model.is_equilibrium
+    assert gauss.linearise(stuck, start, independent=["B", "A"]).states == ("B", "A", "B rate")
+    body = scene.bodies["lower"]
+    arm, inertia = np.linalg.norm(body.com), body.inertia[2] + body.mass * np.linalg.norm(body.com) ** 2
+    weight = body.mass * abs(scene.gravity[1]) * arm / inertia
+    assert np.sort(np.abs(model.eigenvalues)) == pytest.approx([0.0, np.sqrt(weight), np.sqrt(weight)], rel=EXACT)
+    assert model.A[2] == pytest.approx([-weight, -weight, 0.0])
+
+
 def test_rolling_binds_rates_alone():
     model = gauss.linearise(gauss.load("rolling_disk"))
     assert len([one for one in model.states if one.endswith(" rate")]) == 3 and len(model.states) == 8
+    given = gauss.linearise(gauss.load("rolling_disk"), independent=model.states[:5])
+    assert given.states[:5] == model.states[:5] and len(given.states) == 8
+    assert np.sort_complex(given.eigenvalues) == pytest.approx(np.sort_complex(model.eigenvalues), abs=1e-6)
 
 
 def test_a_pole_is_balanced_by_the_regulator_of_its_linear_model():
@@ -154,6 +194,9 @@ def test_outputs_are_slopes_of_what_is_measured():
         (lambda s: gauss.linearise(s, inputs=["rial"]), StateError, "rail"),
         (lambda s: gauss.linearise(s, outputs=["pin rates"]), StateError, "pin rate"),
         (lambda s: gauss.linearise(s, independent=["rail"]), StateError, "2 coordinates"),
+        (lambda s: gauss.linearise(s, independent=3), ArgumentError, "independent: expected names"),
+        (lambda s: gauss.modes("cart_pole"), ArgumentError, "modes: expected a System or Scene"),
+        (lambda s: gauss.modes(s, s.initial_state(), t=1.0), ArgumentError, "time of its own"),
         (lambda s: gauss.equilibrium(s, keep=["nothing"]), StateError, "nothing"),
         (lambda s: gauss.equilibrium(s, loads={"rial": 1.0}), StateError, "rail"),
         (lambda s: gauss.equilibrium(s, loads={"rail": 1.0}), SimulationError, "'rail' still accelerates"),

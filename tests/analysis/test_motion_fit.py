@@ -209,9 +209,11 @@ def test_events_without_derivatives_are_refused_by_name():
         gauss.fit_motion(scene, [0.0, 0.1], {"flight.x": [0.0, 0.0]}, ["body.mass"], step=0.01)
 
 
-def test_the_figure_shows_each_column():
+def test_the_figure_shows_each_column(tmp_path):
     pytest.importorskip("matplotlib")
     scene = gauss.load("pendulum")
     t, measured = motion(scene, 0.5, ("A", "A rate"), 11)
-    figure = gauss.fit_motion(scene, t, measured, ["gravity.y"], step=0.05).plot()
-    assert [axes.get_ylabel() for axes in figure.axes[::2]] == ["A", "A rate"]
+    found = gauss.fit_motion(scene, t, measured, ["gravity.y"], step=0.05)
+    assert [axes.get_ylabel() for axes in found.plot().axes[::2]] == ["A", "A rate"]
+    text = found.report(tmp_path / "fit.html").read_text(encoding="utf-8")
+    assert "gravity.y" in text and text.count("<svg") == 2

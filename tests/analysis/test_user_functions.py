@@ -61,6 +61,7 @@ def welded() -> gauss.System:
 
 MOTIONLESS = (
     gauss.linearise,
+    gauss.modes,
     gauss.equilibrium,
     gauss.equilibria,
     gauss.advise,

@@ -1,6 +1,8 @@
+import ctypes
 import shutil
 import subprocess
 import zipfile
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,11 +13,13 @@ from gauss.errors import ArgumentError, SceneError, SimulationError
 from gauss.export.fmu.model_description import variables
 from gauss.scene import actuators
 from gauss.scene.named_numbers import scene_of, value_of
+from gauss.system import coordinate_rates
 from tests.support.files import call
 
 COMPILER = shutil.which("cc")
 pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 ACCURACY = 1e-5  # of motions of two integrators with tolerances of 1e-8, relative to the largest value
+ROUND_OFF = 1e-14  # of rates, relative to the largest
 SPAN = 0.4
 
 
@@ -67,6 +71,32 @@ def test_units_move_as_the_scene_does(name, kind, tmp_path):
     wanted = gauss.simulate(system, SPAN, progress=False, **held)
     expected = np.concatenate([wanted.q[-1], wanted.v[-1]])
     np.testing.assert_allclose(list(found[-1])[1:], expected, rtol=0.0, atol=ACCURACY * np.abs(expected).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_rates_of_a_unit_are_our_accelerations(name, tmp_path):
+    """Called as an importer does, without one: instantiate, set time and states, get the derivatives of the states."""
+    system, rng = gauss.compile_scene(SCENES[name]()), np.random.default_rng(1)
+    with zipfile.ZipFile(export.to_fmu(system, tmp_path, "unit")) as archive:
+        archive.extractall(tmp_path)
+    token = ElementTree.parse(tmp_path / "modelDescription.xml").getroot().get("instantiationToken")
+    library = ctypes.CDLL(str(next((tmp_path / "binaries").rglob("unit.*"))))
+    library.fmi3InstantiateModelExchange.restype = ctypes.c_void_p
+    given = [b"unit", token.encode(), b"", ctypes.c_bool(False), ctypes.c_bool(False), None, None]
+    unit = ctypes.c_void_p(library.fmi3InstantiateModelExchange(*given))
+    size, array = ctypes.c_size_t(system.n_q + system.n_v), (ctypes.c_double * (system.n_q + system.n_v))
+    start = system.initial_state()
+    for t in (0.0, 0.3, 0.7):
+        q = gauss.system.retract(system, start.q, 0.2 * rng.normal(size=system.n_v))
+        state = system.projected(system.state(q, start.v + rng.normal(size=system.n_v), t))
+        found = array()
+        assert library.fmi3SetTime(unit, ctypes.c_double(t)) == 0
+        assert library.fmi3SetContinuousStates(unit, array(*state.q, *state.v), size) == 0
+        assert library.fmi3GetContinuousStateDerivatives(unit, found, size) == 0
+        expected = np.concatenate([coordinate_rates(system, state.q, state.v), system.accelerations(state)])
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=ROUND_OFF * np.abs(expected).max())
+    library.fmi3FreeInstance(unit)
 
 
 @pytest.mark.peer

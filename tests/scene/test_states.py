@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 from scipy.linalg import expm
 
 import gauss
@@ -143,16 +143,46 @@ def test_actuators_move_as_their_equations(make):
 def test_states_go_with_loops_and_contacts():
     scene = gauss.load("four_bar")
     actuators.low_pass(scene, "slow", lambda t, at: at.rate("A"), 0.1, start=0.5)
-    trajectory = gauss.simulate(scene, SPAN, **TIGHT)
+    fine = np.linspace(0.0, SPAN, 2001)
+    trajectory = gauss.simulate(scene, SPAN, times=fine, **TIGHT)
     rate, slow = trajectory.rate("A"), trajectory.rate("slow")
-    t = trajectory.t
-    fine = np.linspace(0.0, SPAN, 20_001)
-    known = np.interp(fine, t, rate)
-    exact = 0.5 * np.exp(-SPAN / 0.1) + np.trapezoid(known * np.exp((fine - SPAN) / 0.1) / 0.1, fine)
-    assert abs(slow[-1] - exact) < 1e-3 * np.abs(rate).max()
+    exact = 0.5 * np.exp(-SPAN / 0.1) + simpson(rate * np.exp((fine - SPAN) / 0.1) / 0.1, x=fine)
+    assert abs(slow[-1] - exact) <= ACCURACY * np.abs(rate).max()
     stopped = gauss.load("double_pendulum_stops")
     actuators.low_pass(stopped, "slow", lambda t, at: at.rate("A"), 0.1)
     assert np.isfinite(gauss.simulate(stopped, SPAN).rate("slow")[-1])
+
+
+def test_a_motor_turns_a_linkage_with_the_power_that_it_takes():
+    """∫ (u − R i) i dt is the energy of the winding and of the four-bar: k i q̇ leaves the one and enters the other."""
+    scene, fine = gauss.load("four_bar"), np.linspace(0.0, SPAN, 2001)
+    actuators.dc_motor(scene, "m", "A", VOLTAGE, resistance=RESISTANCE, inductance=INDUCTANCE, constant=CONSTANT, ratio=20.0)
+    found = gauss.simulate(scene, SPAN, times=fine, **TIGHT)
+    i, energy = found.rate("m current"), gauss.energy(found)
+    stored = 0.5 * INDUCTANCE * i[-1] ** 2 + (energy.kinetic + energy.potential)[-1] - (energy.kinetic + energy.potential)[0]
+    taken = simpson((VOLTAGE - RESISTANCE * i) * i, x=fine)
+    assert abs(taken - stored) <= ACCURACY * max(np.abs(energy.kinetic).max(), abs(taken))
+
+
+@pytest.mark.slow
+def test_a_linear_model_of_a_linkage_with_a_motor():
+    """The rates of the crank and of the current at a rest of both, by differences along the loop."""
+    scene = gauss.load("four_bar")
+    scene.starts.clear()
+    actuators.dc_motor(scene, "m", "A", 0.0, resistance=RESISTANCE, inductance=INDUCTANCE, constant=CONSTANT)
+    bare = gauss.load("four_bar")
+    bare.starts.clear()
+    rest = gauss.equilibria(bare)[0]
+    system = gauss.compile_scene(scene)
+    q = np.zeros(system.n_q)
+    q[[system.column(name) for name in rest.model.system.coordinates]] = rest.state.q
+    model = gauss.linearise(system, system.state(q, np.zeros(system.n_v)), independent=["A", "m current"])
+    alone = gauss.linearise(bare, rest.state, inputs=["A"], independent=["A"])
+    assert model.states == ("A", "A rate", "m current") and model.is_equilibrium
+    wanted = np.zeros((3, 3))
+    wanted[:2, :2], wanted[1, 2] = alone.A, CONSTANT * alone.B[1, 0]
+    wanted[2, 1:] = -CONSTANT / INDUCTANCE, -RESISTANCE / INDUCTANCE
+    np.testing.assert_allclose(model.A, wanted, atol=1e-9 * np.abs(wanted).max())
 
 
 def test_what_is_refused():

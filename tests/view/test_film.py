@@ -110,11 +110,18 @@ def test_contact_forces_bear_what_stands():
     assert not any(place.closed[-1] or place.forces[-1].any() for place in touches(flying, resampled(flying, 5), 0.4))
 
 
-def test_the_command_line_writes_films(tmp_path):
+OF_A_SCENE = {
+    "pendulum": ("--trace", "rod"),
+    "block_on_incline": ("--integrator", "time_stepping", "--step", "0.01"),  # friction of contacts
+}
+
+
+@pytest.mark.parametrize("scene", OF_A_SCENE)
+def test_the_command_line_writes_films(tmp_path, scene):
     from typer.testing import CliRunner
 
     from gauss.cli import app
 
-    path = tmp_path / "pendulum.gif"
-    result = CliRunner().invoke(app, ["show", "pendulum", "--duration", "0.1", "--gif", str(path), "--trace", "rod"])
+    path = tmp_path / f"{scene}.gif"
+    result = CliRunner().invoke(app, ["show", scene, "--duration", "0.1", "--gif", str(path), *OF_A_SCENE[scene]])
     assert result.exit_code == 0 and path.exists() and f"film written to {path}" in result.output.replace("\n", "")

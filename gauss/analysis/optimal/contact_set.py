@@ -105,9 +105,30 @@ class ContactSet:
                 found.append((contact.friction * normal) ** 2 - across @ across)
         return found
 
+    @property
+    def gap_labels(self) -> tuple[tuple[str, float], ...]:
+        """What its gap functions are in messages, and their units [m, rad]."""
+        return tuple((f"the gap of {name!r}", scale) for name, scale in zip(self.names, self.scales, strict=True))
+
+    @property
+    def force_labels(self) -> tuple[tuple[str, float], ...]:
+        """What :meth:`admissible` gives in messages, and its units [N, N m; of cones their square]."""
+        found = []
+        for k, name, scale in zip(self.places, self.names, self.scales, strict=True):
+            unit, contact = self.whole.scale.energy / scale, self.sides[k].whole
+            found.append((f"the force of {name!r}", unit))
+            if isinstance(contact, Contact) and contact.friction:
+                found.append((f"the cone of friction of {name!r}", unit**2))
+        return tuple(found)
+
+    @cached_property
+    def opened(self) -> "ContactSet":
+        """All gaps that are not closed."""
+        return ContactSet(self.whole, [side.name for side in self.sides]).less(self)
+
     def open_gaps(self, equations: OptimalEquations) -> Casadi | None:
         """(t, x, u) → all gaps that are not closed; None if there are none."""
-        opened = ContactSet(self.whole, [side.name for side in self.sides]).less(self)
+        opened = self.opened
         return equations.in_units(lambda t, q, v, _: opened.widths(t, q, v), "gaps") if opened.names else None
 
     def forces(self, equations: OptimalEquations) -> Casadi | None:

@@ -51,7 +51,7 @@ def optimal_hybrid_motion(
     """Motion of least cost through given phases, in each of which other stops, ropes and contacts are closed.
 
     The collocation of :func:`gauss.optimal_motion` in all phases at once, with free times of the events. Open gaps are not
-    negative at the collocation points; forces of closed ones push, and keep within the cones of friction. Between two phases
+    negative; forces of closed ones push, and keep within the cones of friction. Between two phases
     Gauss's principle for velocities gives the rates after the impact of the gaps that close.
 
     Parameters
@@ -78,6 +78,11 @@ def optimal_hybrid_motion(
     -------
     HybridMotion
         States, inputs, cost, errors, and each phase by itself. It is a local optimum, near the guesses.
+
+    Warns
+    -----
+    LimitWarning
+        If a limit, a gap or a force is beyond it between the points of the last mesh, with the size of the excess.
 
     Raises
     ------
@@ -132,6 +137,7 @@ def _joined(phases: Sequence[OptimalMotion]) -> HybridMotion:
         first.residual,
         max(one.mesh_error for one in phases),
         max(one.simulation_error for one in phases),
+        max(one.limit_error for one in phases),
         first.iterations,
         tuple((sum(count for count, _ in own), max(error for _, error in own)) for own in each),
         tuple(phases),

@@ -11,7 +11,6 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.simulation.passed_switching import smooth_timetable, warn_of_features
 from gauss.system import State, System
 
-REMEDY = "let prescribed velocities be continuous, and prescribed positions smooth"
 MOST_PLACES = 20  # of an interval: more switching times and cells of a law are left to the check of the result
 NEAR = 0.01  # of an equal interval: a mesh point nearer to a switching time gives way to it
 
@@ -28,7 +27,7 @@ def law_mesh(system: System, start: State, span: tuple[float, float], intervals:
     if duration != longest:
         return equal
     begin, end = start.t, start.t + duration
-    times = smooth_timetable(system, Laws(system), start, end, REMEDY)
+    times = smooth_timetable(system, Laws(system), start, end)
     places = (np.array([0.5 * (before + after) for before, after in times.stops(begin, end)[:-1]]) - begin) / duration
     if not places.size or places.size > MOST_PLACES * intervals:
         return equal
@@ -50,7 +49,7 @@ def warn_of_passed(system: System, start: State, t: np.ndarray):
     SimulationError
         If a prescribed position or velocity jumps.
     """
-    times = smooth_timetable(system, Laws(system), start, float(t[-1]), REMEDY)
+    times = smooth_timetable(system, Laws(system), start, float(t[-1]))
     edges = distinct(np.clip(np.concatenate([t[[0, -1]], times.switches, times.mesh]), t[0], t[-1]))
     if edges.size < 3:
         return

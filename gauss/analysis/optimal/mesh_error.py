@@ -16,6 +16,7 @@ from gauss.integrators import Rates
 from gauss.system import State
 
 SUBSTEPS = 16  # of an interval: the error of order 4 is 65 000 times smaller than with one step
+MOST_PARTS = 4  # of an interval, from one mesh to the next
 MARGIN = 4.0 * APART  # relative to the times: no evaluation falls upon a switching time at an end of the interval
 
 
@@ -41,12 +42,12 @@ class LinearInputStep(MotionStep):
         return Rates(LoadedMechanism(self.system, loads, state.t, state.q, state.v, still).motion()[0], np.zeros(3))
 
     def interval(self, t: float, h: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """(q, v) at the end of an interval, from inputs u (2, n_u) at its ends."""
+        """(q, v) at the start and after each part (SUBSTEPS + 1, n_x) of an interval, from inputs u (2, n_u) at its ends."""
         given, margin = np.concatenate([[t], u[0], (u[1] - u[0]) / h]), MARGIN * max(abs(t), abs(t + h))
-        begin, step = t + margin, (h - 2.0 * margin) / SUBSTEPS
+        begin, step, found = t + margin, (h - 2.0 * margin) / SUBSTEPS, [x]
         for k in range(SUBSTEPS):
-            x = self.move(np.concatenate([[begin + k * step, step], x, given]))
-        return x
+            found.append(self.move(np.concatenate([[begin + k * step, step], found[-1], given])))
+        return np.array(found)
 
 
 class MeshError:
@@ -66,8 +67,8 @@ class MeshError:
         """Its compiled step."""
         return LinearInputStep(self.equations)
 
-    def of_intervals(self, t: np.ndarray, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Error (n,) of each interval from its own start, the largest of all coordinates and rates in their units.
+    def moved(self, t: np.ndarray, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """States (n, SUBSTEPS + 1, n_q + n_v) along each interval from its own start.
 
         Parameters
         ----------
@@ -78,20 +79,40 @@ class MeshError:
         u : ndarray, shape (n, 2, n_u)
             Inputs at the ends of the intervals.
         """
-        ends = [self.step.interval(t[k], t[k + 1] - t[k], x[k], u[k]) for k in range(len(u))]
-        return np.abs((np.array(ends) - x[1:]) / self.equations.units).max(axis=1)
+        return np.array([self.step.interval(t[k], t[k + 1] - t[k], x[k], u[k]) for k in range(len(u))])
+
+    def of_intervals(self, moved: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Error (n,) of each interval whose states are moved, the largest of all coordinates and rates in their units."""
+        return np.abs((moved[:, -1] - x[1:]) / self.equations.units).max(axis=1)
 
     def simulated(self, t: np.ndarray, start: np.ndarray, u: np.ndarray) -> np.ndarray:
         """States (n + 1, n_q + n_v) of a motion from the start under the inputs."""
         found = [start]
         for k in range(len(u)):
-            found.append(self.step.interval(t[k], t[k + 1] - t[k], found[-1], u[k]))
+            found.append(self.step.interval(t[k], t[k + 1] - t[k], found[-1], u[k])[-1])
         return np.array(found)
 
 
-def refined(mesh: np.ndarray, errors: np.ndarray, tolerance: float, order: int) -> np.ndarray:
-    """Mesh whose intervals have errors below a tolerance: error ∝ h^(order + 1); an interval makes at most four."""
-    counts = np.ceil((errors / (0.5 * tolerance)) ** (1.0 / (order + 1)))
-    parts = np.where(errors > tolerance, np.clip(counts, 2, 4), 1).astype(int)
-    pieces = [np.linspace(a, b, m, endpoint=False) for a, b, m in zip(mesh[:-1], mesh[1:], parts, strict=True)]
+def refined(mesh: np.ndarray, errors: np.ndarray, excess: np.ndarray, tolerance: float, order: int) -> np.ndarray:
+    """Mesh with smaller errors and excesses over limits; an interval makes at most four.
+
+    Parameters
+    ----------
+    mesh : ndarray, shape (n + 1,)
+        Mesh from 0 to 1.
+    errors, excess : ndarray, shape (n,)
+        Error of each interval, ∝ h^(order + 1), and what it is beyond limits by, ∝ h²; zero where it is small enough.
+    tolerance : float
+        Largest error and excess.
+    order : int
+        Order of the collocation.
+    """
+    counts = np.maximum(*(_parts(*one, tolerance) for one in ((errors, order + 1), (excess, 2))))
+    pieces = [np.linspace(a, b, m, endpoint=False) for a, b, m in zip(mesh[:-1], mesh[1:], counts, strict=True)]
     return np.concatenate([*pieces, mesh[-1:]])
+
+
+def _parts(sizes: np.ndarray, power: int, tolerance: float) -> np.ndarray:
+    """Parts of each interval, for sizes ∝ h^power."""
+    counts = np.ceil((sizes / (0.5 * tolerance)) ** (1.0 / power))
+    return np.where(sizes > tolerance, np.clip(counts, 2, MOST_PARTS), 1).astype(int)

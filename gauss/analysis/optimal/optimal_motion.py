@@ -34,7 +34,8 @@ def optimal_motion(
     """Motion of least cost from one state to another, or of a period, within limits, and the inputs that cause it.
 
     Direct collocation at Gauss–Legendre points, solved by IPOPT with the exact derivatives of CasADi; the mesh is refined
-    until each of its intervals agrees with steps of gauss. Loops are kept closed at the mesh points by multipliers.
+    until each of its intervals agrees with steps of gauss, and keeps the limits between its points, too. Loops are kept
+    closed at the mesh points by multipliers.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def optimal_motion(
     order : int
         Order of the collocation: 2, 4, 6, 8 or 10.
     tolerance : float
-        Largest error of an interval, in units of the coordinates and rates.
+        Largest error of an interval, in units of the coordinates and rates; twice of it may be beyond a limit.
     refinements : int
         Most refinements of the mesh.
     iterations : int
@@ -80,6 +81,8 @@ def optimal_motion(
 
     Warns
     -----
+    LimitWarning
+        If a limit is exceeded between the points of the last mesh, with the size of the excess.
     SwitchingWarning
         If a law of time has a feature that passes between the points of the mesh.
 

@@ -182,10 +182,11 @@ class PhaseProblems:
             return last
         return _closing((self.closed[k] | touching).system, last)
 
-    def _signed(self, k: int) -> dict[str, Casadi]:
-        """What is not negative in a phase, and at its start."""
+    def _signed(self, k: int) -> dict:
+        """What is not negative in a phase, with its names, and at its start."""
         own, equations = self.closed[k], self.equations[k]
         found = {"gaps": own.open_gaps(equations), "forces": own.forces(equations)}
+        found |= {"gap_labels": own.opened.gap_labels, "force_labels": own.force_labels}
         if (k or self.wraps) and not (own | self.struck[k]).less(self.closed[k - 1]).names:
             found["opens"] = own.pulls(equations, self.closed[k - 1])
         return found

@@ -45,6 +45,8 @@ class MotionProblem:
         Their names.
     gaps, forces : casadi.Function or None
         (t, x, u) → open gaps, and forces of the closed ones, which are not negative.
+    gap_labels, force_labels : tuple of (str, float)
+        What their values are in messages, and units of them.
     opens : casadi.Function or None
         (t, x, u) → what is not negative at the start: less the forces that gaps which open there would have if closed.
     bears : casadi.Function or None
@@ -69,6 +71,8 @@ class MotionProblem:
     forces: Casadi = None
     opens: Casadi = None
     bears: Casadi = None
+    gap_labels: tuple[tuple[str, float], ...] = ()
+    force_labels: tuple[tuple[str, float], ...] = ()
 
     @property
     def units(self) -> np.ndarray:

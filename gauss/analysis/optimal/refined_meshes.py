@@ -1,17 +1,22 @@
-"""Optimal motions on meshes that are divided until each interval agrees with steps of gauss."""
+"""Optimal motions on meshes that are divided until each interval agrees with steps of gauss, and is within the limits."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from gauss.analysis.optimal.infeasible import refuse
 from gauss.analysis.optimal.law_mesh import warn_of_passed
+from gauss.analysis.optimal.limit_excess import LimitExcess, limit_excess, warn_of_excess
 from gauss.analysis.optimal.mesh_error import MeshError, refined
-from gauss.analysis.optimal.problem import MotionProblem, MotionValues
+from gauss.analysis.optimal.problem import MotionProblem, MotionValues, Solved
 from gauss.analysis.optimal.programme import CollocationProgramme
 from gauss.analysis.optimal.result import OptimalMotion
 from gauss.errors import SimulationError
 from gauss.system import State
+
+LIMIT_REFINEMENTS = 4  # most of them that limits alone ask for: each may make the intervals there four times shorter
+LIMIT_SHARE = 2.0  # of the tolerance, within which limits are kept: the motions that are looked at have errors of it
 
 
 def on_refined_meshes(
@@ -35,30 +40,82 @@ def on_refined_meshes(
     SimulationError
         If there is no optimum, or more refinements are needed.
     """
+    checks = [MeshError(problem.equations) for problem in problems]
+    accurate, meshes, iterations = _optima(problems, checks, guesses, tolerance, refinements)
+    if not accurate:
+        worst, count = max((mesh[-1][1], mesh[-1][0]) for mesh in meshes)
+        raise SimulationError(
+            f"optimal motion: the mesh error is {worst:.1e} with {count} intervals after {refinements} "
+            "refinements; allow more refinements= or a larger tolerance=."
+        )
+    best = accurate[-1]
+    _warn_of_passed(problems, best.samples)
+    warn_of_excess(best.excess, LIMIT_SHARE * tolerance)
+    each = zip(problems, checks, meshes, strict=True)
+    return [_motion(*one, best, k, iterations) for k, one in enumerate(each)]
+
+
+def _optima(problems, checks, guesses, tolerance: float, refinements: int):
+    """Optima on meshes that are fine enough, the last one the best; intervals and error of all meshes; iterations."""
     meshes: list[list[tuple[int, float]]] = [[] for _ in problems]
-    iterations, checks = 0, [MeshError(problem.equations) for problem in problems]
-    rows = _rows(problems, guesses)
+    iterations, accurate, rows = 0, list[MeshedMotion](), _rows(problems, guesses)
     for _ in range(refinements + 1):
         solved = CollocationProgramme(problems, [guess.mesh for guess in guesses], rows).solve(guesses)
         if not solved.is_optimal:
+            if accurate:
+                break
             refuse(problems, rows, guesses, solved)
         iterations += solved.iterations
-        samples = _samples(problems, solved.values)
-        errors = [check.of_intervals(*one) for check, one in zip(checks, samples, strict=True)]
-        largest = [float(own.max()) for own in errors]
-        meshes = [[*mesh, (len(own), worst)] for mesh, own, worst in zip(meshes, errors, largest, strict=True)]
-        if max(largest) <= tolerance:
-            _warn_of_passed(problems, samples)
-            return [
-                _motion(problem, check, one, cost, (solved.kkt, solved.residual, mesh[-1][1]), iterations, tuple(mesh))
-                for problem, check, one, cost, mesh in zip(problems, checks, samples, solved.costs, meshes, strict=True)
-            ]
-        guesses = _divided(problems, solved.values, errors, tolerance)
-    worst, count = max((mesh[-1][1], mesh[-1][0]) for mesh in meshes)
-    raise SimulationError(
-        f"optimal motion: the mesh error is {worst:.1e} with {count} intervals after {refinements} "
-        "refinements; allow more refinements= or a larger tolerance=."
-    )
+        found = _checked(problems, checks, solved)
+        meshes = [[*mesh, (len(own), float(own.max()))] for mesh, own in zip(meshes, found.errors, strict=True)]
+        if found.mesh_error <= tolerance:
+            accurate.append(found)
+            if found.limit_error <= LIMIT_SHARE * tolerance or len(accurate) > LIMIT_REFINEMENTS:
+                break
+        guesses = _divided(problems, found, tolerance)
+    return accurate, meshes, iterations
+
+
+@dataclass(frozen=True)
+class MeshedMotion:
+    """Optimum on the meshes of all phases, and its check; each of the lists has an entry for each phase.
+
+    Parameters
+    ----------
+    solved : Solved
+        Answer of IPOPT.
+    samples : list of tuple of ndarray
+        Times (n + 1,), states (n + 1, n_q + n_v), and inputs (n, 2, n_u) at the ends of the intervals.
+    errors : list of ndarray
+        Error (n,) of each interval.
+    excess : list of LimitExcess
+        What it is beyond its limits by.
+    """
+
+    solved: Solved
+    samples: list[tuple[np.ndarray, ...]]
+    errors: list[np.ndarray]
+    excess: list[LimitExcess]
+
+    @property
+    def mesh_error(self) -> float:
+        """Largest error of an interval."""
+        return float(max(own.max() for own in self.errors))
+
+    @property
+    def limit_error(self) -> float:
+        """Largest excess over a limit."""
+        return max(own.largest for own in self.excess)
+
+
+def _checked(problems: Sequence[MotionProblem], checks: Sequence[MeshError], solved: Solved) -> MeshedMotion:
+    """An optimum, moved along each interval by steps of gauss."""
+    samples, errors, excess = _samples(problems, solved.values), list[np.ndarray](), list[LimitExcess]()
+    for problem, check, (t, x, u) in zip(problems, checks, samples, strict=True):
+        moved = check.moved(t, x, u)
+        errors.append(check.of_intervals(moved, x))
+        excess.append(limit_excess(problem, t, moved, u))
+    return MeshedMotion(solved, samples, errors, excess)
 
 
 def _warn_of_passed(problems: Sequence[MotionProblem], samples):
@@ -74,25 +131,26 @@ def _rows(problems: Sequence[MotionProblem], guesses: Sequence[MotionValues]) ->
     return [problem.equations.independent_rows(problem.start_time, guess.x[:, 0]) for problem, guess in pairs]
 
 
-def _divided(
-    problems: Sequence[MotionProblem], found: Sequence[MotionValues], errors: Sequence[np.ndarray], tolerance: float
-) -> list[MotionValues]:
-    """Motions on meshes whose intervals of too large an error are divided."""
-    return [
-        values.on(refined(values.mesh, own, tolerance, 2 * problem.stages), problem.stages)
-        for problem, values, own in zip(problems, found, errors, strict=True)
-    ]
+def _divided(problems: Sequence[MotionProblem], found: MeshedMotion, tolerance: float) -> list[MotionValues]:
+    """Motions on meshes whose intervals of too large an error are divided; those beyond limits once errors are small."""
+    is_accurate, guesses = found.mesh_error <= tolerance, list[MotionValues]()
+    for problem, values, errors, excess in zip(problems, found.solved.values, found.errors, found.excess, strict=True):
+        beyond = is_accurate * excess.of_intervals / LIMIT_SHARE
+        mesh = refined(values.mesh, errors, beyond, tolerance, 2 * problem.stages)
+        guesses.append(values.on(mesh, problem.stages))
+    return guesses
 
 
 def _motion(
-    problem: MotionProblem, check: MeshError, samples, cost: float, accuracy, iterations: int, meshes
+    problem: MotionProblem, check: MeshError, meshes, best: MeshedMotion, phase: int, iterations: int
 ) -> OptimalMotion:
     """Motion of a phase."""
-    (t, x, u), equations = samples, problem.equations
-    simulated = np.abs((check.simulated(t, x[0], u) - x) / equations.units).max()
+    (t, x, u), equations, solved = best.samples[phase], problem.equations, best.solved
+    simulated = float(np.abs((check.simulated(t, x[0], u) - x) / equations.units).max())
     q, v = np.split(x, [equations.system.n_q], axis=1)
-    reached = (*accuracy, float(simulated), iterations, meshes)
-    return OptimalMotion(problem.system, t, q, v, equations.names, _law(t, u), cost, *reached)
+    errors = float(best.errors[phase].max()), simulated, best.excess[phase].largest
+    accuracy = (solved.kkt, solved.residual, *errors, iterations, tuple(meshes))
+    return OptimalMotion(problem.system, t, q, v, equations.names, _law(t, u), solved.costs[phase], *accuracy)
 
 
 def _samples(problems: Sequence[MotionProblem], found: Sequence[MotionValues]) -> list[tuple[np.ndarray, ...]]:

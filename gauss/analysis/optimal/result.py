@@ -44,6 +44,9 @@ class OptimalMotion:
         Largest error of an interval against steps of gauss from its start, in shares of the units.
     simulation_error : float
         The same of the whole motion, simulated from the start with these inputs.
+    limit_error : float
+        Largest excess over a limit between the points of the mesh: of coordinates, rates, gaps and contact forces, in shares
+        of the units.
     iterations : int
         Iterations of all meshes.
     meshes : tuple of tuple
@@ -61,6 +64,7 @@ class OptimalMotion:
     residual: float
     mesh_error: float
     simulation_error: float
+    limit_error: float
     iterations: int
     meshes: tuple[tuple[int, float], ...]
 

@@ -7,7 +7,6 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.simulation.passed_switching import smooth_timetable, warn_of_features
 from gauss.system import State, System
 
-REMEDY = "let prescribed velocities be continuous, and prescribed positions smooth"
 SHORTEST = 1e-13  # of a step: what is left between a switching time and a node is rounding
 
 
@@ -39,7 +38,7 @@ def timed_steps(
     SimulationError
         If a prescribed position or velocity jumps.
     """
-    times, step = smooth_timetable(system, laws, start, float(nodes[-1]), REMEDY), float(lengths.max())
+    times, step = smooth_timetable(system, laws, start, float(nodes[-1])), float(lengths.max())
     if times.unresolved(start.t, float(nodes[-1]), step):
         warn_of_features(system.scene.name, step, "let the law vary more slowly")
     return divided(times, nodes, lengths)

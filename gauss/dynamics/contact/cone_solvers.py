@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from gauss.errors import SimulationError
+from gauss.errors import SimulationError, extra
 
 MOST_PROGRAMMES = 300  # of the fixed point
 FIXED = 1e-10  # relative: change of the tangential rates that ends it
@@ -46,7 +46,8 @@ def _cones(mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _clarabel(W: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    import clarabel
+    with extra():
+        import clarabel
     from scipy.sparse import csc_matrix, triu
 
     normals, cones = _cones(mu)
@@ -64,7 +65,8 @@ def _clarabel(W: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
 
 
 def _scs(W: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    import scs
+    with extra():
+        import scs
     from scipy.sparse import csc_matrix, triu
 
     normals, cones = _cones(mu)

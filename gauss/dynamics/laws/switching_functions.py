@@ -23,6 +23,7 @@ from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.kink_error import kink_error, kink_factor
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
 from gauss.dynamics.laws.products import Products
+from gauss.dynamics.laws.subinterval_bounds import hidden_peaks, largest_size, may_turn, sign_changes, upper_bounds
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
@@ -30,7 +31,6 @@ from gauss.integrators import Point, Tolerance
 from gauss.system import State, System, coordinate_rates, coordinate_units
 
 JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
-STEEP, NEGLIGIBLE = 2.5, -50.0  # rise of an exponent within a subinterval, and the exponent of a negligible value
 POINTS = 5  # random points at which switching functions are compared
 SHORT, ONWARD = 6.0, 1e6  # smallest steps that may cross a surface undivided, and growth of the step after such a one
 TRIES = 40.0  # consecutive rejections, after which the crossing is shorter than the resolution of time
@@ -151,19 +151,19 @@ class SwitchingFunctions:
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
         enclosed = [_divided(_intervals(self._enclosures(np.ravel(part))), *self._counts) for part in parts]
         tops = [
-            _tops(values[conditions:], rates[conditions:], (ends[j][conditions:], ends[j + 1][conditions:]), tau)
+            upper_bounds(values[conditions:], rates[conditions:], (ends[j][conditions:], ends[j + 1][conditions:]), tau)
             for j, (values, rates, _, _) in enumerate(enclosed)
         ]
         highest = list(map(partial(reduce, math.maximum), zip(*tops, strict=True)))
         for j, (values, rates, found, steps) in enumerate(enclosed):
-            size = [_size(one) + _size(other) for one, other in zip(found[::2], found[1::2], strict=True)]
+            size = [largest_size(one) + largest_size(other) for one, other in zip(found[::2], found[1::2], strict=True)]
             jumping = iter([math.where(step.low < step.high, 1.0, 0.0) for step in steps])
             middle = (j + 0.5) / PARTS
-            hidden = _hidden_peaks((ends[j][conditions:], ends[j + 1][conditions:]), tops[j], highest, hidden, middle)
+            hidden = hidden_peaks((ends[j][conditions:], ends[j + 1][conditions:]), tops[j], highest, hidden, middle)
             for k, value in enumerate(values[:conditions]):
                 noise = SIGN_ROUNDING * size[k] + self.noise[k] if k < len(self.pairs) else None
-                changes, straddles = _changes(value, ends[j][k], ends[j + 1][k], noise)
-                turns = _turns(rates[k] if rates else None)
+                changes, straddles = sign_changes(value, ends[j][k], ends[j + 1][k], noise)
+                turns = may_turn(rates[k] if rates else None)
                 for jump in islice(jumping, len(self.jumps[k])):
                     turns = math.maximum(turns, jump)
                 crossings = crossings + changes
@@ -322,42 +322,6 @@ def _jumps(x: Expression) -> list[Expression]:
     return [node for node in reachable([x]) if node.op in JUMPS]
 
 
-def _tops(values: list[Interval], rates: list[Interval], ends: tuple[list, list], tau: Scalar) -> list[Scalar]:
-    """Upper bounds of functions on a subinterval, by the enclosures of their values and, if there are any, their rates."""
-    if not rates:
-        return [value.high for value in values]
-    each = zip(values, rates, *ends, strict=True)
-    return [math.minimum(value.high, 0.5 * (x + y) + 0.5 * tau * _most(rate)) for value, rate, x, y in each]
-
-
-def _hidden_peaks(ends, tops: list[Scalar], highest: list[Scalar], hidden: Scalar, middle: float) -> Scalar:
-    """Share of a step before its first hidden peak of an exponent, ``hidden`` or the middle of this subinterval."""
-    for before, after, high, top in zip(*ends, tops, highest, strict=True):
-        steep = math.where(high > math.minimum(before, after) + STEEP, 1.0, 0.0)
-        counted = math.where(high > math.maximum(top - STEEP, NEGLIGIBLE), steep, 0.0)
-        hidden = math.where(counted > 0.0, math.minimum(hidden, middle), hidden)
-    return hidden
-
-
-def _turns(rate: Interval | None) -> Scalar:
-    """1 where a function may turn, as its rate is not of one sign, or unknown."""
-    return 1.0 if rate is None else math.where(rate.low > 0.0, 0.0, math.where(rate.high < 0.0, 0.0, 1.0))
-
-
-def _changes(value: Interval, before: Scalar, after: Scalar, noise: Scalar | None) -> tuple[Scalar, Scalar]:
-    """Number of changes between the ends of a subinterval, and whether the enclosure straddles a switching value.
-
-    Without ``noise``, the round-off of a sign, every whole number is one.
-    """
-    if noise is None:
-        level = math.floor(before)
-        return math.minimum(math.abs(math.floor(after) - level), 2.0), math.where(
-            math.floor(value.low) < math.floor(value.high), 1.0, 0.0
-        )
-    changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
-    return changes, math.where(value.low < -noise, math.where(value.high > noise, 1.0, 0.0), 0.0)
-
-
 def _intervals(ends) -> list[Interval]:
     """Intervals of their ends, low and high one after the other."""
     return list(starmap(Interval, ends.reshape(-1, 2)))
@@ -377,14 +341,6 @@ def onward(share: Scalar, shortest: Scalar) -> Scalar:
 def _exponents(outputs) -> list[Expression]:
     """Arguments of exponential functions: a narrow peak is negligible at every stage outside of it."""
     return list(dict.fromkeys(node.operands[0] for node in reachable(outputs) if node.op == "exp"))
-
-
-def _most(value: Interval) -> Scalar:
-    return math.maximum(_size(value), _size(-value))
-
-
-def _size(value: Interval) -> Scalar:
-    return math.maximum(math.maximum(value.high, -value.low), 0.0)
 
 
 def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:

@@ -23,8 +23,8 @@ from gauss.simulation.batch.fixed_step_batch import CHUNKS_PER_THREAD, in_thread
 from gauss.simulation.compiled_run import CHECK_ERRORS
 from gauss.simulation.compiled_steps.explicit_stages import ExplicitStages
 from gauss.simulation.compiled_steps.loop_functions import adaptive
+from gauss.simulation.motion_records import EnergyRecord
 from gauss.simulation.step_limits import BUDGET, LEAST_RESTART_STEP, SMALLEST_STEP, steps_per_check
-from gauss.simulation.trajectory import EnergyRecord
 
 # steps of a motion on a device before those that are not at their end are gathered: of 4096 double pendulums, with 230 to
 # 1067 steps in 10 s, threads are busy for 95 % of the steps of a warp; with 200 for 84 %, where lanes are refilled for 86 %

@@ -21,7 +21,8 @@ from gauss.simulation.batch.machine_code import fixed_step_code
 from gauss.simulation.held_inputs import RecordedInput, driven_as
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.motion_records import Stats
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
 
 METHOD = "compiled batch, checked by inverse dynamics"

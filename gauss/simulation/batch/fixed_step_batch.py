@@ -10,8 +10,8 @@ import numpy as np
 
 from gauss.codegen.gpu.batches import DeviceFixedStepLoop
 from gauss.codegen.kernels import WORST_RECORD, BatchSpan, FixedStepBatchLoop
+from gauss.simulation.motion_records import EnergyRecord
 from gauss.simulation.step_limits import BUDGET, steps_per_check
-from gauss.simulation.trajectory import EnergyRecord
 
 NEVER = 2**52  # steps: beyond the end of any motion
 CHUNKS_PER_THREAD = 4  # of the motions: a delayed thread does not delay the others

@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.dynamics.contact.contact_changes import ModeChange
 from gauss.dynamics.contact.step_modes import UNKNOWN, StepModes, changes_of
-from gauss.simulation.trajectory import Event
+from gauss.simulation.motion_records import Event
 
 CHANGES = {(0, 1): "closes", (0, 2): "closes", (1, 2): "slips", (2, 1): "holds"}  # kinds of events by the modes
 

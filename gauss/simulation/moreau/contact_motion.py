@@ -12,7 +12,7 @@ from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_events import event_of
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings
-from gauss.simulation.trajectory import Event
+from gauss.simulation.motion_records import Event
 from gauss.system import State, System
 
 

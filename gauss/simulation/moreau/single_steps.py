@@ -10,7 +10,7 @@ from gauss.dynamics.contact.gap_laws import removal_time
 from gauss.errors import SimulationError
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.contact_motion import ContactMotion
-from gauss.simulation.trajectory import Event
+from gauss.simulation.motion_records import Event
 from gauss.system import State, System
 
 

@@ -8,8 +8,9 @@ import numpy as np
 from gauss.dynamics.contact.gap_laws import removal_time
 from gauss.simulation.energy_balance import energy_record
 from gauss.simulation.moreau.single_steps import ReachedPoint, SingleSteps
+from gauss.simulation.motion_records import Event, Stats
 from gauss.simulation.problem import Problem
-from gauss.simulation.trajectory import Event, Stats, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.undetected_switching import SPARSE_STEP
 
 LOOKS = 6  # steps whose energies are looked at

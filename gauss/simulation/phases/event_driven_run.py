@@ -26,12 +26,13 @@ from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, crossed_time
+from gauss.simulation.motion_records import Event
 from gauss.simulation.phases.event_location import first_hit, first_negative, first_true
 from gauss.simulation.phases.phase import Phase
 from gauss.simulation.prescribed import booked, of_impact
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
-from gauss.simulation.trajectory import Event, Trajectory
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import ContactMode, State, guards, sides
 
 ZENO_EVENTS = 200  # events within ZENO_TIME: more of them do not come to an end

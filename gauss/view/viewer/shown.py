@@ -8,7 +8,7 @@ from gauss.dynamics import compile_scene
 from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
-from gauss.simulation.trajectory import Stats
+from gauss.simulation.motion_records import Stats
 from gauss.system import coordinate_rates
 
 FRAMES = 30  # per second

@@ -35,7 +35,7 @@ def test_a_period_of_bounces_takes_the_least_impulse():
     """A ball of e < 1 that keeps bouncing in a period T: the floor gives (1 + e) v, ∫ u dt = g T − (1 + e) v.
 
     With ∫ u² least, u = a + b t; the conditions of the period and of T leave a convex problem in the speed v at the impact,
-    whose minimum is found here by hand: ballistic but for what the rebound lacks.
+    whose minimum is found here by hand: ballistic but for the part of the speed that the impact takes.
     """
     T, e = 1.0, 0.5
     flight = gauss.MotionPhase(T, struck="floor")

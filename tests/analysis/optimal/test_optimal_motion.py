@@ -216,7 +216,7 @@ def test_inputs_of_a_motion_drive_a_simulation():
         motion["pusch"]
 
 
-def rubbing():
+def with_friction():
     scene = swing_up()
     scene.joint_friction("rail", 1.0, name="brake")
     return scene
@@ -230,7 +230,7 @@ REFUSED = {  # what is refused, and words of the message
         "'rail' misses 1",
     ),
     "no inputs": (lambda: gauss.optimal_motion(gauss.load("pendulum"), 1.0), SimulationError, "scene.input"),
-    "friction": (lambda: gauss.optimal_motion(rubbing(), 1.0), SimulationError, "brake"),
+    "friction": (lambda: gauss.optimal_motion(with_friction(), 1.0), SimulationError, "brake"),
     "start": (lambda: gauss.optimal_motion(cart(), 1.0, start={"rial": 0.0}), ArgumentError, "rail"),
     "end": (lambda: gauss.optimal_motion(cart(), 1.0, end={"rail speed": 0.0}), ArgumentError, "rail rate"),
     "limits": (lambda: gauss.optimal_motion(cart(), 1.0, limits={"pusch": 1.0}), ArgumentError, "push"),
