@@ -32,8 +32,10 @@ def closed(system: System, state: State, held=()) -> tuple[State, bool]:
     for _ in range(NEWTON_STEPS):
         phi = kernel(np.concatenate([[found.t], found.q]))
         J = Tangents(system, found).position_rows[:, free] * units
+        lengths = np.linalg.norm(J, axis=1)
+        lengths[lengths == 0.0] = 1.0  # rows are angles and lengths, whose units must not decide on the rank
         xi = np.zeros(system.n_v)
-        xi[free] = -units * np.linalg.lstsq(J, phi, rcond=RANK_TOLERANCE)[0]
+        xi[free] = -units * np.linalg.lstsq(J / lengths[:, None], phi / lengths, rcond=RANK_TOLERANCE)[0]
         longest = np.abs(xi / system.scale.coordinates).max(initial=0.0)
         if not longest <= LONGEST_STEP:
             break

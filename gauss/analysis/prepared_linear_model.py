@@ -189,7 +189,7 @@ def _compiled(model: LinearModel):
         by_forces = linear.by_forces(forces(t, q, v))
         A, B = linear.state_matrices(by_forces)
         C, D = (outputs(linear, changes) for changes in (linear.by_state, by_forces))
-        return A[np.ix_(states, states)], B[states], C[:, states], D, error_measures(terms, given)
+        return A[np.ix_(states, states)], B[states], C[:, states], D, error_measures(terms, given, of_loops=True)
 
     function = TracedFunction(lambda: write(values, *interface.sizes, 1, name="linear"), interface, name)
     key = PreparedLinearModel, model.states, model.inputs, model.outputs, laws.key

@@ -8,15 +8,18 @@ import numpy as np
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.conditions import refuse_motionless
+from gauss.dynamics.conditions import closed_form_contacts, refuse_motionless
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mobility import mobility
+from gauss.dynamics.rules import Question
 from gauss.errors import GaussError, require
 from gauss.integrators import METHODS
 from gauss.scene import Prescribed
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.system import State, System, retract
+from gauss.system.contact_gaps import slips
 
 NEAR_SINGULAR = 1e-3  # σ_min/σ_max of the loop-closure Jacobian below which a configuration is near-singular
 STIFF = 100.0  # fastest decay over the other rates above which an implicit method is recommended
@@ -166,9 +169,16 @@ def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
     return np.linalg.eigvals(np.block([[np.zeros_like(K), np.eye(len(K))], [K, D]]))
 
 
+def _stepped(system: System) -> str:
+    """Why motions take time stepping; empty where they need not."""
+    if slips(system.scene):
+        return "contacts have friction"
+    return "".join(closed_form_contacts(Question(system, Laws(system))))
+
+
 def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
-    if system.slips.placed:
-        return TIME_STEPPING.name, "contacts have friction; give a step="
+    if why := _stepped(system):
+        return TIME_STEPPING.name, f"{why}; give a step="
     if system.scene.nonsmooth:
         return "dop853", "it locates the events of unilateral constraints, limited forces, losses and backlash"
     if rates is None:
@@ -182,7 +192,7 @@ def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
 
 def _timed(system: System, state: State) -> float | None:
     """Shortest time [s] of the evaluations within :data:`TIMING`."""
-    if system.slips.placed or system.set_valued.placed or system.losses:
+    if _stepped(system) or system.set_valued.placed or system.losses:
         return None
     system.accelerations(state)  # compiled on first use
     best, until = np.inf, time.perf_counter() + TIMING

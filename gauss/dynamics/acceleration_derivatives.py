@@ -11,6 +11,7 @@ import numpy as np
 from gauss.codegen import LDLT, Scalar, as_number, forward, write
 from gauss.dynamics.composite_bodies import CompositeBodies
 from gauss.dynamics.mechanism import Mechanism, inverse_dynamics
+from gauss.dynamics.rigid_loops import refused_in_other_pose
 from gauss.dynamics.rnea import KinematicTree
 from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import SimulationError
@@ -38,8 +39,9 @@ class LoadedMechanism:
         self.mechanism = Mechanism(system, q, v, t)
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Accelerations (n_v,) and multipliers (m,)."""
-        return self.mechanism.motion(self.effort, self.forces)
+        """Accelerations (n_v,) and multipliers (m,); not numbers where a loop that cannot move has another pose."""
+        rates, multipliers = self.mechanism.motion(self.effort, self.forces)
+        return refused_in_other_pose(self.system, self.q, rates), multipliers
 
     def changes(self, rates, multipliers, directions) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Changes along directions, at fixed accelerations and multipliers, symbols or numbers.
@@ -67,7 +69,10 @@ class LoadedMechanism:
 
 
 def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives of the accelerations by displacements along the rates, rates and generalised forces, each (n_v, n_v)."""
+    """Derivatives of the accelerations by displacements along the rates, rates and generalised forces, each (n_v, n_v).
+
+    Not numbers where a loop that cannot move has another pose than in the scene.
+    """
     n, loaded = system.n_v, LoadedMechanism(system, loads, t, q, v, load)
     rates, multipliers = loaded.motion()
     m, unit, zero = multipliers.size, np.eye(n), np.zeros(n)
@@ -91,7 +96,8 @@ def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tu
     if m:
         Y = np.array([loaded.mechanism.response(zero, e)[0] for e in np.eye(m)]).T
         slopes = slopes + Y @ violation.reshape(m, 2 * n)
-    return slopes[:, :n], slopes[:, n:], X
+    by_q, by_v, by_load = (refused_in_other_pose(system, q, part) for part in (slopes[:, :n], slopes[:, n:], X))
+    return by_q, by_v, by_load
 
 
 def inverse_dynamics_derivatives(system: System, loads, t: Scalar, q, v, acceleration) -> tuple[np.ndarray, np.ndarray]:

@@ -29,13 +29,16 @@ def _rigid_joints(system: System) -> list[str]:
 
 
 def pose_difference(system: System, q) -> Scalar:
-    """Sum of the squared differences of the coordinates of :func:`rigid_joints` to the reference configuration, relative."""
+    """Sum of the squared differences of the coordinates of :func:`rigid_joints` to the reference configuration, relative.
+
+    Of coordinates (n_q,), or of many states in columns (n_q, k).
+    """
     total, reference, units = 0.0, system.reference.q, list(coordinate_units(system).values())
     for name in rigid_joints(system):
         joint = system.joint(name)
         turned = system.quaternions.get(name, slice(0))
         if turned.stop:
-            total = total + 1.0 - (q[turned] @ reference[turned]) ** 2
+            total = total + 1.0 - (q[turned].T @ reference[turned]) ** 2
         for k in range(joint.q.start, turned.start if turned.stop else joint.q.stop):
             off = q[k] - reference[k]
             turns = units[k] == "rad" and joint.pair.kind != "screw"
@@ -48,10 +51,15 @@ def is_in_other_pose(system: System, q):
     return pose_difference(system, q) > OTHER_POSE**2
 
 
+def refused_in_other_pose(system: System, q, values: np.ndarray) -> np.ndarray:
+    """Values of the reduced system, numbers or symbols; NaN where a rigid loop has another pose than it has there."""
+    return math.where(is_in_other_pose(system, q), np.nan, values) if rigid_joints(system) else values
+
+
 def refuse_other_pose(system: System, q):
-    """Raise a StateError if a rigid loop has another pose than in the reference configuration."""
+    """Raise a StateError if a rigid loop has another pose than in the reference configuration, in any column of q."""
     joints = rigid_joints(system)
-    if joints and is_in_other_pose(system, q):
+    if joints and np.any(is_in_other_pose(system, q)):
         raise StateError(
             f"joints {', '.join(map(repr, joints))} cannot move, and their loops are rigid bodies in the pose of the scene; "
             "the state has another pose of them: give the scene its bodies in that pose."

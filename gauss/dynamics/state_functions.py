@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss import math
 from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
@@ -17,6 +18,7 @@ from gauss.dynamics.mechanism import loop_constraint_scales, loop_residual
 from gauss.dynamics.mobility import mobility
 from gauss.dynamics.parameter_terms import size_of
 from gauss.dynamics.projection import fixed_columns
+from gauss.dynamics.rigid_loops import is_in_other_pose, refuse_other_pose, rigid_joints
 from gauss.dynamics.state_terms import REFERENCES, StateTerms
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.term_table import TERMS, Term, traced_loads
@@ -198,7 +200,8 @@ def _function(system: System, requests, columns) -> TracedFunction:
         terms = StateTerms(system, q, v, t) if columns is None else ConstrainedTerms(system, q, v, t, columns)
         found = (_traced(TERMS[one.name], terms, one, arguments) for one in requests)
         results = [part for result in found for part in (result if isinstance(result, tuple) else (result,))]
-        return *results, error_measures(terms, given)
+        of_loops = columns is not None or any(TERMS[one.name].of_loops for one in requests)
+        return *results, error_measures(terms, given, of_loops)
 
     name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
     return TracedFunction(lambda: write(values, *interface.sizes, 1, name="state"), interface, name)
@@ -273,14 +276,17 @@ def error_limits(columns) -> tuple[float, ...]:
     return (RESIDUAL_TOLERANCE, FINITE, *(() if columns is None else (LARGEST_RATIO, NULL_SPACE_RESIDUAL)))
 
 
-def error_measures(terms: StateTerms, given) -> list:
+def error_measures(terms: StateTerms, given, of_loops: bool) -> list:
     """Residual of the state, a sum of all inputs that is finite only if each is, sizes of N and of K N.
 
     A sum is NaN if one of its terms is. Without independent coordinates the state need not meet the constraints: its
-    residual is that of the quaternions.
+    residual is that of the quaternions. It is infinite where results are ``of_loops``, and one that cannot move has another
+    pose than in the scene.
     """
     system, unit = terms.system, terms.system.scale.coordinates
     residual, total = off_unit(system, terms.q), sum(np.abs(part).sum() for part in given)
+    if of_loops and rigid_joints(system):
+        residual = residual + math.where(is_in_other_pose(system, terms.q), np.inf, 0.0)
     if not isinstance(terms, ConstrainedTerms):
         return [residual, total]
     rows = loop_residual(system, terms.q, terms.t)[0]
@@ -296,7 +302,15 @@ def distance_of_loops(system: System, state: State) -> float:
 
 
 def refused_state(system: System, state: State, name: str, columns) -> str:
-    """Why a state with unit quaternions and finite numbers is refused."""
+    """Why a state with unit quaternions and finite numbers is refused.
+
+    Raises
+    ------
+    StateError
+        If a loop that cannot move has another pose than in the scene.
+    """
+    if distance_of_loops(system, state) <= RESIDUAL_TOLERANCE:
+        refuse_other_pose(system, state.q)
     if columns is None:
         return f"{name}: no finite result in this state."
     rows = distance_of_loops(system, state)

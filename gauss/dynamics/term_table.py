@@ -44,6 +44,7 @@ class Term(NamedTuple):
     has_reference: bool = False
     has_loads: bool = False
     of_parameter: bool = False
+    of_loops: bool = False
 
 
 def traced_loads(system: System) -> Laws:
@@ -116,12 +117,17 @@ TERMS = {
         ("vv", "vv", "vv"),
         _slopes(acceleration_derivatives, independent_acceleration_derivatives),
         has_loads=True,
+        of_loops=True,
     ),
     "inverse_dynamics_by": Term(
         "qva", ("vp",), _by_parameter(inverse_dynamics_by_parameter, independent_efforts_by_parameter), **BY_PARAMETER
     ),
     "accelerations_by": Term(
-        "qvl", ("vp",), _by_parameter(accelerations_by_parameter, independent_accelerations_by_parameter), **BY_PARAMETER
+        "qvl",
+        ("vp",),
+        _by_parameter(accelerations_by_parameter, independent_accelerations_by_parameter),
+        **BY_PARAMETER,
+        of_loops=True,
     ),
     "loop_constraints": Term("qv", ("r", "rv", "r"), lambda terms, *_: terms.loop_constraints),
 }

@@ -96,7 +96,8 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
     list of ExportedFunction
         Each takes q, v, acceleration or load as it needs them, u if the scene has inputs on which it depends, and t. Loads
         are those of the scene as they are now. They check no argument: quaternions are to be of unit length, and near
-        singular configurations results are as inaccurate as the configuration makes them.
+        singular configurations results are as inaccurate as the configuration makes them. Accelerations and their
+        derivatives are not numbers (NaN) where a loop that cannot move has another pose than in the scene.
 
     Raises
     ------

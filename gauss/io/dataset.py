@@ -12,6 +12,7 @@ import numpy as np
 from gauss.dynamics import Plan, compile_scene
 from gauss.errors import ArgumentError, FileError, MissingPackageError, require
 from gauss.io.columns import COLUMNS, as_dataset, columns
+from gauss.io.joined_names import separated
 from gauss.io.labelled import of_motion, of_rollout, of_rotors, of_tracking
 from gauss.io.load import LABELLED, RESULTS
 from gauss.rotors import RotorMotion
@@ -194,7 +195,7 @@ def _stats(about: dict) -> Stats:
 def _events(found) -> tuple[Event, ...]:
     names = ("time", "kind", "gaps", "loss", "impulses")
     return tuple(
-        Event(t, kind, tuple(gaps.split(", ")), loss, {name: tuple(each) for name, each in json.loads(impulses).items()})
+        Event(t, kind, separated(gaps), loss, {name: tuple(each) for name, each in json.loads(impulses).items()})
         for t, kind, gaps, loss, impulses in zip(*(found[f"event_{name}"].values.tolist() for name in names), strict=True)
     )
 

@@ -38,11 +38,13 @@ def save_fclib(problem: FrictionProblem, path: str | PathLike, r: np.ndarray | N
     MissingPackageError
         If h5py is not installed.
     ArgumentError
-        If the impulses do not belong to the problem.
+        If the impulses do not belong to the problem, or a number is not finite.
     """
     require(problem, (FrictionProblem,), "save_fclib")
     if r is not None and np.shape(r) != problem.q.shape:
         raise ArgumentError(f"save_fclib: r has shape {np.shape(r)}, the problem {problem.q.shape}.")
+    if not _are_finite(problem.W, problem.q, problem.mu, r):
+        raise ArgumentError("save_fclib: expected finite numbers in the problem and its solution.")
     W = csc_matrix(problem.W)
     with _h5py().File(path, "w") as file:
         local = file.create_group("fclib_local")
@@ -79,7 +81,8 @@ def load_fclib(path: str | PathLike) -> tuple[FrictionProblem, np.ndarray | None
     MissingPackageError
         If h5py is not installed.
     FileError
-        If the file is missing, is none of FCLIB, or holds a problem in the plane, in global form, or with equality rows.
+        If the file is missing, is none of FCLIB, or holds a problem in the plane, in global form, or with equality rows, or
+        a number that is not finite.
     """
     h5py = _h5py()
     if not Path(path).is_file():
@@ -99,8 +102,14 @@ def load_fclib(path: str | PathLike) -> tuple[FrictionProblem, np.ndarray | None
         if W.shape != (q.size, q.size) or q.size != 3 * mu.size:
             raise FileError(f"{str(path)!r}: W has shape {W.shape}, q {q.shape}, mu {mu.shape}; expected 3 rows a contact.")
         r = np.asarray(file["solution/r"], dtype=float) if "solution/r" in file else None
+        if not _are_finite(W, q, mu, r):
+            raise FileError(f"{str(path)!r}: expected finite numbers.")
         names = _names(local, mu.size)
     return FrictionProblem(W, q, mu, names), r
+
+
+def _are_finite(*parts) -> bool:
+    return all(np.isfinite(part).all() for part in parts if part is not None)
 
 
 def _matrix(group) -> np.ndarray:
@@ -116,7 +125,7 @@ def _matrix(group) -> np.ndarray:
 def _names(local, count: int) -> tuple[str, ...]:
     if NAMES not in local:
         return tuple(f"contact {k}" for k in range(count))
-    return tuple(np.asarray(local[NAMES]).astype(str).tolist())
+    return tuple(name.decode() if isinstance(name, bytes) else str(name) for name in np.asarray(local[NAMES]).tolist())
 
 
 def _h5py():

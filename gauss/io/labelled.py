@@ -5,6 +5,7 @@ import json
 import numpy as np
 
 from gauss.analysis import energy, reactions
+from gauss.io.joined_names import joined
 from gauss.io.rotors import toml_text
 from gauss.rotors import RotorMotion
 from gauss.servo import Tracking
@@ -131,7 +132,7 @@ def _events(trajectory: Trajectory) -> dict:
     return {
         "event_time": ("event", np.array([event.t for event in events], dtype=float), {"units": "s"}),
         "event_kind": ("event", np.array([event.kind for event in events], dtype=str)),
-        "event_gaps": ("event", np.array([", ".join(event.gaps) for event in events], dtype=str)),
+        "event_gaps": ("event", np.array([joined(event.gaps) for event in events], dtype=str)),
         "event_loss": ("event", np.array([event.loss for event in events], dtype=float), {"units": "J"}),
         "event_impulses": ("event", np.array([json.dumps(event.impulses) for event in events], dtype=str)),
     }

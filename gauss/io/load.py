@@ -132,6 +132,8 @@ def save(thing, path) -> Path:
         return write(thing, path)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+    except UnicodeEncodeError as error:
+        raise FileError(f"{path}: no file can hold {error.object[error.start]!r}, which is in a name.") from error
 
 
 def _read_toml(path: Path):

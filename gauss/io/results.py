@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gauss.errors import FileError
+from gauss.io.joined_names import joined
 from gauss.simulation import Trajectory
 
 
@@ -16,8 +17,8 @@ def write_npz(trajectory: Trajectory, path: Path) -> Path:
 
     Arrays: ``t`` (k,) [s], ``q`` (k, n_q), ``v`` (k, n_v), ``work`` (k, 3) [J] of drives, of forces, lost in dampers,
     ``coordinates`` (n_v,) names, ``bodies`` (n,) names, ``positions`` (k, n, 3) [m] of the body frames; of the events of
-    one-sided constraints ``event_t`` [s], ``event_kind``, ``event_gaps`` (names, comma between), ``event_loss`` [J] and
-    ``event_impulses`` (JSON).
+    one-sided constraints ``event_t`` [s], ``event_kind``, ``event_gaps`` (names, comma between, or JSON where one has a
+    comma), ``event_loss`` [J] and ``event_impulses`` (JSON).
     """
     np.savez_compressed(path, **arrays(trajectory))
     return path
@@ -37,7 +38,7 @@ def arrays(trajectory: Trajectory) -> dict[str, Any]:
         "positions": trajectory.poses()[0],
         "event_t": np.array([event.t for event in trajectory.events]),
         "event_kind": np.array([event.kind for event in trajectory.events], dtype=str),
-        "event_gaps": np.array([", ".join(event.gaps) for event in trajectory.events], dtype=str),
+        "event_gaps": np.array([joined(event.gaps) for event in trajectory.events], dtype=str),
         "event_loss": np.array([event.loss for event in trajectory.events]),
         "event_impulses": np.array([json.dumps(event.impulses) for event in trajectory.events], dtype=str),
     }

@@ -255,7 +255,9 @@ def _kind_of_class(name: str) -> str:
 
 
 def text(value, what: str) -> str:
-    """Non-empty name."""
+    """Non-empty name, of characters that files can hold."""
     if not isinstance(value, str) or not value.strip():
         raise SceneError(f"{what}: expected a non-empty name, got {value!r}.")
+    if "\0" in value or any("\ud800" <= letter <= "\udfff" for letter in value):
+        raise SceneError(f"{what}: {value!r} has a character that no file can hold: NUL, or half of a pair of UTF-16.")
     return value

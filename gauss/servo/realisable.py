@@ -6,6 +6,7 @@ import numpy as np
 
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.servo.instant import ServoInstant
 from gauss.servo.kernels import responses, tree_rows, untraced
 from gauss.servo.plan import NoReductionError, RelationPlan, direct, neighbours, reduced
@@ -85,10 +86,13 @@ def instant(servo: Servo, state: State, plan: RelationPlan) -> ServoInstant:
     ------
     UnrealisableError
         If a number is not finite: an actuator has no direction, or the state is singular.
+    StateError
+        If a loop that cannot move has another pose than in the scene.
     """
     if untraced(servo):
         found = Saddle(servo, state).instant
     else:
+        refuse_other_pose(servo.system, state.q)
         found = responses(servo, plan.scalars)(state).onto_contacts(servo.n_contacts)
     if not (np.isfinite(found.S).all() and np.isfinite(found.b).all()):
         raise UnrealisableError(

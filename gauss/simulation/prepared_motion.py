@@ -12,6 +12,7 @@ from gauss.codegen import one_tier
 from gauss.codegen.kernels import Control, LoopStatus, address
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.plan import plan_of
+from gauss.dynamics.rigid_loops import refuse_other_pose, rigid_joints
 from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import FixedStep
@@ -46,6 +47,7 @@ class PreparedMotion:
                 scene, duration, integrator, step, rtol, atol, "auto", stabilisation, None, end, (), False
             )
             self.system, self.duration, plan = problem.system, float(duration), plan_of(problem.question)
+            self._rigid = rigid_joints(self.system)
             name = self.system.scene.name
             if plan.driver != "compiled loop" or isinstance(problem.method, FixedStep):
                 fixed = "the integrator has fixed steps, which gauss.Simulator makes"
@@ -118,6 +120,8 @@ class PreparedMotion:
             fits = False
         if not fits:
             raise StateError(f"expected {self._q.size} coordinates and {self._v.size} rates, got {q!r} and {v!r}.")
+        if self._rigid:
+            refuse_other_pose(self.system, self._q)
         if self._calling is not None:
             found = self._called(*self._calling)
             return found.q, found.v

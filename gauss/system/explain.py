@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.codegen.optimiser import OPTIMISER
-from gauss.errors import AssemblyError, GaussError
+from gauss.errors import AssemblyError, GaussError, SimulationError
 
 MOST_REASONS = 5  # number of reasons of a pass that are listed
 RANK_ROWS = 150  # number of loop constraints up to which freedoms are counted by rank: the time grows with its cube
@@ -15,8 +15,11 @@ def _method(system) -> list[str]:
     """Plans of motions and of single states."""
     if system.dynamics is None:
         return ["  solved by: the certified recursion; it was built without machine code"]
-    lines = []
-    for what, plan in system.dynamics.plans(system).items():
+    try:
+        plans, lines = system.dynamics.plans(system), []
+    except SimulationError as refusal:  # of the default integrator: it says what to use
+        return [f"  motions: {refusal}"]
+    for what, plan in plans.items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
         cost, ratio = system.dynamics.cost(system, plan)
         if ratio > CLOSE_ROUTES:

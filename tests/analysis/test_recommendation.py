@@ -100,3 +100,15 @@ def test_the_doctor_lists_and_empties_the_cache(tmp_path, monkeypatch):
     emptied = {finding.name: finding.text for finding in doctor.examine_cache(empty=True)}
     assert "2 files" in emptied["emptied"] and emptied["object code"].startswith("0 files")
     assert {path.name for path in (tmp_path / "cache").iterdir()} == {"key", "numbers.txt"}
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_scenes_whose_distances_are_found_by_iteration_are_explained_and_stepped(friction):
+    scene = gauss.Scene("tetrahedron on a floor", gravity=(0, 0, -9.81))
+    scene.body("solid", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0, 0, 1.0))
+    scene.free("moves", "ground", "solid")
+    scene.mesh("tetrahedron", "solid", np.vstack([np.zeros(3), np.eye(3)]))
+    scene.half_space("floor")
+    scene.contacts_all(friction=friction)
+    system = gauss.compile_scene(scene)
+    assert "time_stepping" in system.explain() and gauss.advise(system).method == "time_stepping"

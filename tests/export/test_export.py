@@ -263,3 +263,23 @@ def test_names_in_remarks_do_not_end_them():
 def test_unknown_functions_are_refused():
     with pytest.raises(ArgumentError, match="mass_matrix"):
         export.to_c(gauss.load("pendulum"), "mas_matrix")
+
+
+def test_other_poses_of_loops_that_cannot_move_are_no_numbers():
+    """Two rods with both ends on an arm are written in the pose of the scene: their mirror image is none of it."""
+    casadi = pytest.importorskip("casadi")
+    scene, top = gauss.Scene("brace", gravity=(0, -9.81, 0)), (0.5, 0.4, 0.0)
+    scene.body("arm", 1.0, (0.1, 0.2, 0.3))
+    scene.revolute("root", "ground", "arm", axis=(0, 0, 1))
+    for name, end in (("one", (0.0, 0.0, 0.0)), ("two", (1.0, 0.0, 0.0))):
+        scene.body(name, 1.0, (0.1, 0.1, 0.1), com=(0.2, 0.1, 0.0), position=end)
+        scene.revolute(f"end of {name}", "arm", name, at=end, axis=(0, 0, 1))
+    scene.revolute("top", "one", "two", at=top, axis=(0, 0, 1))
+    turned, v = 2.0 * np.arctan2(0.4, 0.5), np.array([1.0, 0.0, 0.0, 0.0])
+    for name in ("forward_dynamics", "acceleration_derivatives"):
+        function = export.to_casadi(scene, name)
+        results = []
+        for q in ([0.3, 0.0, 0.0, 0.0], [0.3, -turned, turned, 2.0 * turned]):
+            found = function(casadi.DM(q), v, 0.0 * v, 0.0)
+            results.append(np.concatenate([np.ravel(part) for part in (found if isinstance(found, tuple) else (found,))]))
+        assert np.isfinite(results[0]).all() and np.isnan(results[1]).all()

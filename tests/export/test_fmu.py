@@ -10,6 +10,7 @@ import pytest
 import gauss
 from gauss import export
 from gauss.errors import ArgumentError, SceneError, SimulationError
+from gauss.export.fmu.model_description import variables
 from gauss.scene import actuators
 from gauss.scene.named_numbers import scene_of, value_of
 from gauss.system import coordinate_rates
@@ -215,3 +216,19 @@ def test_the_command_writes_tunable_parameters(tmp_path):
     assert call(*given).exit_code == 0
     with zipfile.ZipFile(tmp_path / "pendulum.fmu") as unit:
         assert 'name="rod.mass"' in unit.read("modelDescription.xml").decode()
+
+
+def test_variables_have_names_of_their_own():
+    """An input named after its joint, a joint called time, outputs named like rates and derivatives."""
+    scene = gauss.load("double_pendulum")
+    first, second = scene.joints
+    scene.input(first, first)
+    for name in (first, "time", f"{first} rate", f"der({second})", f"output {first}"):
+        scene.output(name, "rate", second)
+    system = gauss.compile_scene(scene)
+    found = [one for kind in variables(system, system.initial_state(), {}).values() for one in kind]
+    names, references = [one.name for one in found], [one.reference for one in found]
+    assert len(set(names)) == len(names) and references == list(range(len(names)))
+    scene.output("bell \x07", "rate", second)
+    with pytest.raises(ArgumentError, match="letters"):
+        variables(gauss.compile_scene(scene), system.initial_state(), {})

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gauss
-from gauss.errors import FileError, PainleveWarning
+from gauss.errors import FileError, PainleveWarning, SceneError
 from gauss.io.catalog import families, folder, shipped
 from tests.support import mechanisms
 
@@ -180,3 +180,16 @@ def test_every_name_of_the_package_exists():
     assert all(hasattr(gauss, name) for name in gauss.__all__)
     assert sorted(gauss.__all__) == gauss.__all__
     assert Path(folder(), "families.py").is_file()
+
+
+@pytest.mark.parametrize("name", ["half \ud800", "cut\0off", "ends\0"])
+def test_names_that_no_file_can_hold_are_refused(name):
+    scene = gauss.load("pendulum")
+    with pytest.raises(SceneError, match="no file can hold"):
+        scene.frame(name, "rod")
+
+
+@pytest.mark.parametrize("ending", [".csv", ".json", ".nc"])
+def test_columns_that_no_file_can_hold_are_refused(tmp_path, ending):
+    with pytest.raises(FileError, match="no file can hold"):
+        gauss.save({"half \ud800": np.arange(3.0)}, tmp_path / f"table{ending}")

@@ -179,6 +179,10 @@ def planar_link(*rates):
 
 REFUSED = {
     "a law in Python": (lambda s: s.drive("B", torque=lambda t: t), "drive of B"),
+    "springs that cancel": (
+        lambda s: [s.joint_spring(f"k{k}", "B", stiffness=k, rest=0.1 * k) for k in (30.0, -30.0)],
+        "'k-30.0': the springs of joint 'B' cancel",
+    ),
     "a plane": (lambda s: s.on_plane("floor", "b", "ground"), "floor"),
     "a prescribed speed": (lambda s: s.drive("B", speed=1.0), "drive of B"),
     "a loop of cylindrical joints": (
@@ -206,3 +210,32 @@ def test_what_mujoco_lacks_is_refused_by_name(name):
     add(scene)
     with pytest.raises(FileError, match=said):
         to_mjcf(scene)
+
+
+LIGHT = {  # scale of lengths and masses, and what of a link without moment about its axis MuJoCo cannot take
+    "metres": (1.0, 1.0, None),
+    "millimetres": (1e-3, 1e-6, "moment of inertia, 0 kg m²"),
+    "micrometres": (1e-6, 1e-15, "mass, 7e-16 kg"),
+    "small moments": (1e-5, 1e-6, "moment of inertia, 3.5e-17 kg m²"),
+}
+
+
+@pytest.mark.parametrize("name", LIGHT)
+def test_bodies_too_light_for_mujoco_are_refused_and_not_made_heavier(name):
+    length, mass, said = LIGHT[name]
+    scene, unit = gauss.Scene("light"), mass * length**2
+    scene.body("a", 0.7 * mass, (0.5 * unit, 0.0 if name == "millimetres" else 0.35 * unit, 0.5 * unit), com=(0, length, 0))
+    scene.revolute("A", "ground", "a", axis=(1, 0, 0))
+    if said is None:
+        assert differences(scene)[1] < SAME
+        return
+    with pytest.raises(FileError, match=f"body 'a': its (least )?{said}"):
+        to_mjcf(scene)
+
+
+def test_limits_that_mujoco_would_enforce_are_named_in_the_file():
+    scene = gauss.Scene("limits")
+    scene.body("a", 1.0, (1, 1, 1))
+    scene.revolute("A--", "ground", "a", axis=(1, 0, 0), limits=(-1.0, 1.0))
+    text = to_mjcf(scene)
+    assert "limits of joint 'A- -'" in text and mujoco.MjModel.from_xml_string(text).jnt_limited[0] == 0

@@ -8,6 +8,7 @@ import pytest
 
 import gauss
 from gauss.errors import FileError, NotImportedWarning, SceneError
+from gauss.io.joined_names import joined, separated
 
 pytest.importorskip("h5netcdf")
 MESH = """solid s
@@ -151,3 +152,21 @@ def test_elements_are_called_as_in_a_scene_file():
     scene.free("f", "ground", "a")
     with pytest.raises(SceneError, match="joint_spring 'damper': joint 'f'"):
         scene.joint_spring("damper", "f", damping=1.0)
+
+
+GAPS = ("stop", "stop of A, the first", "[stop]", '"', "a,b", ", ", " x")
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in GAPS), GAPS, ()], ids=repr)
+def test_names_of_gaps_are_taken_apart_as_they_were(names):
+    assert separated(joined(names)) == names
+
+
+@pytest.mark.parametrize("ending", [".nc", ".zarr"])
+def test_events_name_their_gaps_again(tmp_path, ending):
+    scene = gauss.load("pendulum")
+    scene.stop(next(iter(scene.joints)), -0.5, 0.5, name="left, or right", restitution=0.5)
+    motion = gauss.simulate(scene, 1.5, progress=False)
+    assert motion.events
+    again = gauss.load_motion(gauss.save(motion, tmp_path / f"motion{ending}"))
+    assert again.events == motion.events

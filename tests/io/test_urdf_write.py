@@ -229,3 +229,85 @@ def test_mistakes_in_the_file_beside_are_told(tmp_path, name):
     side_file(path).write_text(content)
     with pytest.raises(FileError, match=f"bars.loops.toml: .*{words}"):
         gauss.load(path)
+
+
+def controlled():
+    """Two links whose frames URDF moves, an input and outputs of every kind but contacts."""
+    scene = two_bodies("revolute")
+    joint, body = list(scene.joints)[-1], list(scene.bodies)[-1]
+    scene.frame("tip", body, (0.1, 0.2, 0.3), (0.3, 0.2, 0.1))
+    scene.input("motor", {joint: 2.0}, limits=(-1.0, 3.0))
+    for kind in ("coordinate", "rate", "joint_force", "joint_moment"):
+        scene.output(kind, kind, joint)
+    for kind in ("position", "velocity", "angular_velocity", "acceleration", "accelerometer", "gyroscope"):
+        scene.output(f"{kind} of a body", kind, body)
+        scene.output(f"{kind} of a point", kind, "tip", at=(0.2, 0.1, 0.0))
+    return scene
+
+
+def test_inputs_act_and_outputs_measure_the_same(tmp_path):
+    scene = controlled()
+    read = again(scene, tmp_path)
+    assert read.inputs == scene.inputs and list(read.outputs) == list(scene.outputs)
+    motions = [gauss.simulate(one, 0.1, progress=False) for one in (scene, read)]
+    for name in scene.outputs:
+        expected, found = (motion.output(name)[-1] for motion in motions)
+        assert found == pytest.approx(expected, rel=1e-7, abs=1e-7), name  # two motions of relative accuracy 1e-12
+
+
+AMBIGUOUS = {
+    "the joint of a frame": lambda scene: [
+        scene.frame("eye", "b"),
+        scene.body("c", 1.0, (1, 1, 1)),
+        scene.ball("eye is fixed", "b", "c"),
+        scene.coincident("shut", "b", "c"),
+    ],
+    "the link of a chain": lambda scene: [
+        scene.body("c", 1.0, (1, 1, 1)),
+        scene.universal("U", "b", "c"),
+        scene.frame("c before U.angle2", "b"),
+    ],
+    "an output of a chain": lambda scene: [
+        scene.body("c", 1.0, (1, 1, 1)),
+        scene.universal("U", "b", "c"),
+        scene.output("angles", "coordinate", "U"),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", AMBIGUOUS)
+def test_what_another_name_would_change_is_refused(name):
+    scene = gauss.Scene("names")
+    scene.body("b", 1.0, (1, 1, 1))
+    scene.revolute("A", "ground", "b", axis=(0, 1, 0))
+    AMBIGUOUS[name](scene)
+    with pytest.raises(FileError, match="get this name in URDF|chain of joints in URDF"):
+        to_urdf(scene)
+
+
+PARTLY = {  # joints that become loops in the file, and a start of them alone
+    "screw": ({"pitch": 0.3, "axis": (1, 1, 0)}, (0.2, 1.0)),
+    "ball": ({}, ((0.5, 0.5, 0.5, 0.5), (1.0, 2.0, 3.0))),
+    "free": ({}, ((0.1, 0.2, 0.3, 0.6, 0.0, 0.8, 0.0), (1.0, 2.0, 3.0, 3.0, 2.0, 1.0))),
+    "cylindrical": ({"axis": (1, 1, 0)}, ((0.1, 0.2), (0.3, 0.4))),
+}
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
+@pytest.mark.parametrize("kind", PARTLY)
+def test_starts_of_some_joints_leave_the_others_where_they_were(tmp_path, kind, turned):
+    """The loops that URDF needs for a joint do not move the joints that the scene gives no start."""
+    options, (position, rate) = PARTLY[kind]
+    scene = two_bodies("revolute")
+    scene.body("c", 1.0, (0.1, 0.2, 0.2), position=(0.5, 0.5, 0.5), rotation=(0.3, 0.1, 0.2))
+    ends = ("c", "b") if turned else ("b", "c")
+    scene.joint("P", kind, *ends, at=(0.2, 0.1, 0.3), **options)
+    scene.start("P", position, rate)
+    read = again(scene, tmp_path)
+    instants = [gauss.Kinematics(system, system.initial_state()) for system in map(gauss.compile_scene, (scene, read))]
+    for body in scene.bodies:
+        expected, found = (
+            np.concatenate([one.position(body, com), one.velocity(body, com), one.angular_velocity(body)])
+            for one, com in zip(instants, (scene.bodies[body].com, read.bodies[body].com), strict=True)
+        )
+        assert found == pytest.approx(expected, rel=SAME, abs=SAME)

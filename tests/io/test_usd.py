@@ -5,13 +5,17 @@ import pytest
 
 import gauss
 from gauss.errors import FileError, NotImportedWarning
+from gauss.io.mjcf.tree import joint_frame
+from gauss.rotations import to_quaternion
 from gauss.system import random_state
+from tests.support.files import linear
 
 pxr = pytest.importorskip("pxr")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics  # noqa: E402
 
 SAME = 1e-6  # relative: USD holds numbers of joints and masses in single precision
 SCENE_G = 9.81
+DRIVE = "drive:angular:physics:"
 
 
 class _Writer:
@@ -254,7 +258,110 @@ def _onto_itself(writer):
     writer.joint(UsdPhysics.FixedJoint, "j", "a", "a")
 
 
+def _prim(name: str):
+    """Make a function of the writer from one of the prim of this name, or of the stage."""
+    return lambda spoil: lambda writer: spoil(writer.stage.GetPrimAtPath(name) if name else writer.stage)
+
+
+def _given(name: str, attribute: str, value, kind=None):
+    """A writer gives an attribute; of a type of its own where UsdPhysics does not define it."""
+
+    def spoil(prim):
+        known = prim.GetAttribute(attribute)
+        (known or prim.CreateAttribute(attribute, kind or Sdf.ValueTypeNames.Float)).Set(value)
+
+    return _prim(name)(spoil)
+
+
+def _sampled(name: str, attribute: str, value):
+    """A writer gives an attribute one value at one time, and none without."""
+
+    def spoil(prim):
+        found = prim.GetAttribute(attribute) or prim.CreateAttribute(attribute, Sdf.ValueTypeNames.Float)
+        found.Clear()
+        found.Set(value, 0.0)
+
+    return _prim(name)(spoil)
+
+
+def _of_plugin(schema: str):
+    """A writer applies a schema of a plugin that is not there."""
+
+    def spoil(prim):
+        applied = Sdf.TokenListOp()
+        applied.prependedItems = ["PhysicsRigidBodyAPI", "PhysicsMassAPI", schema]
+        prim.SetMetadata("apiSchemas", applied)
+
+    return spoil
+
+
+def _typed(kind: str, relation: str = ""):
+    """A writer adds a prim of a type that no plugin defines."""
+
+    def spoil(stage):
+        prim = stage.DefinePrim("/robot/extra", kind)
+        if relation:
+            prim.CreateRelationship(relation).SetTargets([Sdf.Path("/robot/a")])
+
+    return spoil
+
+
+def _drive(name: str, kind: str, **values):
+    """A writer adds a drive."""
+
+    def spoil(prim):
+        drive = UsdPhysics.DriveAPI.Apply(prim, kind)
+        for key, value in ({"Stiffness": 1.0} | values).items():
+            getattr(drive, f"Create{key}Attr")(value)
+
+    return _prim(name)(spoil)
+
+
+def _collider_without_centre(writer):
+    sphere = UsdGeom.Sphere.Define(writer.stage, "/robot/a/hull")
+    UsdPhysics.CollisionAPI.Apply(sphere.GetPrim())
+    UsdPhysics.MassAPI.Get(writer.stage, "/robot/a").GetCenterOfMassAttr().Clear()
+
+
+def _second_scene(stage):
+    UsdPhysics.Scene.Define(stage, "/moon").CreateGravityMagnitudeAttr(1.62)
+
+
+SCALES = (Gf.Vec3f(-1, 1, 1), Gf.Vec3f(0, 1, 1), Gf.Vec3f(float("nan"), 1, 1))
+SCALE, ORIENT = "xformOp:scale", "xformOp:orient"
+SILENT = {  # what would move otherwise than is read, without a word
+    "a pose at one time": (_sampled("/robot/b", "xformOp:translate", Gf.Vec3d(1, 0, 0)), "translate changes with time"),
+    "a target at one time": (
+        lambda writer: [_drive("/robot/h", "angular")(writer), _sampled("/robot/h", DRIVE + "targetPosition", 30.0)(writer)],
+        "targetPosition changes with time",
+    ),
+    "gravity at one time": (_sampled("/physics", "physics:gravityMagnitude", 3.0), "gravityMagnitude changes with time"),
+    "a mirrored body": (_given("/robot/a", SCALE, SCALES[0]), "mirrors or shears"),
+    "a flat body": (_given("/robot/a", SCALE, SCALES[1]), "scale"),
+    "a scale that is none": (_given("/robot/a", SCALE, SCALES[2]), "scale"),
+    "a long quaternion": (_given("/robot/a", ORIENT, Gf.Quatd(2, 0, 1, 0)), "length 1"),
+    "a mimic joint of PhysX": (_prim("/robot/a")(_of_plugin("PhysxMimicJointAPI:rotZ")), "PhysxMimicJointAPI:rotZ"),
+    "a tendon of PhysX": (_prim("/robot/a")(_of_plugin("PhysxTendonAxisAPI:x")), "PhysxTendonAxisAPI:x"),
+    "a gear of PhysX": (_prim("")(_typed("PhysxPhysicsGearJoint", "physics:body0")), "PhysxPhysicsGearJoint"),
+    "a joint of another name": (_prim("")(_typed("Binding", "physics:body1")), "Binding"),
+    "an actuator of MuJoCo": (_prim("")(_typed("MjcActuator")), "MjcActuator"),
+    "no gravity": (_given("/robot/a", "physxRigidBody:disableGravity", True, Sdf.ValueTypeNames.Bool), "disableGravity"),
+    "a held axis": (_given("/robot/a", "physxRigidBody:lockedPosAxis", 3, Sdf.ValueTypeNames.Int), "lockedPosAxis"),
+    "damping of MuJoCo": (_given("/robot/h", "mjc:damping", 3.0), "mjc:damping"),
+    "a drive across the hinge": (_drive("/robot/h", "rotX"), "drive 'rotX'"),
+    "a drive of another kind": (_drive("/robot/h", "linear"), "drive 'linear'"),
+    "a drive that is none": (_drive("/robot/h", "angular", Damping=float("nan")), "expected a number"),
+    "a force below zero": (_drive("/robot/h", "angular", MaxForce=-1.0), "largest force"),
+    "a centre of colliders": (_collider_without_centre, "centerOfMass"),
+    "two gravities": (_prim("")(_second_scene), "different gravity"),
+    "gravity that is none": (_given("/physics", "physics:gravityMagnitude", float("nan")), "expected a number"),
+    "no metres": (lambda writer: UsdGeom.SetStageMetersPerUnit(writer.stage, 0.0), "metersPerUnit"),
+    "metres below zero": (lambda writer: UsdGeom.SetStageMetersPerUnit(writer.stage, -1.0), "metersPerUnit"),
+    "no kilograms": (lambda writer: UsdPhysics.SetStageKilogramsPerUnit(writer.stage, 0.0), "kilogramsPerUnit"),
+    "a force that is none": (_given("/robot/h", "physics:breakForce", float("nan")), "breakForce"),
+}
 MISTAKES = {
+    **SILENT,
     "no mass": (_without_mass, "body 'a'.*MassAPI"),
     "a kinematic body": (_kinematic, "kinematic"),
     "a layer elsewhere": (_elsewhere, "root_folder"),
@@ -292,3 +399,120 @@ def test_files_that_hold_nothing_are_refused(tmp_path, text):
     path.write_text(text)
     with pytest.raises(FileError):
         gauss.load(path)
+
+
+NAMED = {  # what is not read, and may change the motion
+    "velocities": (_given("/robot/a", "physics:angularVelocity", Gf.Vec3f(0, 30, 0)), "velocities at the start of a"),
+    "sleep": (_given("/robot/b", "physics:startsAsleep", True), "sleep at the start of b"),
+    "joints that break": (_given("/robot/h", "physics:breakForce", 3.0), "forces that break h"),
+    "other programs": (_given("/robot/a", "physxRigidBody:angularDamping", 0.05), "physxRigidBody:angularDamping of a"),
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_what_may_change_the_motion_is_named(tmp_path, name):
+    writer, (add, words) = _Writer(tmp_path), NAMED[name]
+    _chain(writer)
+    add(writer)
+    with pytest.warns(NotImportedWarning, match=words):
+        writer.load()
+
+
+def test_locks_of_no_width_are_locks(tmp_path):
+    """Limits that are both zero leave no freedom; those at another value have no counterpart."""
+    writer = _Writer(tmp_path)
+    writer.body("a", 1.0, (0.1, 0.1, 0.1), (0, 0, 0), (0, 0, 0))
+    joint = writer.joint(UsdPhysics.Joint, "j", "", "a")
+    limits = [UsdPhysics.LimitAPI.Apply(joint.GetPrim(), freedom) for freedom in D6["ball"] + ("transX", "transY")]
+    for limit in limits:
+        limit.CreateLowAttr(0.0)
+        limit.CreateHighAttr(0.0)
+    assert writer.load().joints["j"].kind == "prismatic"
+    limits[0].CreateLowAttr(20.0)
+    limits[0].CreateHighAttr(20.0)
+    writer.stage.Save()
+    with pytest.raises(FileError, match="held at 20"):
+        gauss.load(writer.path)
+
+
+KINDS = {  # kind of a joint, and how USD has it
+    "revolute": UsdPhysics.RevoluteJoint,
+    "prismatic": UsdPhysics.PrismaticJoint,
+    "ball": UsdPhysics.SphericalJoint,
+    "fixed": UsdPhysics.FixedJoint,
+    "cylindrical": UsdPhysics.Joint,
+}
+TREES = 12
+
+
+def _random_tree(rng) -> gauss.Scene:
+    """Six bodies in skew poses on joints of all kinds, some of them named from the child to the parent."""
+    scene = gauss.Scene("random", gravity=(0.0, 0.0, -SCENE_G))
+    names = ["ground"]
+    for name in "abcdef":
+        x, y, z = rng.uniform(0.05, 0.5, 3)
+        scene.body(
+            name,
+            rng.uniform(0.5, 2.0),
+            (y + z, x + z, x + y),
+            rng.normal(size=3),
+            inertia_axes=rng.normal(size=3),
+            position=rng.normal(size=3),
+            rotation=rng.normal(size=3),
+        )
+        kind, other = rng.choice([*KINDS]), rng.choice(names)
+        ends = (other, name) if rng.random() < 0.5 else (name, other)
+        axis = {} if kind in ("ball", "fixed") else {"axis": rng.normal(size=3)}
+        scene.joint(f"on {name}", kind, *ends, at=rng.normal(size=3), **axis)
+        names.append(name)
+    return scene
+
+
+def _written(writer, system, state):
+    """Bodies of a tree in the poses of a state, and its joints by their frames in both bodies."""
+    motion = gauss.Kinematics(system, state)
+    for body in system.scene.bodies.values():
+        R, (J, axes) = motion.rotation(body.name), body.principal()
+        turned = to_quaternion(R)
+        prim = writer.body(body.name, body.mass, J, body.com, motion.position(body.name), turned)
+        api = UsdPhysics.MassAPI.Get(writer.stage, prim.GetPath())
+        api.CreatePrincipalAxesAttr(Gf.Quatf(*map(float, to_quaternion(axes))))
+    for joint in system.scene.joints.values():
+        placed = {end: joint_frame(system, joint, end) if end != "ground" else None for end in (joint.parent, joint.child)}
+        if "ground" in placed:
+            k = system.joint(joint.name)
+            pose = (k.R_parent, k.p_parent) if joint.parent == "ground" else (k.R_child, k.p_child)
+            placed["ground"] = pose
+        name = joint.name.replace(" ", "_")
+        found = writer.joint(
+            KINDS[joint.kind],
+            name,
+            *("" if end == "ground" else end for end in placed),
+            *(tuple(float(x) for x in p) for _, p in placed.values()),
+            axis="Z" if joint.kind in ("revolute", "prismatic") else None,
+        )
+        for attribute, (R, _) in zip((found.CreateLocalRot0Attr, found.CreateLocalRot1Attr), placed.values(), strict=True):
+            attribute(Gf.Quatf(*map(float, 3.0 * to_quaternion(R))))  # of any length
+        if joint.kind == "cylindrical":
+            for freedom in ("transX", "transY", "rotX", "rotY"):
+                limit = UsdPhysics.LimitAPI.Apply(found.GetPrim(), freedom)
+                limit.CreateLowAttr(1.0)
+                limit.CreateHighAttr(-1.0)
+
+
+@pytest.mark.parametrize("seed", range(TREES))
+def test_random_trees_accelerate_as_those_they_were_written_from(tmp_path, seed):
+    """Frames, starts, directions, units: the file holds poses in the world only."""
+    rng = np.random.default_rng(seed)
+    writer = _Writer(tmp_path, *((1.0, 1.0) if seed % 2 else (0.01, 0.001)))
+    system = gauss.compile_scene(_random_tree(rng))
+    state = random_state(system, rng, spread=0.5)
+    still = gauss.State(0.0, state.q, 0.0 * state.v)
+    _written(writer, system, still)
+    wanted = gauss.solve(gauss.assemble(system, still)).a.reshape(-1, 6)[:, 3:]
+    expected = dict(zip(system.structure.bodies, wanted, strict=True))
+    found = linear(writer.load())
+    size = max(np.abs(one).max() for one in expected.values())
+    assert found.keys() == expected.keys()
+    for body, acceleration in expected.items():
+        assert found[body] == pytest.approx(acceleration, abs=10.0 * SAME * size)

@@ -149,3 +149,22 @@ def test_what_is_refused(what, tmp_path):
     kind, text, call = REFUSED[what]
     with pytest.raises(kind, match=text):
         call(tmp_path)
+
+
+def test_names_and_numbers_of_files_are_kept_or_refused(tmp_path):
+    W = np.diag([2.0, 1.0, 1.0, 3.0, 1.0, 1.0])
+    problem = FrictionProblem(W, np.arange(6.0), np.array([0.3, 0.0]), ("Kugel – Wand", "玉"))
+    path = tmp_path / "problem.hdf5"
+    save_fclib(problem, path, problem.q)
+    found, r = load_fclib(path)
+    assert found.names == problem.names and np.array_equal(r, problem.q)
+    for broken in (problem._replace(W=W * np.nan), problem._replace(mu=problem.mu + np.inf)):
+        with pytest.raises(ArgumentError, match="finite"):
+            save_fclib(broken, path)
+    with pytest.raises(ArgumentError, match="finite"):
+        save_fclib(problem, path, problem.q * np.inf)
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "a") as file:
+        file["fclib_local/vectors/q"][0] = np.nan
+    with pytest.raises(FileError, match="finite"):
+        load_fclib(path)

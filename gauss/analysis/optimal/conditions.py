@@ -14,6 +14,7 @@ from gauss.analysis.loop_closure import closed, with_rates
 from gauss.analysis.optimal.continuation import followed
 from gauss.analysis.tangents import Tangents
 from gauss.dynamics.projection import limits
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import ArgumentError, StateError, did_you_mean, require
 from gauss.system import State, System, coordinate_rates
 
@@ -113,6 +114,7 @@ def end_of(system: System, given, what: str, near: State) -> MotionEnd:
         return MotionEnd((), near)
     if isinstance(given, State):
         state = system.state(given.q, given.v, given.t)
+        refuse_other_pose(system, state.q)
         conditions = [EndCondition(name, place, *(2 * (_entry(state, place),))) for name, place in _all(system).items()]
         if not closed(system, state)[1]:
             raise StateError(

@@ -18,6 +18,7 @@ from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, reverse
 from gauss.dynamics import compile_scene
 from gauss.dynamics.motion_step import MotionStep
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import ArgumentError, SimulationError, judged_later, require
 from gauss.scene import Scene
 from gauss.simulation.passed_switching import examine_steps
@@ -195,6 +196,7 @@ class _Ilqr:
         self.system, self.h = system, step
         self.start = system.initial_state() if start is None else start
         require(self.start, (State,), "ilqr: start")
+        refuse_other_pose(system, self.start.q)
         self.step, self.second_order = CurvedStep(unlimited(system), integrator), second_order
         self.t = self.start.t + step * np.arange(self.count + 1)
         examine_steps(system, self.step.laws, self.start, float(self.t[-1]), step, "let laws of time be smooth")

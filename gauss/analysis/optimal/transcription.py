@@ -63,10 +63,20 @@ class Transcription:
         self.symbols = {name: casadi.MX.sym(name, *shape) for name, shape in self.sizes.items()}
         self.variables = casadi.vertcat(*map(casadi.vec, self.symbols.values()))
 
+    @property
+    def unit_of_time(self) -> float:
+        """Unit of the duration, a variable as the states, which are in shares of the units of the scene [s]."""
+        return self.problem.equations.system.scale.time
+
+    @property
+    def duration(self) -> Casadi:
+        """Duration [s]."""
+        return self.unit_of_time * self.symbols["duration"]
+
     @cached_property
     def times(self) -> tuple[Casadi, Casadi]:
         """Times of the collocation points (s, n), and of the mesh points (1, n + 1)."""
-        duration, start = self.symbols["duration"], self.problem.start_time if self.before is None else self.before.end_time
+        duration, start = self.duration, self.problem.start_time if self.before is None else self.before.end_time
         inner = self.mesh[:-1] + np.diff(self.mesh) * self.tableau.c[:, None]
         return start + duration * self.casadi.DM(inner), start + duration * self.casadi.DM(self.mesh).T
 
@@ -100,7 +110,7 @@ class Transcription:
     @property
     def _widths(self) -> Casadi:
         """Lengths of the intervals [s], (1, n)."""
-        return self.symbols["duration"] * self.casadi.DM(np.diff(self.mesh)).T
+        return self.duration * self.casadi.DM(np.diff(self.mesh)).T
 
     @cached_property
     def objective(self) -> Casadi:
@@ -109,7 +119,7 @@ class Transcription:
         if self.relaxed:
             return sum(casadi.sum1(self.symbols[name]) for name in SLACKS if name in self.sizes)
         if self.problem.cost is None:
-            return self.symbols["duration"]
+            return self.duration
         t, z, u = self.inner
         rates = casadi.reshape(self.problem.cost.map(t.size2())(t, z, u), self.problem.stages, len(self.mesh) - 1)
         return casadi.sum2(casadi.mtimes(casadi.DM(self.tableau.b).T, rates) * self._widths)
@@ -204,7 +214,7 @@ class Transcription:
                 "x": state,
                 "z": np.tile(state, self.problem.stages),
                 "u": np.tile(effort, 2),
-                "duration": np.array([duration]),
+                "duration": np.array([duration / self.unit_of_time]),
             }
             of |= {"mu": np.full(len(self.rows), free), "over": slack * self._may_be_missed()}
             of |= {"under": of["over"]} | dict.fromkeys(("ahead", "behind"), np.full(equations.n_x, slack * LARGEST_MISS))
@@ -223,7 +233,7 @@ class Transcription:
             "x": guess.x,
             "z": guess.z.reshape(-1, n),
             "u": guess.u.reshape(-1, n),
-            "duration": np.array([[guess.duration]]),
+            "duration": np.array([[guess.duration / self.unit_of_time]]),
         }
         return np.concatenate([given.get(name, np.zeros(shape)).ravel(order="F") for name, shape in self.sizes.items()])
 
@@ -233,6 +243,6 @@ class Transcription:
         parts = zip(np.split(variables, ends), self.sizes.items(), strict=True)
         found = {name: part.reshape(shape, order="F") for part, (name, shape) in parts}
         z, u = found["z"].reshape(self.problem.stages, -1, n), found["u"].reshape(2, -1, n)
-        values = MotionValues(self.mesh, found["x"], z, u, float(found["duration"].item()))
+        values = MotionValues(self.mesh, found["x"], z, u, self.unit_of_time * float(found["duration"].item()))
         misses = (found["over"] - found["under"]).ravel() if self.relaxed else np.zeros(len(self.problem.conditions))
         return values, misses

@@ -26,6 +26,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import loop_residual
 from gauss.dynamics.motion_step import MotionStep
 from gauss.dynamics.parameter_terms import OF_JOINTS
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import ArgumentError, SimulationError, require
 from gauss.scene import Scene
 from gauss.simulation.tolerances import check_tolerances
@@ -115,6 +116,7 @@ class Motion:
             raise ArgumentError(f"sensitivities: duration {duration} s is no whole number of steps of {step} s.")
         self.h, self.start = step, system.initial_state() if state is None else state
         require(self.start, (State,), "sensitivities: state")
+        refuse_other_pose(system, self.start.q)
         self.parameters = name_list(parameters, "sensitivities: parameters")
         _refuse_lengths_of_loops(system, self.parameters)
         self.integrator, self.system = integrator, system

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
+from gauss.errors import ArgumentError
 from gauss.system import State, System
 from gauss.system.coordinate_names import coordinate_units, rate_units
 from gauss.versions import VERSION
@@ -32,6 +33,28 @@ class Variable(NamedTuple):
         return f"    <Float64 {' '.join(f'{key}={quoteattr(value)}' for key, value in pairs.items())}/>"
 
 
+class UnitNames:
+    """Names of the variables of a unit, of which no two are equal."""
+
+    def __init__(self):
+        self.taken = set[str]()
+
+    def own(self, name: str, kind: str) -> str:
+        """Name that no other variable has: the given one, or one with the kind before it.
+
+        Raises
+        ------
+        ArgumentError
+            If it cannot be printed.
+        """
+        if not name.isprintable():
+            raise ArgumentError(f"to_fmu: {name!r}: a unit cannot hold this name; use letters that can be printed.")
+        while name in self.taken:
+            name = f"{kind} {name}"
+        self.taken.add(name)
+        return name
+
+
 def state_names(system: System) -> dict[str, str]:
     """Names and units of the states: coordinates, then rates; states of one's own have their names."""
     coordinates, rates, own = coordinate_units(system), rate_units(system), system.scene.states
@@ -40,35 +63,41 @@ def state_names(system: System) -> dict[str, str]:
 
 
 def variables(system: System, start: State, parameters: Mapping[str, float]) -> dict[str, list[Variable]]:
-    """Variables of a unit by kind, in the order of their value references; parameters by name, with their values."""
-    scene, states = system.scene, state_names(system)
+    """Variables of a unit by kind, in the order of their value references; parameters by name, with their values.
+
+    Each has a name of its own: one that is taken, as that of an input named after its joint, gets its kind before it.
+
+    Raises
+    ------
+    ArgumentError
+        If a name cannot be printed, which the description cannot hold.
+    """
+    scene, states, named = system.scene, state_names(system), UnitNames()
     order = "time", "states", "derivatives", "inputs", "parameters", "outputs"
     kinds: dict[str, list[Variable]] = {kind: [] for kind in order}
-    kinds["time"].append(Variable("time", 0, {"causality": "independent"}))
+    kinds["time"].append(Variable(named.own("time", "time"), 0, {"causality": "independent"}))
     reference, values = 1, [*start.q, *start.v]
     shown = "local" if scene.outputs else "output"
     for (name, unit), value in zip(states.items(), values, strict=True):
         given = {"causality": shown, "initial": "exact", "start": repr(float(value)), "description": f"[{unit}]"}
-        kinds["states"].append(Variable(name, reference, given))
+        kinds["states"].append(Variable(named.own(name, "state"), reference, given))
         reference += 1
-    for k, name in enumerate(states):
-        kinds["derivatives"].append(
-            Variable(f"der({name})", reference, {"causality": "local", "initial": "calculated", "derivative": str(k + 1)})
-        )
+    for k, state in enumerate(tuple(kinds["states"])):
+        given = {"causality": "local", "initial": "calculated", "derivative": str(k + 1)}
+        kinds["derivatives"].append(Variable(named.own(f"der({state.name})", "derivative"), reference, given))
         reference += 1
     for name in scene.inputs:
-        kinds["inputs"].append(Variable(name, reference, {"causality": "input", "start": "0.0"}))
+        kinds["inputs"].append(Variable(named.own(name, "input"), reference, {"causality": "input", "start": "0.0"}))
         reference += 1
     for name, value in parameters.items():
         given = {"causality": "parameter", "variability": "tunable", "initial": "exact", "start": repr(float(value))}
-        kinds["parameters"].append(Variable(name, reference, given))
+        kinds["parameters"].append(Variable(named.own(name, "parameter"), reference, given))
         reference += 1
     for output in scene.outputs.values():
         size = output.size(scene)
         for k in range(size):
             name = output.name if size == 1 else f"{output.name}[{k}]"
-            taken = name in states or name in scene.inputs
-            label = f"output {name}" if taken else name
+            label = named.own(name, "output")
             kinds["outputs"].append(Variable(label, reference, {"causality": "output", "initial": "calculated"}))
             reference += 1
     return kinds

@@ -34,7 +34,8 @@ def to_fmu(system: System | Scene, folder=".", name: str | None = None, paramete
     ----------
     system : System or Scene
         The system. Its inputs and outputs are those of the unit; where the scene has no outputs, all coordinates and rates
-        are outputs. Start values can be changed, also of states of one's own.
+        are outputs. Start values can be changed, also of states of one's own; derivatives are not numbers (NaN) from a start
+        in which a loop that cannot move has another pose than in the scene.
     folder : str or Path
         Folder of the file.
     name : str, optional

@@ -9,6 +9,8 @@ from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, Jo
 from gauss.scene.values import rotation_matrix
 from gauss.system.frames import relative
 
+CANCELLED = 1e-9  # of the larger stiffness: what is left of two that cancel is rounding
+
 
 def write_elements(document):
     """Write couplings, relations and loads.
@@ -93,9 +95,13 @@ def _(spring: JointSpring, document):
     name = document.coordinate(spring.joint, f"joint spring {spring.name!r}")
     joint = next(element for element in document.root.iter("joint") if element.get("name") == name)
     stiffness, damping, rest = (float(joint.get(key, 0.0)) for key in ("stiffness", "damping", "springref"))
-    total = stiffness + spring.stiffness
-    if total:
-        rest = (stiffness * rest + spring.stiffness * spring.rest) / total  # springs side by side
+    total, torque = stiffness + spring.stiffness, stiffness * rest + spring.stiffness * spring.rest
+    if torque and abs(total) <= CANCELLED * max(abs(stiffness), abs(spring.stiffness)):
+        raise FileError(
+            f"joint spring {spring.name!r}: the springs of joint {spring.joint!r} cancel but for a constant load, which "
+            "springs of MuJoCo cannot give; write one spring, and a drive with that load."
+        )
+    rest = torque / total if total else rest  # springs side by side
     for key, value in (("stiffness", total), ("damping", damping + spring.damping), ("springref", rest)):
         joint.set(key, repr(float(value)))
 

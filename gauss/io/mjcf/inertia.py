@@ -7,36 +7,72 @@ from gauss.errors import FileError
 from gauss.io.mjcf.tree import Limb
 from gauss.scene import GROUND, Body, Scene
 from gauss.scene.body import TRIANGLE_TOLERANCE
+from gauss.system import System
 from gauss.system.frames import relative
 
-LEAST = 1e-14  # kg, kg m²: MuJoCo refuses moving bodies with less than 1e-15
+TAKEN = 1e-15  # kg, kg m²: MuJoCo refuses moving bodies with less
+LEAST = 1e-14  # kg, kg m²: written in place of what it refuses
+ROUNDING = 1e-14  # of the largest moment: the least one is zero but for rounding
+NEGLIGIBLE = 1e-9  # of the mass of the scene, and of its moments: what is written in place of nothing must not show
 PARALLEL = 1e-12  # sine of the angle between axes that are parallel but for rounding
 
 
-def inertial(scene: Scene, limbs: list[Limb], limb: Limb) -> tuple[dict, str]:
+def inertial(system: System, limbs: list[Limb], limb: Limb, strict: bool = True) -> tuple[dict, str]:
     """Attributes of <inertial>, and a remark on what was changed.
+
+    Parameters
+    ----------
+    system : System
+        The scene, compiled.
+    limbs : list of Limb
+        Bodies of the tree.
+    limb : Limb
+        The body.
+    strict : bool
+        Whether what MuJoCo refuses is refused, where more in its place would show.
 
     Raises
     ------
     FileError
-        If the body's inertia is not physical, and its motion would show that.
+        If the body's inertia is not physical, and its motion would show that; or less than MuJoCo takes.
     """
+    scene, scale = system.scene, system.scale
     body = scene.bodies[limb.body]
     J, R = body.principal()
     remarks = []
     mass = body.mass
     if not mass and not _carries(scene, limbs, body.name):
         raise FileError(f"body {body.name!r}: neither it nor what hangs on it has mass; MuJoCo cannot move it.")
-    if mass < LEAST:
+    if _is_replaced(body, mass, scale.mass, "kg", strict):
         mass = LEAST
         remarks.append(f"{LEAST:g} kg instead of no mass")
     if not _is_triangle(J):
         J, remark = _completed(scene, limbs, body, J, R)
         remarks.append(remark)
-    if J.min() < LEAST:
+    least = J.min() if J.min() > ROUNDING * J.max() else 0.0
+    if _is_replaced(body, least, scale.mass * scale.length**2, "kg m²", strict):
         J = np.maximum(J, LEAST)
         remarks.append(f"{LEAST:g} kg m² instead of no moment of inertia")
     return {"pos": body.com, "mass": mass, "diaginertia": J, "quat": rotations.to_quaternion(R)}, ", ".join(remarks)
+
+
+def _is_replaced(body: Body, value: float, whole: float, unit: str, strict: bool) -> bool:
+    """Whether a mass or moment is zero, and :data:`LEAST` stands in its place, which does not show in the scene.
+
+    Raises
+    ------
+    FileError
+        If it would show, or a value that is not zero is less than MuJoCo takes.
+    """
+    if not value and LEAST <= NEGLIGIBLE * whole:
+        return True
+    if strict and value < TAKEN:
+        what = "mass" if unit == "kg" else "least moment of inertia"
+        raise FileError(
+            f"body {body.name!r}: its {what}, {value:.3g} {unit}, is less than the {TAKEN:g} {unit} that MuJoCo takes, "
+            "and more would show; give it more, or write a larger scene of the same proportions."
+        )
+    return False
 
 
 def _is_triangle(J: np.ndarray) -> bool:

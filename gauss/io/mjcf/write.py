@@ -185,11 +185,14 @@ def _write_bodies(document: MjcfDocument):
         R, position = relative(scene, one.on, one.body)
         body = document.add(document.bodies[one.on], "body", name=one.body, pos=position, quat=rotations.to_quaternion(R))
         document.bodies[one.body] = body
-        attributes, remark = inertial(scene, document.limbs, one)
+        attributes, remark = inertial(document.system, document.limbs, one)
         if remark:
             body.append(ElementTree.Comment(f" {remark} "))
         if attributes:
             document.add(body, "inertial", **attributes)
+        if one.joint.limits is not None:
+            said = f" limits of joint {one.joint.name!r}, for the assembly of a start only, have no counterpart "
+            body.append(ElementTree.Comment(said.replace("--", "- -")))
         for step in one.steps:
             _write_step(document, body, step)
         _couple_screw(document, one)

@@ -20,8 +20,10 @@ from gauss.io.mjcf.tree import ElementaryJoint, Limb, joint_frame, limb, spannin
 from gauss.io.urdf.numbers import roll_pitch_yaw, text_of
 from gauss.io.urdf.plus_write import write_coupling, write_loop
 from gauss.io.urdf.side import ENDS, side_file
+from gauss.io.urdf.starts import whole_start
 from gauss.rotations import from_quaternion
-from gauss.scene import GROUND, Coupling, Drive, Joint, Scene, Start
+from gauss.scene import GROUND, Coupling, Drive, Joint, Output, Scene, Start
+from gauss.scene.inputs import SENSORS
 from gauss.scene.toml import toml_text
 from gauss.scene.values import rotation_matrix
 from gauss.system import System
@@ -110,9 +112,7 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
     if said:
         listed = f" Not in this file, but in the one beside it: {', '.join(said)}. ".replace("--", "- -")
         document.root.insert(0, Comment(listed))
-    for name in _names(document.root):
-        if not name.isprintable():
-            raise FileError(f"{name!r}: URDF cannot hold this name; use letters that can be printed.")
+    _check_names(document)
     ElementTree.indent(document.root)
     return ElementTree.tostring(document.root, encoding="unicode") + "\n", beside
 
@@ -126,6 +126,19 @@ def _ground(scene: Scene) -> str:
 
 def _names(root: Element):
     return [element.get("name") for element in root.iter() if isinstance(element.tag, str) and element.get("name")]
+
+
+def _check_names(document: UrdfDocument):
+    """Refuse names that URDF cannot hold, and links or joints of the same name, as those that are made for chains."""
+    for name in _names(document.root):
+        if not name.isprintable():
+            raise FileError(f"{name!r}: URDF cannot hold this name; use letters that can be printed.")
+    joints = [element for tag in ("joint", "loop") for element in document.root.findall(tag)]
+    for kind, elements in (("link", document.root.findall("link")), ("joint", joints)):
+        names = [element.get("name") for element in elements] + (list(document.rest.joints) if kind == "joint" else [])
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise FileError(f"{twice!r}: two elements of the kind {kind} get this name in URDF; rename one.")
 
 
 def _write_limb(document: UrdfDocument, one: Limb):
@@ -201,7 +214,7 @@ def _write_link(document: UrdfDocument, one: Limb):
     if body.inertia_as_given:
         (J, R), remark = body.principal(), "no body has this inertia"
     elif body.mass:
-        values, remark = inertial(document.scene, document.limbs, one)
+        values, remark = inertial(document.system, document.limbs, one, strict=False)
         J, R = values["diaginertia"], from_quaternion(values["quat"])
     else:
         return
@@ -239,6 +252,27 @@ def _keep_rest(document: UrdfDocument):
         kept = {name: one for name, one in getattr(scene, group).items() if not write_coupling(document, one)}
         getattr(rest, group).update((name, _moved(one, document.shifts)) for name, one in kept.items())
     _keep_loads(document)
+    rest.inputs.update(scene.inputs)
+    rest.outputs.update((name, _measured(document, output)) for name, output in scene.outputs.items())
+
+
+def _measured(document: UrdfDocument, output: Output) -> Output:
+    """Output in the file, at the same point of its body.
+
+    Raises
+    ------
+    FileError
+        If it measures a joint that becomes a chain in the file.
+    """
+    if SENSORS[output.kind][0] == "joint":
+        rates = document.scene.joints[output.of].pair.rates
+        if len(rates) > 1 and f"{output.of}.{rates[0]}" in _names(document.root):
+            raise FileError(
+                f"output {output.name!r}: joint {output.of!r} is a chain of joints in URDF; measure one of a body."
+            )
+        return output
+    shift = document.shifts.get(output.of, np.zeros(3))
+    return replace(output, at=_tuple(output.at - shift)) if SENSORS[output.kind][0] == "frame" else output
 
 
 def _keep_loads(document: UrdfDocument):
@@ -247,9 +281,22 @@ def _keep_loads(document: UrdfDocument):
     for name, load in scene.loads.items():
         for number, part in enumerate(_split(document, load) if isinstance(load, Drive) else [load]):
             rest.loads[f"{name}{number or ''}"] = _moved(part, document.shifts)
-    for start in scene.starts.values():
-        for part in _split(document, start):
-            rest.starts[part.joint] = part
+    for part in _starts(document):
+        rest.starts[part.joint] = part
+
+
+def _starts(document: UrdfDocument) -> list[Start]:
+    """Starts of the joints of the file: those of the scene, or all where the file has loops that the scene has not."""
+    scene, floating = document.scene, {}
+    for one in document.limbs:
+        if _floats(scene, one):
+            floating[one.body] = one.joint.name if _is_plain(document.system, one) else f"{one.body} floats"
+    closes = any(
+        one.joint.kind == "screw" or floating.get(one.body, one.joint.name) != one.joint.name for one in document.limbs
+    )
+    if scene.starts and closes:
+        return list(whole_start(document.system, document.limbs, floating))
+    return [part for start in scene.starts.values() for part in _split(document, start)]
 
 
 def _in_file(document: UrdfDocument, coupling: Coupling) -> bool:
@@ -286,7 +333,7 @@ def _moved(element, shifts: dict[str, np.ndarray]):
 
 
 def _listed(rest: Scene):
-    kinds = ("joints", "couplings", "relations", "shapes", "contacts", "set_valued", "loads", "starts")
+    kinds = ("joints", "couplings", "relations", "shapes", "contacts", "set_valued", "loads", "starts", "inputs", "outputs")
     return [(kind.removesuffix("s"), name) for kind in kinds for name in getattr(rest, kind)]
 
 

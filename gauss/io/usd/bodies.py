@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.errors import FileError, extra
-from gauss.io.usd.poses import FramePose, StageUnits, checked, matrix
+from gauss.io.usd.poses import FramePose, StageUnits, checked, matrix, number
 from gauss.scene import GROUND, Scene
 
 with extra("usd"):
@@ -42,18 +42,28 @@ def body_of(prim: Usd.Prim, bodies: dict[str, Usd.Prim]) -> str:
     return GROUND
 
 
-def add_body(scene: Scene, name: str, prim: Usd.Prim, pose: FramePose, units: StageUnits):
+def colliding(stage: Usd.Stage, bodies: dict[str, Usd.Prim]) -> set[str]:
+    """Bodies with colliders."""
+    return {body_of(prim, bodies) for prim in moving_prims(stage) if prim.HasAPI(UsdPhysics.CollisionAPI)}
+
+
+def add_body(scene: Scene, name: str, prim: Usd.Prim, pose: FramePose, units: StageUnits, has_colliders: bool):
     """Body at a pose of the reference configuration."""
     api = UsdPhysics.MassAPI(prim)
-    mass = float(api.GetMassAttr().Get() or 0.0)
+    mass = number(prim, api.GetMassAttr())
     moments = np.array(api.GetDiagonalInertiaAttr().Get() or (0, 0, 0), dtype=float)
     if not prim.HasAPI(UsdPhysics.MassAPI) or mass <= 0.0 or not moments.any():
         raise FileError(
             f"{prim.GetPath()}: body {name!r}: physics:mass and physics:diagonalInertia are read, masses of colliders are "
             "not; write both with MassAPI."
         )
-    own, com = units.pose(prim), np.array(api.GetCenterOfMassAttr().Get(), dtype=float)
-    com = np.zeros(3) if not np.isfinite(com).all() else own.R.T @ (units.point(prim, com) - own.p)
+    own, given = units.pose(prim), api.GetCenterOfMassAttr()
+    if not given.HasAuthoredValue() and has_colliders:
+        raise FileError(
+            f"{prim.GetPath()}: body {name!r}: without physics:centerOfMass it is that of the colliders, whose masses are "
+            "not read; write it with MassAPI."
+        )
+    com = own.R.T @ (units.point(prim, given.Get()) - own.p) if given.HasAuthoredValue() else np.zeros(3)
     moments = checked(prim, moments) * units.mass * units.length**2
     options = {"inertia_axes": matrix(prim, api.GetPrincipalAxesAttr().Get()), "position": pose.p, "rotation": pose.R}
     scene.body(name, mass * units.mass, tuple(moments), tuple(com), **options)

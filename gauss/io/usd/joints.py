@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 from math import inf, radians
 
-import numpy as np
-
 from gauss.errors import FileError, extra
 from gauss.io.usd.bodies import body_of, moving_prims
-from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits
+from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits, number
 from gauss.scene import GROUND
 
 with extra("usd"):
@@ -27,8 +25,6 @@ PAIRS_OF: dict[tuple[str, ...], tuple[str, Axis]] = {  # kind and axis by the fr
     ("transX", "transZ", "rotY"): ("planar", AXES["Y"]),
     ("transY", "transZ", "rotX"): ("planar", AXES["X"]),
 }
-NOT_READ = ("physxJoint:armature", "physxJoint:jointFriction", "newton:armature", "newton:friction")
-NOT_READ_APIS = ("Mimic", "Tendon", "Gear")
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,6 @@ def joints_of(stage: Usd.Stage, bodies: dict[str, Usd.Prim], units: StageUnits) 
 
 
 def _joint(prim: Usd.Prim, name: str, bodies: dict[str, Usd.Prim], units: StageUnits) -> UsdJoint:
-    _refuse_what_is_not_read(prim)
     joint, kind_of = UsdPhysics.Joint(prim), _kind(prim, units)
     ends = []
     for bound, at, turned in (
@@ -122,7 +117,7 @@ def _kind(prim: Usd.Prim, units: StageUnits) -> tuple:
     ):
         if prim.IsA(schema):
             joint = schema(prim)
-            low, high = float(joint.GetLowerLimitAttr().Get()), float(joint.GetUpperLimitAttr().Get())
+            low, high = number(prim, joint.GetLowerLimitAttr(), inf), number(prim, joint.GetUpperLimitAttr(), inf)
             return kind, AXES[joint.GetAxisAttr().Get()], limits_of(prim, low, high, kind, units), drive
     if prim.GetTypeName() != "PhysicsJoint":
         raise FileError(f"{prim.GetPath()}: a joint of type {prim.GetTypeName()} is not modelled.")
@@ -130,13 +125,17 @@ def _kind(prim: Usd.Prim, units: StageUnits) -> tuple:
 
 
 def _by_freedoms(prim: Usd.Prim, units: StageUnits) -> tuple:
-    """Kind of a D6 joint: a freedom whose lower limit is above the upper one is locked."""
+    """Kind of a D6 joint: a freedom whose lower limit is above the upper one, or where both are zero, is locked."""
     ranges = dict.fromkeys(FREEDOMS, (-inf, inf))
     for freedom in FREEDOMS:
         if prim.HasAPI(UsdPhysics.LimitAPI, freedom):
             limit = UsdPhysics.LimitAPI(prim, freedom)
-            ranges[freedom] = float(limit.GetLowAttr().Get()), float(limit.GetHighAttr().Get())
-    free = tuple(freedom for freedom, (low, high) in ranges.items() if low <= high)
+            ranges[freedom] = number(prim, limit.GetLowAttr(), inf), number(prim, limit.GetHighAttr(), inf)
+            if ranges[freedom][0] == ranges[freedom][1] != 0.0:
+                raise FileError(
+                    f"{prim.GetPath()}: {freedom} is held at {ranges[freedom][0]}; turn or move a frame instead."
+                )
+    free = tuple(freedom for freedom, (low, high) in ranges.items() if low < high)
     if free not in PAIRS_OF:
         raise FileError(f"{prim.GetPath()}: a D6 joint with the freedoms {', '.join(free)} is not modelled.")
     kind, axis = PAIRS_OF[free]
@@ -158,8 +157,8 @@ def _unread_ranges(prim: Usd.Prim) -> list[str]:
     """Names of the ranges of a D6 joint of several freedoms; that of a single freedom is read."""
     limited = {name: UsdPhysics.LimitAPI(prim, name) for name in FREEDOMS if prim.HasAPI(UsdPhysics.LimitAPI, name)}
     ranges = [(name, float(one.GetLowAttr().Get()), float(one.GetHighAttr().Get())) for name, one in limited.items()]
-    finite = [f"limit:{name}" for name, low, high in ranges if low <= high and (low, high) != (-inf, inf)]
-    locked = sum(low > high for _, low, high in ranges)
+    finite = [f"limit:{name}" for name, low, high in ranges if low < high and (low, high) != (-inf, inf)]
+    locked = sum(low >= high for _, low, high in ranges)
     return finite if len(FREEDOMS) - locked > 1 else []
 
 
@@ -171,11 +170,3 @@ def limits_of(prim: Usd.Prim, low: float, high: float, kind: str, units: StageUn
         raise FileError(f"{prim.GetPath()}: expected the lower limit below the upper one, got {low} and {high}.")
     scale = radians(1.0) if kind == "revolute" else units.length
     return low * scale, high * scale
-
-
-def _refuse_what_is_not_read(prim: Usd.Prim):
-    """Refuse what moves the mechanism and has no counterpart in UsdPhysics."""
-    bad = [str(name) for name in prim.GetAppliedSchemas() if any(word in str(name) for word in NOT_READ_APIS)]
-    bad += [name for name in NOT_READ if prim.HasAttribute(name) and np.any(prim.GetAttribute(name).Get())]
-    if bad:
-        raise FileError(f"{prim.GetPath()}: {', '.join(bad)} is not modelled.")

@@ -14,10 +14,11 @@ import numpy as np
 from gauss import math
 from gauss.errors import FileError, NotImportedWarning, SceneError, extra
 from gauss.io.numbers import LIMITS, check_option
-from gauss.io.usd.bodies import add_body, moving_prims, rigid_bodies
+from gauss.io.usd.bodies import add_body, colliding, rigid_bodies
 from gauss.io.usd.guard import opened_stage
-from gauss.io.usd.joints import UsdJoint, joints_of, unread_limits
-from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits
+from gauss.io.usd.joints import UsdJoint, joints_of
+from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits, checked, number
+from gauss.io.usd.unread import physics_scenes, refuse_unread, unread
 from gauss.rotations import to_quaternion
 from gauss.scene import GROUND, Scene
 
@@ -50,13 +51,14 @@ def read_usd(path, limits: str = "start", root_folder=None) -> Scene:
     Warns
     -----
     NotImportedWarning
-        Of colliders, and of limits of ball joints and planes, which are not read.
+        Of colliders, limits of ball joints and planes, velocities at the start, forces that break joints, and attributes of
+        other programs on bodies and joints, which are not read.
     """
     path = Path(path)
     check_option(path, "limits", limits, LIMITS)
     stage = opened_stage(path, root_folder)
     try:
-        scene = _scene(stage, path.stem)
+        scene, not_read = _scene(stage, path.stem), unread(stage, rigid_bodies(stage).values())
         if limits == "stops":
             for name in [joint.name for joint in scene.joints.values() if joint.limits is not None]:
                 scene.stop(name)
@@ -64,40 +66,23 @@ def read_usd(path, limits: str = "start", root_folder=None) -> Scene:
         raise FileError(f"{path}: {error}") from error
     except NOT_OF_SCHEMA as error:
         raise FileError(f"{path}: USD refuses it, or a value is not of the type of its schema: {error}") from error
-    for left in _unread(stage):
+    for left in not_read:
         warnings.warn(f"{path}: not read: {left}.", NotImportedWarning, stacklevel=2)
     return scene
-
-
-def _unread(stage: Usd.Stage) -> list[str]:
-    """What is not read, in words: contacts, and limits of joints."""
-    prims = moving_prims(stage)
-    contacts = [prim.GetName() for prim in prims if prim.HasAPI(UsdPhysics.CollisionAPI)]
-    limits = [f"{prim.GetName()} ({', '.join(names)})" for prim, names in _unread_limits(stage)]
-    return [f"{what} of {_shown(names)}" for what, names in (("contacts", contacts), ("limits", limits)) if names]
-
-
-def _shown(names: list[str]) -> str:
-    return f"{', '.join(names[:8])}{', …' if len(names) > 8 else ''}"
-
-
-def _unread_limits(stage: Usd.Stage) -> list[tuple[Usd.Prim, list[str]]]:
-    """Joints with limits that are not read, and the names of these."""
-    joints = [prim for prim in moving_prims(stage) if prim.IsA(UsdPhysics.Joint)]
-    found = [(prim, unread_limits(prim)) for prim in joints if UsdPhysics.Joint(prim).GetJointEnabledAttr().Get()]
-    return [(prim, names) for prim, names in found if names]
 
 
 def _scene(stage: Usd.Stage, name: str) -> Scene:
     units, bodies = StageUnits(stage), rigid_bodies(stage)
     if not bodies:
         raise FileError("no prim is a rigid body; apply RigidBodyAPI to those that move.")
+    refuse_unread(stage, bodies.values())
     scene = Scene(name, gravity=_gravity(stage, units))
     joints = [joint for joint in joints_of(stage, bodies, units) if joint.kind != "free"]
     placed, tree = _placed(bodies, joints, units)
+    with_colliders = colliding(stage, bodies)
     for body, pose in placed.items():
         if body != GROUND:
-            add_body(scene, body, bodies[body], pose, units)
+            add_body(scene, body, bodies[body], pose, units, body in with_colliders)
     for joint in joints:
         _add_joint(scene, joint, joint.name in tree)
         if joint.name in tree:
@@ -198,6 +183,7 @@ def _vector(R: np.ndarray) -> np.ndarray:
 
 def _add_drive(scene: Scene, joint: UsdJoint, units: StageUnits):
     """Force k (target − q) + d (target rate − q̇) of a drive, within its largest force."""
+    _refuse_other_drives(joint)
     if not joint.drive or not joint.prim.HasAPI(UsdPhysics.DriveAPI, joint.drive):
         return
     drive, turns = UsdPhysics.DriveAPI(joint.prim, joint.drive), joint.kind == "revolute"
@@ -205,16 +191,18 @@ def _add_drive(scene: Scene, joint: UsdJoint, units: StageUnits):
         raise FileError(f"{joint.prim.GetPath()}: its drive gives accelerations; only drives of type 'force' are modelled.")
     unit = 1.0 / degrees(1.0) if turns else units.length  # of coordinates
     force = units.mass * units.length * (units.length if turns else 1.0)  # of forces, for units of mass, length and second
-    stiffness, damping, target, rate, largest = (
-        float(attribute.Get() or 0.0)
+    stiffness, damping, target, rate = (
+        number(joint.prim, attribute)
         for attribute in (
             drive.GetStiffnessAttr(),
             drive.GetDampingAttr(),
             drive.GetTargetPositionAttr(),
             drive.GetTargetVelocityAttr(),
-            drive.GetMaxForceAttr(),
         )
     )
+    largest = number(joint.prim, drive.GetMaxForceAttr(), inf)
+    if largest < 0.0:
+        raise FileError(f"{joint.prim.GetPath()}: its drive has a largest force of {largest}; expected one above zero.")
     k, d, q, v, most, name = (
         stiffness * force / unit,
         damping * force / unit,
@@ -233,17 +221,34 @@ def _add_drive(scene: Scene, joint: UsdJoint, units: StageUnits):
     scene.drive(name, torque=effort, name=f"drive of {name}")
 
 
+def _refuse_other_drives(joint: UsdJoint):
+    """Refuse drives along freedoms that are not read; those along locked ones do nothing."""
+    applied = [str(name).partition(":") for name in joint.prim.GetAppliedSchemas()]
+    for name in [name for schema, _, name in applied if schema == "PhysicsDriveAPI"]:
+        drive = UsdPhysics.DriveAPI(joint.prim, name)
+        limit = UsdPhysics.LimitAPI(joint.prim, name) if joint.prim.HasAPI(UsdPhysics.LimitAPI, name) else None
+        locked = limit is not None and limit.GetLowAttr().Get() >= limit.GetHighAttr().Get()
+        acts = any(number(joint.prim, one) for one in (drive.GetStiffnessAttr(), drive.GetDampingAttr()))
+        if name != joint.drive and acts and not locked:
+            raise FileError(f"{joint.prim.GetPath()}: a drive {name!r} of a {joint.kind} joint is not modelled.")
+
+
 def _gravity(stage: Usd.Stage, units: StageUnits) -> tuple[float, float, float]:
     """Gravity of the physics scene [m/s²]; down, where it says nothing."""
     up = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}[UsdGeom.GetStageUpAxis(stage)]
-    direction, size = -np.array(up), WEIGHT
-    found = next((UsdPhysics.Scene(prim) for prim in stage.Traverse() if prim.IsA(UsdPhysics.Scene)), None)
-    if found is not None:
-        given, magnitude = (
-            np.array(found.GetGravityDirectionAttr().Get(), dtype=float),
-            found.GetGravityMagnitudeAttr().Get(),
-        )
-        direction = given / np.linalg.norm(given) if given.any() else direction
-        size = WEIGHT if magnitude < 0.0 else float(magnitude) * units.length
-    x, y, z = map(float, size * direction)
+    direction = -np.array(up)
+    found = [_gravity_of(prim, direction, units) for prim in physics_scenes(stage)]
+    if any(not np.array_equal(one, found[0]) for one in found):
+        raise FileError(f"{len(found)} physics scenes with different gravity; leave one of them.")
+    x, y, z = map(float, found[0] if found else WEIGHT * direction)
     return x, y, z
+
+
+def _gravity_of(prim: Usd.Prim, down: np.ndarray, units: StageUnits) -> np.ndarray:
+    """Gravity (3,) of one physics scene [m/s²]."""
+    api = UsdPhysics.Scene(prim)
+    given = checked(prim, np.array(api.GetGravityDirectionAttr().Get(), dtype=float))
+    size = number(prim, api.GetGravityMagnitudeAttr(), inf)
+    if size == inf:
+        raise FileError(f"{prim.GetPath()}: gravity is not finite.")
+    return (given / np.linalg.norm(given) if given.any() else down) * (WEIGHT if size < 0.0 else size * units.length)

@@ -42,9 +42,9 @@ def columns(system: System, q0, v0) -> np.ndarray:
 def refuse_inconsistent(system: System, starts: np.ndarray, residual: np.ndarray):
     """Raise a StateError if an initial state violates the constraints, given the residuals (batch,)."""
     worst = int(np.argmax(residual))
+    refuse_other_pose(system, starts[: system.n_q])
     if not residual[worst] <= CONSISTENT:
         state = State(0.0, *np.split(starts[:, worst], [system.n_q]))
-        refuse_other_pose(system, state.q)
         off = violations(system, state)
         words = "; ".join(f"{name!r} {amount}" for name, amount in list(off.items())[:4])
         where = f"q0 and v0: start number {worst} has a constraint residual of {residual[worst]:.3g}: {words}"

@@ -279,3 +279,20 @@ def test_conditions_that_loops_contradict_are_refused(what):
 def test_too_few_refinements_are_named():
     with pytest.raises(SimulationError, match="refinements"):
         gauss.optimal_motion(swing_up(), 2.0, start={"rail": 0.0, "pin": 0.0}, end={"pin": 1.0}, refinements=0, intervals=3)
+
+
+@pytest.mark.parametrize(
+    "length, time, mass", [(1e9, 1, 1), (1e-9, 1, 1), (1, 1e9, 1), (1, 1e-9, 1), (1, 1, 1e9), (1, 1, 1e-9)]
+)
+def test_units_do_not_decide_on_the_optimum(length, time, mass):
+    """A cart goes 1 length: in the least time T = 2 √(m d / F), and in 2 times for the effort 12 m² d² / T³."""
+    cart, force = gauss.Scene("cart", gravity=(0.0, -9.81 * length / time**2, 0.0)), mass * length / time**2
+    cart.body("cart", mass, (0.1 * mass * length**2,) * 3, com=(0.0, 0.5 * length, 0.0))
+    cart.prismatic("rail", "ground", "cart", axis=(1, 0, 0))
+    cart.input("push", "rail", limits=4.0 * force)
+    rest = {"rail": 0.0, "rail rate": 0.0}
+    ends = {"start": rest, "end": rest | {"rail": length}}
+    least = gauss.optimal_motion(cart, (0.1 * time, 10.0 * time), cost="time", **ends)
+    assert least.duration == pytest.approx(time, rel=1e-6)
+    easy = gauss.optimal_motion(cart, 2.0 * time, **ends)
+    assert easy.cost == pytest.approx(12.0 / 8.0 * force**2 * time, rel=1e-6)
