@@ -32,9 +32,9 @@ class Term(NamedTuple):
         of the parameter; i: standard inertial parameters of all bodies.
     trace : callable
         (terms, request, acceleration or load) → its results.
-    of_frame, has_reference, has_loads, of_parameter : bool
+    of_frame, has_reference, has_loads, of_parameter, of_loops : bool
         Whether it is a function of a frame; in axes to be chosen; whether it depends on the loads of the scene; whether it
-        is the derivative by a parameter.
+        is the derivative by a parameter; whether it is of the tree with its loops eliminated.
     """
 
     arguments: str
