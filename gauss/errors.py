@@ -163,6 +163,7 @@ def did_you_mean(name: str, existing: Iterable[str]) -> str:
 
 
 DISTRIBUTIONS = {  # of imports
+    "git": "GitPython",
     "imageio_ffmpeg": "imageio-ffmpeg",
     "pinocchio": "pin",
     "pxr": "usd-core",

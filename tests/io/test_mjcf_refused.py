@@ -166,3 +166,21 @@ def test_folders_of_one_file_do_not_open_those_of_another(tmp_path):
     (tmp_path / "model.xml").write_text(f'<mujoco><compiler meshdir="/etc"/>{asset}</mujoco>')
     with pytest.raises(FileError, match="inner.xml:1: names the file '/etc/passwd' outside"):
         gauss.load(tmp_path / "model.xml")
+
+
+COPIED = '<body><geom size="1" mass="1"/></body>'
+MULTIPLYING = {
+    "replicate": ("", f'<replicate count="1000000000" offset="1 0 0">{COPIED}</replicate>'),
+    "nested": ("", f'<replicate count="1000"><replicate count="1000">{COPIED}</replicate></replicate>'),
+    "composite": ("", '<composite type="cable" count="1000000 1 1"/>'),
+    "hfield": ('<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>', COPIED),
+}
+
+
+@pytest.mark.parametrize("kind", MULTIPLYING)
+def test_elements_that_stand_for_very_many_are_refused(tmp_path, kind):
+    assets, bodies = MULTIPLYING[kind]
+    path = tmp_path / "many.xml"
+    path.write_text(f"<mujoco>{assets}<worldbody>{bodies}</worldbody></mujoco>")
+    with pytest.raises(FileError, match=r"many\.xml:1: <\w+> (makes|has) .* (elements|numbers)"):
+        gauss.load(path)

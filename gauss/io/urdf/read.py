@@ -1,8 +1,8 @@
 """URDF robots through Pinocchio's parser, with the loops and couplings of URDF+ and of a YAML file beside them.
 
 Links that fixed joints weld together become one body, named after the link that its joint moves; the others stay as named
-frames. Limits, damping, friction and collision geometry are read where they are asked for (gauss.io.urdf.extras). Not read:
-visual geometry, transmissions, plugin tags.
+frames. Limits, damping, friction, collision geometry and transmissions are read where they are asked for
+(gauss.io.urdf.extras). Not read: visual geometry, plugin tags.
 """
 
 import warnings

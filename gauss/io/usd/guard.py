@@ -45,7 +45,8 @@ def _layer(path: Path, layer_path: Path) -> Sdf.Layer:
     try:
         layer = Sdf.Layer.FindOrOpen(str(layer_path))
     except Tf.ErrorException as error:
-        raise FileError(f"{path}: USD refuses layer {layer_path.name!r}: {str(error).splitlines()[0]}") from error
+        reason = next((line.strip() for line in str(error).splitlines() if line.strip()), "it is no layer of USD")
+        raise FileError(f"{path}: USD refuses layer {layer_path.name!r}: {reason}") from error
     if layer is None:
         raise FileError(f"{path}: USD cannot read layer {layer_path.name!r}.")
     return layer
