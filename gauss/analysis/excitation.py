@@ -21,7 +21,7 @@ from gauss.analysis.regressor import RegressorModel
 from gauss.arguments import generator, named_arguments, table
 from gauss.dynamics.projection import limits as joint_limits
 from gauss.errors import ArgumentError, SimulationError, StateError, did_you_mean, require
-from gauss.scene import Scene
+from gauss.scene import Scene, Stop
 from gauss.simulation.tolerances import check_tolerances
 from gauss.system import System
 
@@ -98,8 +98,8 @@ def excitation(
     independent : sequence of str, optional
         Independent coordinates of a system with loops, as of :func:`gauss.regressor`; poses are on the branch of its start.
     limits : mapping of str to ((float, float), float, float), optional
-        Least and largest coordinate, largest rate and acceleration of each joint [rad, m, s]; those of the joint, or one
-        about the reference configuration, with loops about the start, with 2/s and 10/s² when not given.
+        Least and largest coordinate, largest rate and acceleration of each joint [rad, m, s]; when not given, the limits and
+        stops of the joint, or one about the reference configuration, with loops about the start, with 2/s and 10/s².
     friction : sequence of str
         Joints whose friction is to be found, see :func:`gauss.identify`.
     trials : int
@@ -140,8 +140,8 @@ def excitation(
     found = np.array([problem.value(start) for start in starts])
     if found.min() >= NOT_CLOSED:
         raise SimulationError(
-            f"excitation: the loops of scene {model.system.scene.name!r} do not close, or are near-singular, within the "
-            f"limits of {', '.join(problem.names)}; narrow them by limits=."
+            f"excitation: within the limits of {', '.join(problem.names)} the loops of scene {model.system.scene.name!r} do "
+            "not close, are near-singular, or pass limits or stops of other joints; narrow them by limits=."
         )
     first = starts[int(np.argmin(found))]
     best = minimize(problem.value, first, method="L-BFGS-B", options={"maxiter": 15 * problem.n}).x
@@ -166,6 +166,7 @@ class _SeriesProblem:
         self.base = list(base_of(model, random_matrix(model, 0)).base)
         self.frequency = 2.0 * np.pi / period
         self.t = np.linspace(0.0, period, SAMPLES * harmonics, endpoint=False)
+        self.bounds = _bounds(system)
         self.centre, self.largest = self._limits(
             table(limits, "excitation: limits", "((least, largest), speed, acceleration) by name")
         )
@@ -179,11 +180,10 @@ class _SeriesProblem:
                 raise ArgumentError(f"excitation: limits of {name!r}. {did_you_mean(name, self.names)}")
         centre, largest = np.zeros(self.n), np.zeros((3, self.n))
         for k, name in enumerate(self.names):
-            own = getattr(system.scene.joints.get(name), "limits", None)
-            middle = middles[k]
-            (low, high), rate, acceleration = given.get(
-                name, (own or (middle - LIMITS[0], middle + LIMITS[0]), LIMITS[1], LIMITS[2])
-            )
+            least, most = (float(bound[self.model.places[k]]) for bound in self.bounds)
+            (low, high), rate, acceleration = given.get(name, (_range(least, most, middles[k]), LIMITS[1], LIMITS[2]))
+            if low < least or high > most:
+                raise ArgumentError(f"excitation: limits of {name!r}: ({low:g}, {high:g}) passes {least:g} or {most:g}.")
             if not (low < high and rate > 0.0 and acceleration > 0.0):
                 raise ArgumentError(f"excitation: limits of {name!r}: expected ((low, high), rate, acceleration).")
             centre[k], largest[:, k] = 0.5 * (low + high), (0.5 * (high - low), rate, acceleration)
@@ -227,9 +227,26 @@ class _SeriesProblem:
 
     def _within(self, q: np.ndarray) -> bool:
         """Whether dependent joints of one freedom keep their limits."""
-        (least, largest), joints = joint_limits(self.model.system), self.model.system.joints
+        (least, largest), joints = self.bounds, self.model.system.joints
         plain = [(one.q.start, one.v.start) for one in joints if one.pair.n_v == 1]
         return all((least[k] <= q[:, entry]).all() and (q[:, entry] <= largest[k]).all() for entry, k in plain)
+
+
+def _range(least: float, most: float, middle: float) -> tuple[float, float]:
+    """Bounds of a coordinate; on sides without any those of a range about the middle."""
+    low = least if least > -np.inf else min(middle, most) - LIMITS[0]
+    return low, most if most < np.inf else max(middle, low) + LIMITS[0]
+
+
+def _bounds(system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest coordinate of each rate (n_v,), by limits and stops; infinite without."""
+    least, largest = joint_limits(system)
+    for stop in system.scene.contacts.values():
+        if isinstance(stop, Stop):
+            k = system.column(stop.joint)
+            least[k] = max(least[k], -np.inf if stop.lowest is None else stop.lowest)
+            largest[k] = min(largest[k], np.inf if stop.highest is None else stop.highest)
+    return least, largest
 
 
 def _moves(joint, places) -> bool:

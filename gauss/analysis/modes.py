@@ -25,7 +25,8 @@ def modes(system: System | Scene, state: State | None = None, *, t: float | None
     Returns
     -------
     LinearModes
-        Eigenmodes, the slowest first; :func:`gauss.mode_motion` shows one of them as a motion.
+        Eigenmodes, the slowest first. :func:`gauss.equilibrium` says where the state of rest is, and whether it is stable;
+        :func:`gauss.mode_motion` shows a mode of its ``model`` as a motion.
 
     Warns
     -----

@@ -13,7 +13,10 @@ from gauss.errors import ArgumentError, extra
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-STYLE = "body { font-family: sans-serif; max-width: 60em; margin: 2em auto } svg { max-width: 100%; height: auto }"
+STYLE = (
+    "body { font-family: sans-serif; max-width: 60em; margin: 2em auto } svg { max-width: 100%; height: auto } "
+    "pre { white-space: pre-wrap }"
+)
 
 
 def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figure"]]) -> Path:

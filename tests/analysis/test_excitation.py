@@ -79,7 +79,7 @@ def test_a_linkage_is_identified_by_its_crank(name):
 def test_loops_that_do_not_close_are_refused():
     scene = gauss.load("four_bar")
     scene.starts.clear()
-    with pytest.raises(SimulationError, match="limits of D; narrow"):
+    with pytest.raises(SimulationError, match="limits of D the loops"):
         wide = {"D": ((-3.0, 3.0), 100.0, 1e4)}
         gauss.excitation(scene, 5.0, harmonics=1, trials=3, independent=["D"], limits=wide)
 
@@ -100,3 +100,28 @@ def test_what_does_not_fit_is_refused():
         gauss.excitation(scene, 5.0, harmonics=0)
     with pytest.raises(SimulationError, match="positive"):
         gauss.excitation(scene, -1.0)
+
+
+def _stopped(scene: str, joint: str):
+    """A scene with stops of a joint 0.2 rad to both sides of its start."""
+    found = gauss.load(scene)
+    system = gauss.compile_scene(found)
+    start = system.initial_state().q[system.column(joint)]
+    found.stop(joint, lowest=start - 0.2, highest=start + 0.2)
+    return found, start, {"independent": ["A"]} if system.has_closures else {}
+
+
+@pytest.mark.parametrize("name", ["pendulum", "four_bar"])
+def test_series_keep_stops(name):
+    scene, start, options = _stopped(name, "A")
+    q = gauss.excitation(scene, 5.0, harmonics=2, trials=3, **options).at(np.linspace(0.0, 5.0, 101))[0]
+    assert (np.abs(q - start) <= 0.2).all()
+    wide = {"A": ((start - 3.0, start + 3.0), 1.0, 1.0)}
+    with pytest.raises(gauss.errors.ArgumentError, match="limits of 'A'"):
+        gauss.excitation(scene, 5.0, harmonics=2, trials=3, limits=wide, **options)
+
+
+def test_stops_of_joints_that_follow_are_kept():
+    scene, _, options = _stopped("four_bar", "C")
+    with pytest.raises(gauss.errors.SimulationError, match="stops of other joints"):
+        gauss.excitation(scene, 5.0, harmonics=2, trials=3, **options)
