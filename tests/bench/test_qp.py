@@ -164,17 +164,22 @@ def test_an_interrupted_comparison_goes_on(tmp_path):
 def test_rows_of_other_settings_or_numbers_are_measured_again(tmp_path, monkeypatch):
     """A row is known by the digests of its problem and of its solver's settings; it takes the place of the older one."""
     some = {"backends": ["daqp"], "levels": ["high"], "progress": False, "name": "mine"}
+    added = []
+    add = ResultTable.add
+    monkeypatch.setattr(ResultTable, "add", lambda table, row: added.append(row) or add(table, row))
 
-    def seconds(size: float) -> list[str]:
+    def measured(size: float) -> int:
+        """How many rows are measured for a problem of this size."""
+        before = len(added)
         instances = [of_arrays("it", "mine", size * np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], None, None)]
-        return [row["seconds"] + row["data"] for row in compare(tmp_path, instances=instances, **some).rows.values()]
+        compare(tmp_path, instances=instances, **some)
+        return len(added) - before
 
-    first = seconds(1.0)
-    assert seconds(1.0) == first
+    assert [measured(1.0), measured(1.0)] == [1, 0]
     monkeypatch.setitem(POLICIES, "daqp", replace(POLICIES["daqp"], limits={"iter_limit": 77}))
-    (second,) = seconds(1.0)
-    assert [second] != first and seconds(1.0) == [second] and seconds(2.0) != [second]
-    assert len(read_table(tmp_path / "mine.csv")) == 1
+    assert [measured(1.0), measured(1.0), measured(2.0), measured(2.0)] == [1, 0, 1, 0]
+    (row,) = read_table(tmp_path / "mine.csv")
+    assert row["data"] == added[-1]["data"] and len({(one["data"], one["settings"]) for one in added}) == 3
 
 
 @pytest.mark.slow
