@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
-from gauss.bench.checked_arrays import read_arrays, require_programme, require_real, require_sparse
 from gauss.bench.instances import Instance, of_arrays
 from gauss.bench.suite import read_fclib, read_npz, read_qps
 from gauss.bench.suite_instances import of_suite_instance
 from gauss.errors import FileError
+from gauss.io.checked_arrays import read_arrays, require_programme, require_real, require_sparse
 
 INFINITE_BOUND = 1e20  # larger bounds are infinite: the convention of the files of Matlab, and of SIF before them
 

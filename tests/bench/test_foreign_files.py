@@ -126,7 +126,7 @@ def test_matrices_of_matlab_with_indices_beyond_their_shape(tmp_path):
 
 @pytest.mark.parametrize(
     ("change", "says"),
-    [({"i": [0, 1, 99]}, "W"), ({"i": [0, 1, -9]}, "W"), ({"mu": [-0.3]}, "friction"), ({"q": [1.0]}, "friction")],
+    [({"i": [0, 1, 99]}, "W"), ({"i": [0, 1, -9]}, "W"), ({"mu": [-0.3]}, "friction"), ({"q": [1.0]}, "q")],
 )
 def test_files_of_fclib_that_are_no_programmes(tmp_path, change, says):
     _write_fclib(tmp_path, FCLIB | change)

@@ -168,3 +168,47 @@ def test_names_and_numbers_of_files_are_kept_or_refused(tmp_path):
         file["fclib_local/vectors/q"][0] = np.nan
     with pytest.raises(FileError, match="finite"):
         load_fclib(path)
+
+
+DAMAGES = {  # data set of "fclib_local", what stands there instead
+    "an index beyond the matrix": ("W/i", np.array([0, 1, 10**6])),
+    "a negative index": ("W/i", np.array([0, 1, -7])),
+    "columns that end beyond the numbers": ("W/p", np.array([0, 1, 2, 10**6])),
+    "triplets without numbers": ("W/nz", np.array([7])),
+    "a matrix of another size": ("W/m", np.array([10**9])),
+    "a matrix without size": ("W/n", np.zeros(0)),
+    "text": ("vectors/q", np.array([b"a", b"b", b"c"])),
+    "negative friction": ("vectors/mu", np.array([-0.5])),
+    "names of other contacts": ("info/contacts", np.array([b"C", b"D"])),
+    "nothing": ("vectors", None),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_files_are_refused(damage, tmp_path):
+    place, other = DAMAGES[damage]
+    path, h5py = tmp_path / "damaged.hdf5", pytest.importorskip("h5py")
+    save_fclib(ONE, path)
+    with h5py.File(path, "r+") as file:
+        del file["fclib_local"][place]
+        if other is not None:
+            file["fclib_local"][place] = other
+    with pytest.raises(FileError, match="damaged"):
+        load_fclib(path)
+
+
+@pytest.mark.parametrize("of", ["data", "a link", "a link of a link"])
+def test_numbers_of_other_files_are_not_read(of, tmp_path):
+    path, elsewhere, h5py = tmp_path / "linked.hdf5", tmp_path / "other.hdf5", pytest.importorskip("h5py")
+    save_fclib(ONE, path)
+    save_fclib(ONE, elsewhere)
+    with h5py.File(path, "r+") as file:
+        vectors = file["fclib_local/vectors"]
+        del vectors["q"]
+        if of == "data":
+            vectors.create_dataset("q", (3,), dtype="f8", external=[(elsewhere, 0, 24)])
+        else:
+            file["other"] = h5py.ExternalLink(elsewhere, "fclib_local/vectors")
+            vectors["q"] = h5py.SoftLink("/other/q") if of == "a link of a link" else h5py.ExternalLink(elsewhere, "other")
+    with pytest.raises(FileError, match="another file"):
+        load_fclib(path)

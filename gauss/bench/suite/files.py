@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from scipy import io, sparse
 
-from gauss.bench.checked_arrays import require_sparse
 from gauss.bench.export import file_name
 from gauss.bench.suite import fclib, qps
 from gauss.bench.suite.catalogue import CLASSES, VERSION
 from gauss.bench.suite.doubled import zeros
 from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.errors import FileError, did_you_mean
+from gauss.io.checked_arrays import require_sparse
 from gauss.linkages.doubled import Doubled
 
 MATRICES, VECTORS = ("P", "A", "G"), ("q", "b", "h", "lb", "ub", "friction")

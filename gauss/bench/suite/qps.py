@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from gauss.bench.checked_arrays import require_symmetric
 from gauss.bench.export import file_name
 from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
+from gauss.io.checked_arrays import require_symmetric
 
 KINDS = "N", "E", "L", "G"  # of rows
 SECTIONS = "NAME", "ROWS", "COLUMNS", "RHS", "RANGES", "BOUNDS", "QUADOBJ", "QMATRIX", "ENDATA"
