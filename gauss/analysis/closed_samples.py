@@ -34,10 +34,7 @@ class ClosedSamples:
     def __init__(self, system: System, start: State, places):
         self.system, self.start, self.places = system, start, list(places)
         self.free = [k for k in range(system.n_v) if k not in self.places]
-        entries = {
-            k: joint.q.start + k - joint.v.start for joint in system.joints for k in range(joint.v.start, joint.v.stop)
-        }
-        self.entries = [entries[k] for k in self.places]
+        self.entries = [system.entry(system.coordinates[k]) for k in self.places]
         self.residual, self.slopes = cached(system, (ClosedSamples,), lambda: _kernels(system))
 
     def poses(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -138,8 +138,7 @@ class PlannedMotion:
         """
         require(system, (System,), "states")
         held = fixed_columns(system, self.coordinates)
-        at = [system.coordinate(name) for name in self.coordinates]
-        places = [joint.q.start + joint.plain(rate or 0) for joint, rate in at]
+        places = [system.entry(name) for name in self.coordinates]
         state = system.initial_state() if start is None else start
         found = list[State]()
         for t in np.atleast_1d(np.asarray(times, dtype=float)):
@@ -335,7 +334,7 @@ def _values(system: System, names: Sequence[str], state: State) -> list[float]:
         joint, rate = system.coordinate(name)
         if rate is None and joint.pair.n_v != 1:
             raise StateError(f"plan_motion: joint {name!r} has {joint.pair.n_v} freedoms; name one rate of it.")
-        found.append(float(state.q[joint.q.start + joint.plain(rate or 0)]))
+        found.append(float(state.q[system.entry(name)]))
     return found
 
 

@@ -105,7 +105,7 @@ def plan_path(
         raise ArgumentError(f"plan_path: samples: expected a whole number, 2 or more, got {samples!r}.")
     names = _names(system, coordinates)
     columns = [system.column(name) for name in names]
-    places = [joint.q.start + joint.plain(rate or 0) for joint, rate in map(system.coordinate, names)]
+    places = [system.entry(name) for name in names]
     given = {"speeds": speeds, "accelerations": accelerations}
     limits = tuple(positive_values(system, value, key)[columns] for key, value in given.items())
     follow = _Follower(system, tuple(others), backend)

@@ -318,10 +318,7 @@ class PostureTarget(Target):
         if isinstance(self.coordinates, State):
             error, A = _displacement(system, q, self.coordinates.q)
             return TargetRows(error, A, system.scale.coordinates, np.full(error.size, self.weight))
-        apart = [
-            value - q[joint.q.start + joint.plain(rate or 0)]
-            for (joint, rate), value in ((system.coordinate(name), value) for name, value in self.coordinates.items())
-        ]
+        apart = [value - q[system.entry(name)] for name, value in self.coordinates.items()]
         weights = np.full(len(columns), self.weight)
         return TargetRows(np.array(apart), np.eye(system.n_v)[columns], system.scale.coordinates[columns], weights)
 

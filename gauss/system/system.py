@@ -13,13 +13,14 @@ import numpy as np
 
 from gauss.backends.structure import Structure
 from gauss.codegen import IS_CONTENT, Scalar
-from gauss.errors import StateError, did_you_mean, require
+from gauss.errors import StateError, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.contact_gaps import sides, slips
 from gauss.system.dynamics_protocol import Dynamics
 from gauss.system.explain import explain
 from gauss.system.frozen_functions import refuse_changed
+from gauss.system.named_places import NamedPlaces
 from gauss.system.pickling import rebuilding
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
@@ -34,7 +35,7 @@ UNIT_QUATERNION = 1e-6  # error of the length of a quaternion typed with 7 digit
 
 
 @dataclass(frozen=True)
-class System(StateFunctions):
+class System(NamedPlaces, StateFunctions):
     """Mechanism with indices. Made by :func:`gauss.compile_scene`.
 
     Parameters
@@ -171,57 +172,6 @@ class System(StateFunctions):
     def closes(self) -> bool:
         """Whether integration can drift off constraints: some subsystem has loops, couplings or relations."""
         return any(subsystem.loop_joints or subsystem.couplings or subsystem.relations for subsystem in self.subsystems)
-
-    @cached_property
-    def _joints_by_name(self) -> dict[str, PlacedJoint]:
-        return {joint.name: joint for joint in reversed(self.joints)}
-
-    @cached_property
-    def _coordinates_by_name(self) -> dict[str, tuple[PlacedJoint, int | None]]:
-        joints = self._joints_by_name.items()
-        single = {f"{name}.{rate}": (joint, k) for name, joint in joints for k, rate in enumerate(joint.pair.rates)}
-        return single | {name: (joint, None) for name, joint in joints}
-
-    def joint(self, name: str) -> PlacedJoint:
-        """Return the joint of this name.
-
-        Raises
-        ------
-        StateError
-            If there is none.
-        """
-        found = self._joints_by_name.get(name)
-        if found is None:
-            raise StateError(f"no joint {name!r}. {did_you_mean(name, [joint.name for joint in self.joints])}")
-        return found
-
-    def coordinate(self, name: str) -> tuple[PlacedJoint, int | None]:
-        """Return the joint of this name, or the joint and the number of its rate that a name such as "U.angle1" means.
-
-        Raises
-        ------
-        StateError
-            If there is neither.
-        """
-        found = self._coordinates_by_name.get(name)
-        return (self.joint(name), None) if found is None else found
-
-    def column(self, name: str) -> int:
-        """Return the place in v of a joint of one freedom, or of one rate of a joint."""
-        placed, k = self.coordinate(name)
-        return placed.v.start + (k or 0)
-
-    def frame(self, name: str) -> PlacedFrame:
-        """Return the body frame or named frame of this name.
-
-        Raises
-        ------
-        StateError
-            If there is none.
-        """
-        if name not in self.frames:
-            raise StateError(f"no body or frame {name!r}. {did_you_mean(name, self.frames)}")
-        return self.frames[name]
 
     @property
     def reference(self) -> State:
