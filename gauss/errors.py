@@ -162,6 +162,13 @@ def did_you_mean(name: str, existing: Iterable[str]) -> str:
     return f"{hint}Known: {shown or 'none yet'}."
 
 
+def listed(names: Iterable, most: int = 8) -> str:
+    """Names for a message: the first ones, and the number of the others."""
+    found = list(map(str, names))
+    more = f" and {len(found) - most} more" if len(found) > most else ""
+    return ", ".join(found[:most]) + more
+
+
 DISTRIBUTIONS = {  # of imports
     "git": "GitPython",
     "imageio_ffmpeg": "imageio-ffmpeg",

@@ -22,7 +22,7 @@ from gauss.dynamics.projection import (
     velocity_residual_of,
     within_limits,
 )
-from gauss.errors import AssemblyError, InconsistentConstraintsWarning, StartWarning, user_level
+from gauss.errors import AssemblyError, InconsistentConstraintsWarning, StartWarning, listed, user_level
 from gauss.system import State, System
 
 SHOWN = 4  # constraints or joints that a message names before it counts
@@ -118,9 +118,7 @@ def _warn_of_changes(system: System, given: State, found: State, kept, is_elsewh
     """Warn of starts that were changed, and of a pose that no path from the given one leads to."""
     changed = changed_starts(system, given, found, kept)
     if changed:
-        words = ", ".join(list(changed.values())[:SHOWN]) + (
-            f" and {len(changed) - SHOWN} more" if len(changed) > SHOWN else ""
-        )
+        words = listed(changed.values(), SHOWN)
         message = f"the constraints cannot be met with the given start: it was changed, {words}."
     elif is_elsewhere:
         message = "the constraints cannot be met near the given coordinates: the start is another assembled pose."

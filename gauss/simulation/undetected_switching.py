@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.dynamics.laws.switching_times import Timetable
-from gauss.errors import SwitchingWarning, user_level
+from gauss.errors import SwitchingWarning, listed, user_level
 from gauss.integrators import FixedStep, Integrator, Library, Rates
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
@@ -135,5 +135,4 @@ def warn_of_passages(system: System, unseen: np.ndarray, method: str):
     """
     which = np.flatnonzero(unseen > 0.0)
     if which.size:
-        some = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
-        warn_of_undetected(system.scene.name, f"in motions {some}, within a step of {method!r},")
+        warn_of_undetected(system.scene.name, f"in motions {listed(which)}, within a step of {method!r},")

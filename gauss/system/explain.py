@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.codegen.optimiser import OPTIMISER
-from gauss.errors import AssemblyError, GaussError, SimulationError
+from gauss.errors import AssemblyError, GaussError, SimulationError, listed
 
 MOST_REASONS = 5  # number of reasons of a pass that are listed
 RANK_ROWS = 150  # number of loop constraints up to which freedoms are counted by rank: the time grows with its cube
@@ -116,11 +116,7 @@ def explain(system) -> str:
         if not loops
         else f"  loop constraints, couplings, relations: {', '.join(loops)}",
         *_one_sided(system),
-        *(
-            [f"  set-valued elements: {', '.join(list(system.scene.set_valued)[:MOST_LISTED])}"]
-            if system.scene.set_valued
-            else []
-        ),
+        *([f"  set-valued elements: {listed(system.scene.set_valued, MOST_LISTED)}"] if system.scene.set_valued else []),
         *_method(system),
         *_reductions(system),
         "",
@@ -134,5 +130,5 @@ def explain(system) -> str:
         lines.append(f"  … and {len(system.joints) - MOST_LISTED} more")
     light = [name for name, J in zip(structure.bodies, np.split(system.Phi, structure.n_bodies), strict=True) if not J.all()]
     if light:
-        lines.append(f"  without inertia in some direction (joints must carry it): {', '.join(light[:MOST_LISTED])}")
+        lines.append(f"  without inertia in some direction (joints must carry it): {listed(light, MOST_LISTED)}")
     return "\n".join(lines)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from gauss.errors import listed
 from gauss.io.mjcf.actuators import (
     acts_early,
     actuators,
@@ -91,7 +92,7 @@ def _without_counterpart(named: Named, contacts: bool) -> Iterator[Finding]:
 def left_out(named: Named, stops: bool = False, contacts: bool = False, keyframe: str | int | None = None) -> list[str]:
     """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
     parts = _untouched(named, contacts) + _unlimited(named, stops) + _inactive(named, keyframe) + _uncontrolled(named)
-    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
+    return [f"{what} {listed(names)}" for what, names in parts if names]
 
 
 def _untouched(named: Named, contacts: bool) -> list[tuple[str, list[str]]]:

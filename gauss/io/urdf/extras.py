@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from gauss import rotations
-from gauss.errors import NotImportedWarning, SceneError, did_you_mean
+from gauss.errors import NotImportedWarning, SceneError, did_you_mean, listed
 from gauss.io.collision_meshes import mesh_path, mesh_vertices
 from gauss.io.guard import Source
 from gauss.io.numbers import LIMITS, add_stop, bounds, check_option
@@ -16,8 +16,6 @@ from gauss.io.urdf.guard import guarded, placed
 from gauss.io.urdf.numbers import value, values
 from gauss.io.urdf.transmissions import add_motors
 from gauss.scene import GROUND, Box, Capsule, Collider, ConvexMesh, Cylinder, Scene, Sphere
-
-MANY = 4  # names that a warning gives before it counts
 
 
 def with_extras(
@@ -83,7 +81,7 @@ def with_extras(
 def _named(text: str, names: Iterable[str | None]) -> list[str]:
     """Message with the given names; none without names."""
     found = [name for name in names if name]
-    return [text.format(_some(found))] if found else []
+    return [text.format(listed(found))] if found else []
 
 
 def _limit(scene: Scene, source: Source, element: Element, stops: bool) -> str | None:
@@ -163,8 +161,3 @@ def _frame(scene: Scene, link: str) -> str:
     if name not in scene.bodies and name not in scene.frames:
         raise SceneError(f"no link {link!r} in the tree of the robot. {did_you_mean(name, [*scene.bodies, *scene.frames])}")
     return name
-
-
-def _some(names: list[str]) -> str:
-    shown = ", ".join(names[:MANY])
-    return shown if len(names) <= MANY else f"{shown} and {len(names) - MANY} more"

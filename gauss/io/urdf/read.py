@@ -11,7 +11,7 @@ from collections.abc import Collection
 import numpy as np
 
 from gauss import rotations
-from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_you_mean, extra
+from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_you_mean, extra, listed
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.joint_file import joint_file
@@ -30,7 +30,6 @@ INERTIAS = ("physical", "as given")
 # Radius of gyration [m] of a point mass: exporters subtract m c² from moments about a joint, which leaves ± 2⁻⁵³ m c² of
 # nothing, and nobody measures inertia to less than (10 nm)².
 SPECK = 1e-8
-MANY = 4  # names that a warning gives before it counts
 
 
 def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "physical") -> Scene:
@@ -142,9 +141,10 @@ def _scene(model, balls: Collection[str] = (), as_given: bool = False) -> Scene:
 def _warn_of_inertia(scene: Scene, source: Source):
     taken = [body.name for body in scene.bodies.values() if body.inertia_as_given]
     if taken:
-        shown = ", ".join(map(repr, taken[:MANY])) + (f" and {len(taken) - MANY} more" if len(taken) > MANY else "")
         words = "taken as given, though no body has them (the triangle inequality, or inertia without mass)"
-        warnings.warn(f"{source.path}: inertias of {shown} are {words}.", UnphysicalInertiaWarning, stacklevel=5)
+        warnings.warn(
+            f"{source.path}: inertias of {listed(map(repr, taken))} are {words}.", UnphysicalInertiaWarning, stacklevel=5
+        )
 
 
 def _require_axes(source: Source):

@@ -9,7 +9,7 @@ import warnings
 from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError, NotImportedWarning
+from gauss.errors import FileError, NotImportedWarning, listed
 from gauss.io.guard import Source
 
 # Children that URDF knows, and those of common tools that do not move a mechanism by themselves.
@@ -40,7 +40,6 @@ FORCED = {
 SPRINGS = ("springStiffness", "springReference")
 ONCE = {"inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"}
 ALIKE = 0.75  # how alike a misspelt name is to what was meant
-MANY = 8  # elements that a warning names
 
 
 def refuse_couplings(source: Source):
@@ -61,7 +60,7 @@ def refuse_couplings(source: Source):
     if found:
         beside = source.path.with_suffix(".loops.toml").name
         raise FileError(
-            f"{source.path}: not read, and without it the robot is another mechanism: {_some(found)}. "
+            f"{source.path}: not read, and without it the robot is another mechanism: {listed(found)}. "
             f"Say it in {beside} beside the file (joints that close loops, couplings), and remove it here."
         )
 
@@ -91,7 +90,7 @@ def warn_of_rest(source: Source):
         ("no URDF, and not read", strange),
         ("of <gazebo>, not read, though it moves the robot there", _moving_in_gazebo(source.root)),
     ]
-    left = [f"{what}: {_some([_located(source, element) for element in elements])}" for what, elements in found if elements]
+    left = [f"{what}: {listed(_located(source, element) for element in elements)}" for what, elements in found if elements]
     if left:
         warnings.warn(f"{source.path}: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
 
@@ -130,7 +129,3 @@ def _is_forced(element: Element) -> bool:
 def _located(source: Source, element: Element) -> str:
     named = element.get("filename") or element.get("name")
     return f"<{element.tag}>{f' {named!r}' if named else ''} ({source.place(element)})"
-
-
-def _some(found: list[str]) -> str:
-    return ", ".join(found[:MANY]) + (f" and {len(found) - MANY} more" if len(found) > MANY else "")

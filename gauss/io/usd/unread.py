@@ -8,7 +8,7 @@ from math import inf
 
 import numpy as np
 
-from gauss.errors import FileError, extra
+from gauss.errors import FileError, extra, listed
 from gauss.io.usd.bodies import moving_prims
 from gauss.io.usd.joints import unread_limits
 from gauss.io.usd.poses import number
@@ -30,7 +30,6 @@ MOVING = {  # attributes that are refused where they are not zero
     }.items()
     for name in names
 }
-SHOWN = 8  # names that a warning gives
 
 
 def refuse_unread(stage: Usd.Stage, bodies: Iterable[Usd.Prim]):
@@ -54,12 +53,12 @@ def refuse_unread(stage: Usd.Stage, bodies: Iterable[Usd.Prim]):
 def unread(stage: Usd.Stage, bodies: Iterable[Usd.Prim]) -> list[str]:
     """What is not read and may change the motion, in words."""
     bodies, joints = list(bodies), enabled_joints(stage)
-    words = [f"{what} {_listed(names)}" for what, names in _of_physics(stage, bodies, joints).items() if names]
+    words = [f"{what} {listed(names)}" for what, names in _of_physics(stage, bodies, joints).items() if names]
     foreign: dict[str, list[str]] = {}
     for prim in (*bodies, *joints, *physics_scenes(stage)):
         for name in filter(_is_foreign, map(str, prim.GetAuthoredPropertyNames())):
             foreign.setdefault(name, []).append(prim.GetName())
-    return words + [f"{name} of {_listed(names)}" for name, names in sorted(foreign.items())]
+    return words + [f"{name} of {listed(names)}" for name, names in sorted(foreign.items())]
 
 
 def _of_physics(stage: Usd.Stage, bodies: list[Usd.Prim], joints: list[Usd.Prim]) -> dict[str, list[str]]:
@@ -123,7 +122,3 @@ def _has_velocity(prim: Usd.Prim) -> bool:
 def _breaks(prim: Usd.Prim) -> bool:
     joint = UsdPhysics.Joint(prim)
     return min(number(prim, one, inf) for one in (joint.GetBreakForceAttr(), joint.GetBreakTorqueAttr())) < inf
-
-
-def _listed(names: list[str]) -> str:
-    return f"{', '.join(names[:SHOWN])}{', …' if len(names) > SHOWN else ''}"

@@ -4,8 +4,8 @@ import warnings
 
 import numpy as np
 
-from gauss.errors import DivergenceWarning, SimulationError, user_level
-from gauss.simulation.energy_balance import SHOWN, imbalances, warn_of_many
+from gauss.errors import DivergenceWarning, SimulationError, listed, user_level
+from gauss.simulation.energy_balance import imbalances, warn_of_many
 from gauss.simulation.simulate import simulate
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
@@ -66,10 +66,9 @@ def tell_of_divergence(system: System, batch: int, reasons: dict[int, str], traj
     first = min(reasons)
     if len(reasons) == batch:
         raise SimulationError(f"motion {first}: {reasons[first]}", trajectories.get(first))
-    more = ", …" if len(reasons) > SHOWN else ""
     warnings.warn(
         f"scene {system.scene.name!r}: {len(reasons)} of {batch} motions do not reach the end: "
-        f"{', '.join(map(str, sorted(reasons)[:SHOWN]))}{more}. Number {first}: {reasons[first]}",
+        f"{listed(sorted(reasons))}. Number {first}: {reasons[first]}",
         DivergenceWarning,
         stacklevel=user_level(),
     )
