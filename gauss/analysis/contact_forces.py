@@ -8,6 +8,7 @@ import numpy as np
 from gauss.analysis.sample_forces import kept_with
 from gauss.analysis.sample_solution import refuse_doubtful
 from gauss.backends import Backend, solve
+from gauss.backends.certificate import UNDETERMINED_SHARE
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
@@ -21,8 +22,6 @@ from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import contact_parts, step_at
 from gauss.system import sides
-
-UNDETERMINED_SHARE = 1e-9  # of the largest entry of the null space: a force with more of it is not unique
 
 
 def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, "k m"]:

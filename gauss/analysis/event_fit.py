@@ -7,11 +7,12 @@ import numpy as np
 
 from gauss.analysis.fit_problem import FitProblem
 from gauss.analysis.sensitivities import sensitivities
-from gauss.analysis.sensitivity.motion import WHOLE, Motion
+from gauss.analysis.sensitivity.motion import Motion
 from gauss.dynamics import compile_scene
 from gauss.errors import ArgumentError, GaussError, SceneError
 from gauss.scene import Scene
 from gauss.scene.named_numbers import is_start, parsed, scene_of
+from gauss.simulation.tolerances import WHOLE
 from gauss.system import System
 
 OF_ELEMENTS = {"bodies": ("mass", "com"), "contacts": ("restitution", "lowest", "highest"), "set_valued": ("limit",)}

@@ -19,18 +19,16 @@ from gauss.analysis.base_parameters import base_of, random_matrix
 from gauss.analysis.closed_samples import ClosedSamples
 from gauss.analysis.regressor import RegressorModel
 from gauss.arguments import generator, named_arguments, table
-from gauss.dynamics.projection import limits as joint_limits
+from gauss.dynamics.projection import limits_and_stops
 from gauss.errors import ArgumentError, SimulationError, StateError, did_you_mean, require
-from gauss.scene import Scene, Stop
+from gauss.scene import Scene
 from gauss.simulation.tolerances import check_tolerances
 from gauss.system import System
 
 SAMPLES = 10  # of a period, for each harmonic: they resolve its extremes to 5 % of the limits, which are kept by MARGIN
 MARGIN = 1.0 / 0.95
 NOT_CLOSED = 690.0  # value of series along which loops do not close: near the logarithm of the largest number
-LARGEST_TRANSMISSION = (
-    100.0  # rate of a dependent coordinate over that of an independent one, in units: beyond, near-singular
-)
+LARGEST_TRANSMISSION = 100.0  # rate of a dependent coordinate over that of an independent one, in units; near-singular above
 LIMITS = (1.0, 2.0, 10.0)  # of coordinates about their centre, rates and accelerations where none are given [rad or m, s]
 
 
@@ -166,7 +164,7 @@ class _SeriesProblem:
         self.base = list(base_of(model, random_matrix(model, 0)).base)
         self.frequency = 2.0 * np.pi / period
         self.t = np.linspace(0.0, period, SAMPLES * harmonics, endpoint=False)
-        self.bounds = _bounds(system)
+        self.bounds = limits_and_stops(system)
         self.centre, self.largest = self._limits(
             table(limits, "excitation: limits", "((least, largest), speed, acceleration) by name")
         )
@@ -236,17 +234,6 @@ def _range(least: float, most: float, middle: float) -> tuple[float, float]:
     """Bounds of a coordinate; on sides without any those of a range about the middle."""
     low = least if least > -np.inf else min(middle, most) - LIMITS[0]
     return low, most if most < np.inf else max(middle, low) + LIMITS[0]
-
-
-def _bounds(system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest coordinate of each rate (n_v,), by limits and stops; infinite without."""
-    least, largest = joint_limits(system)
-    for stop in system.scene.contacts.values():
-        if isinstance(stop, Stop):
-            k = system.column(stop.joint)
-            least[k] = max(least[k], -np.inf if stop.lowest is None else stop.lowest)
-            largest[k] = min(largest[k], np.inf if stop.highest is None else stop.highest)
-    return least, largest
 
 
 def _moves(joint, places) -> bool:

@@ -12,11 +12,9 @@ import numpy as np
 from gauss.analysis.tangents import Tangents
 from gauss.analysis.target import Target, TargetRows
 from gauss.analysis.target_levels import LevelRows
-from gauss.dynamics.projection import limits as joint_limits
-from gauss.dynamics.projection import scalar_coordinates
+from gauss.dynamics.projection import limits_and_stops, scalar_coordinates
 from gauss.dynamics.store import cached
 from gauss.errors import ArgumentError, StateError, did_you_mean
-from gauss.scene import Stop
 from gauss.system import State, System
 
 ROUNDED_ERROR = 1e-11  # of a target, in radians and lengths of the scene
@@ -168,7 +166,7 @@ def _checked(targets) -> tuple[Target, ...]:
 
 def _limits(system: System, given: Mapping | None) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest coordinates (n_v,) of joints, stops and those given."""
-    own = cached(system, (_limits,), lambda: _own_limits(system))
+    own = cached(system, (limits_and_stops,), lambda: limits_and_stops(system))
     lowest, highest = (side.copy() for side in own)
     for place, pair in named_values(system, {} if given is None else given, "limits"):
         name = system.coordinates[place]
@@ -181,15 +179,4 @@ def _limits(system: System, given: Mapping | None) -> tuple[np.ndarray, np.ndarr
         joint, rate = system.coordinate(name)
         joint.plain(rate or 0)
         lowest[place], highest[place] = low, high
-    return lowest, highest
-
-
-def _own_limits(system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest coordinates (n_v,) of joints and stops."""
-    lowest, highest = joint_limits(system)
-    for stop in system.scene.contacts.values():
-        if isinstance(stop, Stop):
-            place = system.column(stop.joint)
-            lowest[place] = max(lowest[place], -np.inf if stop.lowest is None else stop.lowest)
-            highest[place] = min(highest[place], np.inf if stop.highest is None else stop.highest)
     return lowest, highest

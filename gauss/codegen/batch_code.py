@@ -18,12 +18,11 @@ from gauss.codegen.blocks import SHORTEST_OF_ROWS, STATES, StateBlocks, has_bloc
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER, Buffers, counted_loop
-from gauss.codegen.lanes import DOUBLE, INTEGER, kind, lane_indices
+from gauss.codegen.lanes import DOUBLE, INTEGER, LANE, kind, lane_indices
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p)
-LANE = ir.IntType(32)
 
 
 class BatchCode(NamedTuple):

@@ -11,6 +11,7 @@ from gauss.codegen.sincos import SinCos
 from gauss.codegen.text_builder import BIT, TextValue, written
 
 DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
+LANE = ir.IntType(32)  # index of a lane
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
 INTRINSICS |= {"min": "llvm.minnum", "max": "llvm.maxnum"}
@@ -53,7 +54,7 @@ class Lanes:
         if self.width == 1:
             return value
         places = lane_indices([0] * self.width)
-        single = self.b.insert_element(ir.Constant(self.kind, ir.Undefined), value, ir.IntType(32)(0))
+        single = self.b.insert_element(ir.Constant(self.kind, ir.Undefined), value, LANE(0))
         return self.b.shuffle_vector(single, ir.Constant(self.kind, ir.Undefined), places)
 
     def any_lane(self, mask):
@@ -139,7 +140,7 @@ class Lanes:
         if width == 1:
             vector = ir.Constant(kind(count), ir.Undefined)
             for lane, value in enumerate(values):
-                vector = self.b.insert_element(vector, value, ir.IntType(32)(lane))
+                vector = self.b.insert_element(vector, value, LANE(lane))
             return vector
         while len(values) > 1:
             width *= 2
@@ -150,7 +151,7 @@ class Lanes:
     def lane_group(self, vector, place: int):
         """Extract value ``place`` from a vector made by :meth:`joined`."""
         if self.width == 1:
-            return self.b.extract_element(vector, ir.IntType(32)(place))
+            return self.b.extract_element(vector, LANE(place))
         lanes = range(place * self.width, (place + 1) * self.width)
         return self.b.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), lane_indices(lanes))
 
@@ -185,7 +186,7 @@ class Lanes:
             return self.b.call(function, x)
         total = ir.Constant(self.kind, ir.Undefined)
         for lane in range(self.width):
-            place = ir.Constant(ir.IntType(32), lane)
+            place = ir.Constant(LANE, lane)
             value = self.b.call(function, [self.b.extract_element(part, place) for part in x])
             total = self.b.insert_element(total, value, place)
         return total
@@ -202,4 +203,4 @@ def _is_condition(value) -> bool:
 
 def lane_indices(places) -> ir.Constant:
     """Constant of the lanes that a shuffle takes."""
-    return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))
+    return ir.Constant(ir.VectorType(LANE, len(places)), list(places))

@@ -17,7 +17,7 @@ from gauss.codegen import processor
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import PAGE, POINTER, begin_function, counted_loop, input_reader, output_writer
-from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes, kind
+from gauss.codegen.lanes import DOUBLE, INTEGER, LANE, Lanes, kind
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.packed_schedule import PackedSchedule, frame_places, runs
 from gauss.codegen.packs import Pack, Packs
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 PIECE_LENGTH = 400  # units; half of gauss.codegen.outlined_pieces, for vectors fill more of the frame
 PIECE = ir.FunctionType(ir.VoidType(), [POINTER, POINTER, POINTER])  # inputs, outputs, frame
-LANE = ir.IntType(32)
 
 
 class PackedFunction(NativeFunction):

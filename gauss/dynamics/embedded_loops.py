@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends.structure import GROUND
 from gauss.codegen import LDLT
 from gauss.dynamics.aba import ZERO, ArticulatedBody, blocks, free_axes, is_zero, whole_inertia
 from gauss.dynamics.rnea import KinematicTree, force_to_inner
 
-GROUND = -1
 LEAST_RELATIVE_PIVOT = 1e-6  # of a front, over its diagonal entry; accelerations lose that share of their digits
 
 

@@ -15,6 +15,7 @@ from gauss.dynamics.assemble import assemble_motion, position_residual
 from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
+from gauss.scene import Stop
 from gauss.system import State, System, retract
 
 RESIDUAL_ROUNDOFF = 1e-13  # position residual relative to the scales of the rows: its round-off
@@ -87,6 +88,17 @@ def limits(system: System) -> tuple[np.ndarray, np.ndarray]:
         given = system.scene.joints[joint.name].limits
         if given is not None:
             lowest[joint.v], highest[joint.v] = given
+    return lowest, highest
+
+
+def limits_and_stops(system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Limits (n_v,) of the coordinate of each rate, by joints and stops; infinite without."""
+    lowest, highest = limits(system)
+    for stop in system.scene.contacts.values():
+        if isinstance(stop, Stop):
+            place = system.column(stop.joint)
+            lowest[place] = max(lowest[place], -np.inf if stop.lowest is None else stop.lowest)
+            highest[place] = min(highest[place], np.inf if stop.highest is None else stop.highest)
     return lowest, highest
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gauss.errors import FileError, NotImportedWarning, extra
+from gauss.io.collision_meshes import ABOVE
 from gauss.io.urdf.guard import guarded, require_own_meshes
 from gauss.io.urdf.numbers import for_parser
 from gauss.io.urdf.read import ROOTS, base_of, body_names
@@ -16,8 +17,6 @@ from gauss.simulation.provenance import library
 
 with extra():
     import pinocchio as pin
-
-ABOVE = 6  # folders above a file in which its package:// paths are looked for
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,12 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.errors import SimulationError, did_you_mean
+from gauss.errors import ArgumentError, SimulationError, did_you_mean
 from gauss.integrators import Tolerance
 from gauss.system import System, rate_units
 
 DEFAULT_ATOL = 1e-12  # relative to the scale of the scene: 1 rad, its length, and these in its time
+WHOLE = 1e-9  # share of a step by which a duration may differ from a whole number of steps
 KINDS = {"angle": "rad/s", "length": "m/s"}
 
 
@@ -74,6 +75,23 @@ def check_tolerances(**numbers):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
         elif name == "rtol" and value >= 1.0:
             raise SimulationError(f"rtol: expected a number below 1, a share of each coordinate and rate, got {value!r}.")
+
+
+def step_count(duration, step, what: str) -> int:
+    """Return the number of equal steps of a duration [s], for the function ``what``.
+
+    Raises
+    ------
+    SimulationError
+        If either is not a positive number.
+    ArgumentError
+        If the duration is no whole number of steps.
+    """
+    check_tolerances(duration=duration, step=step)
+    count = round(duration / step)
+    if count < 1 or abs(count * step - duration) > WHOLE * step:
+        raise ArgumentError(f"{what}: duration {duration} s is no whole number of steps of {step} s.")
+    return count
 
 
 def _pair(value, what: str) -> tuple[float, float]:

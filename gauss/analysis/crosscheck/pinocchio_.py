@@ -5,14 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.analysis.crosscheck.pinocchio_joints import JointMap, backward, forward
-from gauss.backends.structure import Edge
+from gauss.backends.structure import GROUND, Edge
 from gauss.errors import extra
 from gauss.system import PlacedJoint, State, System
 
 with extra():
     import pinocchio as pin
-
-GROUND = -1
 
 
 @dataclass(frozen=True)

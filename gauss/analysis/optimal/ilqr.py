@@ -22,11 +22,10 @@ from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import ArgumentError, SimulationError, judged_later, require
 from gauss.scene import Scene
 from gauss.simulation.passed_switching import examine_steps
-from gauss.simulation.tolerances import check_tolerances
+from gauss.simulation.tolerances import WHOLE, check_tolerances, step_count
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
 
-WHOLE = 1e-9  # share of a step by which the duration may differ from a whole number of steps
 SHARES = 0.5 ** np.arange(12)  # of the step that the line search tries
 WORTH = 1e-4  # least reduction of the cost, as a share of the predicted one
 LEAST, SMALL, LARGEST, FACTOR = (
@@ -189,10 +188,7 @@ class _Ilqr:
     def __init__(self, system: System, duration, step, cost, final, start, integrator, second_order):
         if not system.scene.inputs:
             raise SimulationError(f"ilqr: scene {system.scene.name!r} has no inputs; scene.input(name, joint) adds one.")
-        check_tolerances(duration=duration, step=step)
-        self.count = round(duration / step)
-        if self.count < 1 or abs(self.count * step - duration) > WHOLE * step:
-            raise ArgumentError(f"ilqr: duration {duration} s is no whole number of steps of {step} s.")
+        self.count = step_count(duration, step, "ilqr")
         self.system, self.h = system, step
         self.start = system.initial_state() if start is None else start
         require(self.start, (State,), "ilqr: start")

@@ -29,10 +29,8 @@ from gauss.dynamics.parameter_terms import OF_JOINTS
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import ArgumentError, SimulationError, require
 from gauss.scene import Scene
-from gauss.simulation.tolerances import check_tolerances
+from gauss.simulation.tolerances import step_count
 from gauss.system import State, System, coordinate_rates
-
-WHOLE = 1e-9  # share of a step by which the duration may differ from a whole number of steps
 
 
 class Piece(Protocol):
@@ -110,10 +108,7 @@ class Motion:
     def __init__(self, system, duration, step, state, inputs, parameters, integrator):
         require(system, (System, Scene), "sensitivities")
         system = compile_scene(system) if isinstance(system, Scene) else system
-        check_tolerances(duration=duration, step=step)
-        self.steps = round(duration / step)
-        if self.steps < 1 or abs(self.steps * step - duration) > WHOLE * step:
-            raise ArgumentError(f"sensitivities: duration {duration} s is no whole number of steps of {step} s.")
+        self.steps = step_count(duration, step, "sensitivities")
         self.h, self.start = step, system.initial_state() if state is None else state
         require(self.start, (State,), "sensitivities: state")
         refuse_other_pose(system, self.start.q)

@@ -126,22 +126,36 @@ def _kind(prim: Usd.Prim, units: StageUnits) -> tuple:
 
 def _by_freedoms(prim: Usd.Prim, units: StageUnits) -> tuple:
     """Kind of a D6 joint: a freedom whose lower limit is above the upper one, or where both are zero, is locked."""
-    ranges = dict.fromkeys(FREEDOMS, (-inf, inf))
-    for freedom in FREEDOMS:
-        if prim.HasAPI(UsdPhysics.LimitAPI, freedom):
-            limit = UsdPhysics.LimitAPI(prim, freedom)
-            ranges[freedom] = number(prim, limit.GetLowAttr(), inf), number(prim, limit.GetHighAttr(), inf)
-            if ranges[freedom][0] == ranges[freedom][1] != 0.0:
-                raise FileError(
-                    f"{prim.GetPath()}: {freedom} is held at {ranges[freedom][0]}; turn or move a frame instead."
-                )
-    free = tuple(freedom for freedom, (low, high) in ranges.items() if low < high)
+    ranges = {freedom: freedom_range(prim, freedom) for freedom in FREEDOMS}
+    for freedom, (low, high) in ranges.items():
+        if low == high != 0.0:
+            raise FileError(f"{prim.GetPath()}: {freedom} is held at {low}; turn or move a frame instead.")
+    free = tuple(freedom for freedom, limits in ranges.items() if not is_locked(*limits))
     if free not in PAIRS_OF:
         raise FileError(f"{prim.GetPath()}: a D6 joint with the freedoms {', '.join(free)} is not modelled.")
     kind, axis = PAIRS_OF[free]
     if len(free) > 1 or not free:
         return kind, axis, None, ""
     return kind, axis, limits_of(prim, *ranges[free[0]], kind, units), free[0]
+
+
+def freedom_range(prim: Usd.Prim, freedom: str) -> tuple[float, float]:
+    """Lower and upper limit of a freedom of a joint, in units of the file; infinite without.
+
+    Raises
+    ------
+    FileError
+        If one is not a number.
+    """
+    if not prim.HasAPI(UsdPhysics.LimitAPI, freedom):
+        return -inf, inf
+    limit = UsdPhysics.LimitAPI(prim, freedom)
+    return number(prim, limit.GetLowAttr(), inf), number(prim, limit.GetHighAttr(), inf)
+
+
+def is_locked(low: float, high: float) -> bool:
+    """Whether limits lock a freedom: the lower one is above the upper one, or both are equal."""
+    return not low < high
 
 
 def unread_limits(prim: Usd.Prim) -> list[str]:
@@ -155,11 +169,8 @@ def unread_limits(prim: Usd.Prim) -> list[str]:
 
 def _unread_ranges(prim: Usd.Prim) -> list[str]:
     """Names of the ranges of a D6 joint of several freedoms; that of a single freedom is read."""
-    limited = {name: UsdPhysics.LimitAPI(prim, name) for name in FREEDOMS if prim.HasAPI(UsdPhysics.LimitAPI, name)}
-    ranges = [(name, float(one.GetLowAttr().Get()), float(one.GetHighAttr().Get())) for name, one in limited.items()]
-    finite = [f"limit:{name}" for name, low, high in ranges if low < high and (low, high) != (-inf, inf)]
-    locked = sum(low >= high for _, low, high in ranges)
-    return finite if len(FREEDOMS) - locked > 1 else []
+    free = {name: limits for name in FREEDOMS if not is_locked(*(limits := freedom_range(prim, name)))}
+    return [f"limit:{name}" for name, limits in free.items() if limits != (-inf, inf)] if len(free) > 1 else []
 
 
 def limits_of(prim: Usd.Prim, low: float, high: float, kind: str, units: StageUnits) -> tuple[float, float] | None:

@@ -16,7 +16,7 @@ from gauss.errors import FileError, NotImportedWarning, SceneError, extra
 from gauss.io.numbers import LIMITS, check_option
 from gauss.io.usd.bodies import add_body, colliding, rigid_bodies
 from gauss.io.usd.guard import opened_stage
-from gauss.io.usd.joints import UsdJoint, joints_of
+from gauss.io.usd.joints import UsdJoint, freedom_range, is_locked, joints_of
 from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits, checked, number
 from gauss.io.usd.unread import physics_scenes, refuse_unread, unread
 from gauss.rotations import to_quaternion
@@ -226,10 +226,8 @@ def _refuse_other_drives(joint: UsdJoint):
     applied = [str(name).partition(":") for name in joint.prim.GetAppliedSchemas()]
     for name in [name for schema, _, name in applied if schema == "PhysicsDriveAPI"]:
         drive = UsdPhysics.DriveAPI(joint.prim, name)
-        limit = UsdPhysics.LimitAPI(joint.prim, name) if joint.prim.HasAPI(UsdPhysics.LimitAPI, name) else None
-        locked = limit is not None and limit.GetLowAttr().Get() >= limit.GetHighAttr().Get()
         acts = any(number(joint.prim, one) for one in (drive.GetStiffnessAttr(), drive.GetDampingAttr()))
-        if name != joint.drive and acts and not locked:
+        if name != joint.drive and acts and not is_locked(*freedom_range(joint.prim, name)):
             raise FileError(f"{joint.prim.GetPath()}: a drive {name!r} of a {joint.kind} joint is not modelled.")
 
 
