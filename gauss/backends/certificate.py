@@ -46,7 +46,7 @@ def certify(
     answer : Answer
         Answer of a backend.
     factor : KKTFactor, optional
-        Factorisation at hand; made anew when not given.
+        Its factorisation; made anew when not given.
     correction : tuple, optional
         Correction of the answer by this factorisation, where it is known already.
 

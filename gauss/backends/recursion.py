@@ -176,7 +176,7 @@ class Recursion:
         return self.solve_with(Factor(compulsion))[0]
 
     def solve_with(self, factor: KKTFactor) -> tuple[Answer, Correction]:
-        """Answer and its last correction, with a factorisation at hand.
+        """Answer by a given factorisation, and its last correction.
 
         Refinement goes on until the correction is at round-off or no longer halves. One step does unless masses differ by
         nine orders or more: there the factorisation itself has lost digits, and each step brings some of them back.

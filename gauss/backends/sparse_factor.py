@@ -19,7 +19,7 @@ from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.errors import BackendError
 
 REGULARISATION = 1e-10  # E, relative to the square of the length of a row if its bodies were free
-PROXIMAL_STEPS = 3  # each halves the error of rows that bind by √REGULARISATION, and takes off much more of others
+PROXIMAL_STEPS = 3  # each halves the residual of rows with a singular value of √REGULARISATION, and that of others much more
 NULL_SPACE_STEPS = 4  # proximal steps after which the null space alone is left of multipliers
 LEAST_NULL_PART = 1e-4  # of a random vector of length 1: a smaller part in the null space is round-off
 

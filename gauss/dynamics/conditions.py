@@ -51,9 +51,7 @@ CONTACT_OPERATIONS = {  # of the gap functions of a pair of shapes in the coordi
 LEAST_EIGENVALUE = 1e-9  # of a mass matrix with a diagonal of ones: smaller ones are rounding
 MOST_CLOSED_GAPS = 24  # of a phase up to which its code is made before its first evaluation: that of more takes seconds
 WIDEST_MECHANISM = 128  # rates up to which the mass matrix of a mechanism is dense straight-line code
-MOST_ROWS = (
-    10  # loop constraints of a linear model in straight-line code: 15, of a Stewart platform, take minutes to compile
-)
+MOST_ROWS = 10  # loop constraints of a linear model in straight-line code: 15, of a Stewart platform, take minutes
 
 
 def refuse_motionless(system: System, what: str):

@@ -11,8 +11,8 @@ from typing import NamedTuple
 from gauss.backends.structure import GROUND
 from gauss.system import Subsystem, System
 
-LEAST = 3  # chains: two fill too little of a vector register
-MOST = 8  # chains that are computed together
+FEWEST_CHAINS = 3  # two fill too little of a vector register
+MOST_CHAINS = 8  # that are computed together
 
 
 class BodyChain(NamedTuple):
@@ -50,7 +50,7 @@ def _classes(subsystem: Subsystem) -> list[list[BodyChain]]:
     classes: dict[tuple, list[BodyChain]] = defaultdict(list)
     for chain in _chains(subsystem):
         classes[_form(subsystem, chain)].append(chain)
-    return [chains[:MOST] for chains in classes.values() if len(chains) >= LEAST]
+    return [chains[:MOST_CHAINS] for chains in classes.values() if len(chains) >= FEWEST_CHAINS]
 
 
 def _chains(subsystem: Subsystem) -> list[BodyChain]:

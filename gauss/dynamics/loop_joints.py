@@ -18,7 +18,7 @@ AXES = np.eye(6)
 
 
 class LinkStates(NamedTuple):
-    """Links of a loop joint, where the rest of the tree is not at hand.
+    """Links of a loop joint, without the rest of the tree.
 
     Attributes
     ----------

@@ -228,7 +228,7 @@ def _comments(instance: SuiteInstance, names: list[str]):
     yield from (f"* unit {name} {unit}" for name, unit in zip(names, instance.units, strict=True))
     if reference is None:
         return
-    yield f"* reference: residual {reference.residual:.1e}, digits {reference.digits:.1f}; value and what it lacks follow"
+    yield f"* reference: residual {reference.residual:.1e}, digits {reference.digits:.1f}; value and residual follow"
     rows = [f"e{i}" for i in range(instance.b.size)], [f"i{i}" for i in range(instance.h.size)]
     for title, of, value in zip(
         ("x", "y", "z", "z_box"),

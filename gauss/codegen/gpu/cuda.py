@@ -72,7 +72,7 @@ class CudaDevice:
         return found
 
     def lowered(self, code: ThreadCode) -> Lowered:
-        """Thread code as LLVM IR; PTX is made for the device at hand where the code is loaded."""
+        """Thread code as LLVM IR; PTX is made where the code is loaded, for that device."""
         text = code.gpu_text()
         refuse_libraries(text)
         return Lowered(code.name, text, code.is_array)

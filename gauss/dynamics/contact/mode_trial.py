@@ -104,7 +104,7 @@ class ModeTrials:
         """Rates of the roots of the gear trains."""
         return np.array([state.v[self.system.column(train.root)] for train in self.trains])
 
-    def overtaken(self, state: State) -> np.ndarray:
+    def engaging(self, state: State) -> np.ndarray:
         """Freewheels whose driven joint is slower than the driver, which needs an impact."""
         return np.flatnonzero(self.one_way & (self.rates(state) < -resting(self.system, state.v) * self.sizes))
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.dynamics.contact.pair_kernels import CYCLIC, PLACE, POSE, SIZES
+from gauss.dynamics.contact.pair_kernels import CYCLIC, POSE, SIZES
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.errors import SimulationError
 
@@ -12,7 +12,6 @@ COLUMN = POSE + SIZES + 3  # pose and sizes of a part, centre of mass of its bod
 # Rows of a column for each axis of a box that counts as its first, and those that distances depend on.
 TURNED = np.array([[*(3 * i + a for i in range(3) for a in axes), *range(9, POSE)] for axes in CYCLIC])
 COLUMNS = np.concatenate([TURNED, POSE + CYCLIC, np.tile(np.arange(POSE + 3, COLUMN), (3, 1))], axis=1)
-DISTANCE_ROWS = np.array([*range(PLACE), *range(POSE, POSE + SIZES)])
 
 
 class NearContacts(NamedTuple):

@@ -31,9 +31,7 @@ NUMERIC |= {"elevation"}
 RANGES = {"range", "ctrlrange", "forcerange", "actuatorfrcrange"}  # which may be infinite
 FORBIDDEN = ("plugin", "extension")
 COPIES = "replicate", "composite", "flexcomp"  # elements that stand for many
-MOST_COPIES = (
-    10_000  # elements that these make: MuJoCo's compiler takes 5 s for 8 000, and four times as long for twice as many
-)
+MOST_COPIES = 10_000  # elements that these make: MuJoCo's compiler takes 5 s for 8 000, four times as long for twice as many
 GRIDS = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}
 LARGEST_GRID = 1e8  # numbers: 10 000 × 10 000, of which each takes memory before anything is read
 

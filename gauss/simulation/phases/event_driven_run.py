@@ -318,7 +318,7 @@ class EventDrivenRun(PythonRun):
             np.flatnonzero(width <= TOUCHING * sizes), np.array([i for i in hits if i < len(self.names)], dtype=int)
         )
         closing = touching[rate[touching] < -slow * sizes[touching]]
-        caught = self.selector.overtaken(state)
+        caught = self.selector.engaging(state)
         jumps = bool(closing.size or caught.size or driven)
         if jumps:
             happened = impact(self.system, state, touching, self.restitution, self.backend, since, driven)
