@@ -85,16 +85,18 @@ def load_fclib(path: str | PathLike) -> tuple[FrictionProblem, np.ndarray | None
         raise FileError(f"no file {str(path)!r}.")
     if not h5py.is_hdf5(path):
         raise FileError(f"{str(path)!r} is no HDF5 file.")
-    with h5py.File(path, "r") as file:
-        try:
+    try:
+        with h5py.File(path, "r") as file:
             local, W, q, mu = read_local(file)
             require_small(8.0 * q.size**2)
-            r = _numbers(file, "solution/r") if "solution/r" in file else None
+            r = _numbers(file, "solution/r").astype(float) if "solution/r" in file else None
+            if r is not None and r.size != q.size:
+                raise ValueError(f"the solution has {r.size} impulses, the problem {q.size}.")
             if not _are_finite(W.data, q, mu, r):
                 raise ValueError("expected finite numbers.")
-            return FrictionProblem(W.toarray(), q, mu, _names(local, mu.size)), r
-        except NOT_OF_FCLIB as error:
-            raise FileError(f"{str(path)!r}: {error.args[0] if error.args else error}") from error
+            return FrictionProblem(W.toarray().astype(float), q, mu, _names(local, mu.size)), r
+    except NOT_OF_FCLIB as error:
+        raise FileError(f"{str(path)!r}: {error.args[0] if error.args else error}") from error
 
 
 def write_local(file, W, q: np.ndarray, mu: np.ndarray, info: Mapping[str, str]):

@@ -180,7 +180,8 @@ DAMAGES = {  # data set of "fclib_local", what stands there instead
     "text": ("vectors/q", np.array([b"a", b"b", b"c"])),
     "negative friction": ("vectors/mu", np.array([-0.5])),
     "names of other contacts": ("info/contacts", np.array([b"C", b"D"])),
-    "nothing": ("vectors", None),
+    "no vectors": ("vectors", None),
+    "impulses of another problem": ("solution/r", np.zeros(6)),
 }
 
 
@@ -188,12 +189,21 @@ DAMAGES = {  # data set of "fclib_local", what stands there instead
 def test_damaged_files_are_refused(damage, tmp_path):
     place, other = DAMAGES[damage]
     path, h5py = tmp_path / "damaged.hdf5", pytest.importorskip("h5py")
-    save_fclib(ONE, path)
+    save_fclib(ONE, path, np.zeros(3))
     with h5py.File(path, "r+") as file:
-        del file["fclib_local"][place]
+        place = f"fclib_local/{place}" if place not in file else place
+        del file[place]
         if other is not None:
-            file["fclib_local"][place] = other
+            file[place] = other
     with pytest.raises(FileError, match="damaged"):
+        load_fclib(path)
+
+
+def test_files_that_end_too_early_are_refused(tmp_path):
+    path = tmp_path / "short.hdf5"
+    save_fclib(ONE, path)
+    path.write_bytes(path.read_bytes()[:-64])
+    with pytest.raises(FileError, match="short"):
         load_fclib(path)
 
 
