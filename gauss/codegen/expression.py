@@ -4,7 +4,10 @@ So one source computes with floats, or traces its own operations (operator overl
 Derivatives, 2nd ed., ch. 6). Nodes belong to a :class:`gauss.codegen.Graph`.
 """
 
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from numbers import Real
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
     from gauss.codegen.graph import Graph
 
 NUMBERS = (float, Real)  # float first: isinstance then rarely asks the abstract class
+INDEX_OF, OPERANDS_OF = attrgetter("index"), attrgetter("operands")  # of a node, without the overhead of a function
 
 
 class Expression:
@@ -202,7 +206,7 @@ def as_number(value) -> float | None:
     return float(value)
 
 
-def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
+def reachable(outputs, operands=OPERANDS_OF) -> list[Expression]:
     """Nodes on which the outputs depend, operands first."""
     found, waiting = set(), [node for node in outputs if isinstance(node, Expression)]
     nodes = []
@@ -212,4 +216,9 @@ def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
             found.add(node.index)
             nodes.append(node)
             waiting.extend(operands(node))
-    return sorted(nodes, key=lambda node: node.index)
+    return sorted(nodes, key=INDEX_OF)
+
+
+def operand_indices(nodes: Iterable[Expression]) -> Iterator[int]:
+    """Index of every operand of all nodes, as often as it is one."""
+    return map(INDEX_OF, chain.from_iterable(map(OPERANDS_OF, nodes)))

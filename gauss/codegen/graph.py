@@ -4,12 +4,13 @@ x·0, x·1, x + 0 and x − x are simplified (:mod:`gauss.codegen.simplification
 """
 
 import math
+import operator
 from collections.abc import Callable
 from numbers import Real
 
 import numpy as np
 
-from gauss.codegen.expression import NUMBERS, Expression, as_number, reachable
+from gauss.codegen.expression import INDEX_OF, NUMBERS, Expression, as_number, reachable
 from gauss.codegen.simplification import SIMPLER
 
 # Evaluation of operations of constants: these are folded.
@@ -23,9 +24,9 @@ UNARY: dict[str, Callable[[float], float]] = {
     "floor": lambda x: float(math.floor(x)),
 }
 BINARY: dict[str, Callable[[float, float], float]] = {
-    "add": lambda x, y: x + y,
-    "sub": lambda x, y: x - y,
-    "mul": lambda x, y: x * y,
+    "add": operator.add,
+    "sub": operator.sub,
+    "mul": operator.mul,
     "div": lambda x, y: x / y if y else x * math.inf,  # IEEE 754, as machine code divides: 0/0 is NaN, not an error
     "atan2": math.atan2,
     "min": min,
@@ -132,9 +133,10 @@ class Graph:
         if x.is_constant and y.is_constant:
             value = BINARY[op](x.value, y.value)  # most often zero with zero
             return x if value == x.value else y if value == y.value else self.constant(value)
-        simplified = SIMPLER.get(op)
-        if simplified is not None and (simpler := simplified(self, x, y)) is not None:
-            return simpler
+        if x.is_constant or y.is_constant or x is y or x.op == "neg" or y.op == "neg":  # else no rule applies
+            simplified = SIMPLER.get(op)
+            if simplified is not None and (simpler := simplified(self, x, y)) is not None:
+                return simpler
         if x.index > y.index and op in COMMUTATIVE:
             x, y = y, x
         return self._make(op, (x, y))
@@ -173,7 +175,7 @@ class Graph:
         return self._make(node.op, tuple(operands), node.value)
 
     def _make(self, op: str, operands: tuple, value=None) -> Expression:
-        key = (op, value, *[operand.index for operand in operands])
+        key = (op, value, *map(INDEX_OF, operands))
         node = self._known.get(key)
         if node is None:
             node = self._known[key] = self._new(op, operands, value)

@@ -2,6 +2,8 @@
 
 from llvmlite import ir
 
+BYTES, WHOLE, NOT_VOLATILE = ir.IntType(8).as_pointer(), ir.IntType(64), ir.IntType(1)(0)
+
 
 def intrinsic(module: ir.Module, name: str, kind: ir.Type, arguments: int) -> ir.Function:
     """Declare e.g. ``llvm.sqrt.v8f64``, all arguments and the result of one type."""
@@ -17,6 +19,5 @@ def external(module: ir.Module, name: str, result: ir.Type, arguments: list[ir.T
 
 def copy(b: ir.IRBuilder, target, source, size: int):
     """Copy ``size`` doubles between memory that does not overlap."""
-    byte, whole = ir.IntType(8).as_pointer(), ir.IntType(64)
-    function = b.module.declare_intrinsic("llvm.memcpy", [byte, byte, whole])
-    b.call(function, [b.bitcast(target, byte), b.bitcast(source, byte), whole(8 * size), ir.IntType(1)(0)])
+    function = b.module.declare_intrinsic("llvm.memcpy", [BYTES, BYTES, WHOLE])
+    b.call(function, [b.bitcast(target, BYTES), b.bitcast(source, BYTES), WHOLE(8 * size), NOT_VOLATILE])

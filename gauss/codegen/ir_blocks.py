@@ -7,13 +7,13 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen.device_module import SingleDeviceModule
-from gauss.codegen.intrinsics import external
+from gauss.codegen.intrinsics import BYTES, external
 from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes
 from gauss.codegen.recurrences import LINE
 from gauss.codegen.single_lanes import SingleLanes
 from gauss.codegen.text_builder import TextBuilder
 
-POINTER, BYTES = DOUBLE.as_pointer(), ir.IntType(8).as_pointer()
+POINTER = DOUBLE.as_pointer()
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
 PAGE = 4096  # bytes
 LARGEST_ON_STACK = 8192  # entries of a buffer; stacks of threads may be as small as 512 kB

@@ -7,7 +7,7 @@ surrounding code, and round scalar and SIMD code differently.
 from collections import Counter
 from collections.abc import Sequence
 
-from gauss.codegen.expression import Expression
+from gauss.codegen.expression import Expression, operand_indices
 
 FUSED = {"fma": (1, 1), "fms": (1, -1), "fnma": (-1, 1)}  # ± x y ± z: signs of product and sum
 CONTRACTED = {"add": ("fma", "fma"), "sub": ("fms", "fnma")}  # where the first, the second operand is the product
@@ -18,7 +18,7 @@ def fused(nodes: Sequence[Expression], outputs) -> list[Expression]:
 
     A contracted sum keeps its index, by which its users refer to it.
     """
-    uses = Counter(x.index for node in nodes for x in node.operands)
+    uses = Counter(operand_indices(nodes))
     uses.update(x.index for x in outputs if isinstance(x, Expression))
     found = {}
     for node in nodes:

@@ -53,6 +53,7 @@ def _sources(folder: str, inside: str = "") -> Iterator[tuple[str, int, int]]:
 def _content_of(paths: list[str]) -> bytes:
     total = hashlib.sha256()
     for path in paths:
-        content = (FOLDER / path).read_bytes()
+        with open(f"{FOLDER}/{path}", "rb", buffering=0) as file:  # a path object for each would take as long as its file
+            content = file.read()
         total.update(b"%s\0%d\0%s" % (path.encode(), len(content), content))
     return total.digest()

@@ -12,7 +12,7 @@ so that few are spilled (Sethi and Ullman, J. ACM 17, 1970).
 from collections import Counter
 from typing import NamedTuple
 
-from gauss.codegen.expression import Expression
+from gauss.codegen.expression import Expression, operand_indices
 from gauss.codegen.function import Function
 from gauss.codegen.graph import Graph
 from gauss.codegen.multiply_add import fused
@@ -86,8 +86,13 @@ class _Reassociation:
         """Latency of every node so far."""
         when = self.when
         for made in self.graph.nodes[len(when) :]:
-            begin = max([when[x.index] for x in made.operands], default=0)
-            when.append(begin + (LATENCY.get(made.op, 1) if made.operands else 0))
+            operands = made.operands
+            if len(operands) == 2:  # the maximum, without its overhead
+                x, y = operands
+                begin = max(when[x.index], when[y.index])
+            else:
+                begin = max([when[x.index] for x in operands], default=0)
+            when.append(begin + (LATENCY.get(made.op, 1) if operands else 0))
         return when
 
     def _sum(self, terms) -> Expression:
@@ -110,7 +115,7 @@ class _Reassociation:
 
 def _used_once(nodes, outputs) -> list[Expression]:
     """Nodes with one use, that are not outputs."""
-    uses = Counter(x.index for node in nodes for x in node.operands)
+    uses = Counter(operand_indices(nodes))
     kept = {x.index for x in outputs if isinstance(x, Expression)}
     return [node for node in nodes if uses[node.index] == 1 and node.index not in kept]
 

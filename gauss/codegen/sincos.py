@@ -10,6 +10,7 @@ from llvmlite import ir
 
 from gauss.codegen.device_module import DeviceModule
 from gauss.codegen.intrinsics import intrinsic
+from gauss.codegen.text_builder import TextBuilder
 
 LARGEST_REDUCED_ANGLE = 1e5  # [rad]: above, the products with P1 and P2 are rounded
 TWO_OVER_PI = 0.6366197723675814
@@ -63,7 +64,7 @@ class SinCos:
         function = ir.Function(self.module, ir.FunctionType(self.pair, [self.kind]), name=f"sincos_{self.width}")
         function.linkage = "internal"
         function.attributes.add("noinline")
-        b = ir.IRBuilder(function.append_basic_block("reduce"))
+        b = TextBuilder(function.append_basic_block("reduce"))
         x = function.args[0]
         sine, cosine = self._polynomials(b, x)
         size = b.call(self._intrinsic("llvm.fabs"), [x])

@@ -79,9 +79,16 @@ class LaterGraph(Graph):
         nodes = [self._origins[x.index] for x in reachable(outputs) if x.index in self._origins]
         return {node.index: node for node in nodes}
 
+    def _are_early(self, operands: tuple) -> bool:
+        """Whether operands are early results and constants alone."""
+        for x in operands:  # a generator would take longer than the rest of an operation
+            if x.index not in self._origins and not x.is_constant:
+                return False
+        return True
+
     def _make(self, op: str, operands: tuple, value=None) -> Expression:
         origins = self._origins
-        if value is None and op not in REPEATED and all(x.index in origins or x.is_constant for x in operands):
+        if value is None and op not in REPEATED and self._are_early(operands):
             nodes = [self._first.constant(x.value) if x.is_constant else origins[x.index] for x in operands]
             node = self._first.evaluation(op, nodes)
             if node is not None:

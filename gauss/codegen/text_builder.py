@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from llvmlite import ir
 
-BIT = ir.IntType(1)
+BIT, INTEGER = ir.IntType(1), ir.IntType(64)
 ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "one"}
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
 
@@ -90,6 +90,10 @@ class TextBuilder(ir.IRBuilder):
         """Number of an unsigned integer."""
         return self._value(typ, f"uitofp {_typed(value)} to {typ}")
 
+    def bitcast(self, value, typ, name=""):
+        """The same bits as a value of another type."""
+        return value if value.type == typ else self._value(typ, f"bitcast {_typed(value)} to {typ}")
+
     def load(self, ptr, name="", align=None, typ=None) -> TextValue:
         """Value in memory."""
         kind = typ or ptr.type.pointee
@@ -103,7 +107,7 @@ class TextBuilder(ir.IRBuilder):
         """Address of an element of an array of numbers."""
         if source_etype is not None or inbounds or len(indices) != 1:
             return super().gep(ptr, indices, inbounds, name, source_etype)
-        return self._value(ptr.type, f"getelementptr {ptr.type.pointee}, {_typed(ptr)}, {_typed(indices[0])}")
+        return self._value(ptr.type, f"getelementptr {ptr.type.pointee}, {_typed(ptr)}, {_index(indices[0])}")
 
     def call(self, fn, args, name="", **how):
         """Call a function."""
@@ -127,6 +131,10 @@ def _flagged(operation: str, flags) -> str:
 
 def _typed(value) -> str:
     return value.typed if type(value) is TextValue else f"{value.type} {value.get_reference()}"
+
+
+def _index(value) -> str:
+    return f"{INTEGER} {value.constant}" if type(value) is ir.Constant and value.type is INTEGER else _typed(value)
 
 
 def _aligned(align: int | None) -> str:
