@@ -225,8 +225,8 @@ def _cut(points: list[Corner], side: list[float], closed: bool) -> list[Corner]:
         follows = (k + 1) % len(points)
         if (closed or follows) and (depth[k] < 0.0) != (depth[follows] < 0.0):
             share = depth[k] / (depth[k] - depth[follows])
-            (x, y, z, height), (x1, y1, z1, height1) = p, points[follows]
-            kept.append((x + share * (x1 - x), y + share * (y1 - y), z + share * (z1 - z), height + share * (height1 - height)))
+            (x, y, z, u), (x1, y1, z1, u1) = p, points[follows]
+            kept.append((x + share * (x1 - x), y + share * (y1 - y), z + share * (z1 - z), u + share * (u1 - u)))
     return kept
 
 

@@ -1,7 +1,7 @@
 """Patches of contact of two solids, called from machine code in place of the kernels of a pair of shapes.
 
-The distances of a pair are asked first; its patch is kept for the rows of its near points, which are asked next: machine code
-reads it there. The biases of rows are zero: a point of a patch moves on both solids, and is found anew in each step.
+The distances of a pair are asked first; its patch is kept for the rows of its near points, which machine code writes next.
+Biases are zero: a point of a patch moves on both solids, and is found anew in each step.
 """
 
 import _thread
