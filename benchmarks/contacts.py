@@ -183,7 +183,7 @@ def crowded() -> list[list[Way]]:
     wide, heap = 0.28, convex_meshes.heap(50)
     return [
         many("stack of 10 boxes", free_bodies.stack(10), 0.3, lambda q: free_bodies.box_depth(q, (free_bodies.EDGE,) * 3)),
-        many("10 dominoes", free_bodies.dominoes(10), 0.6, lambda q: free_bodies.box_depth(q, free_bodies.TILE)),
+        many("10 dominoes", free_bodies.dominoes(10, push=3.0), 0.6, lambda q: free_bodies.box_depth(q, free_bodies.TILE)),
         many("30 balls in a bin", free_bodies.bin_of_balls(30), 1.0, lambda q: free_bodies.ball_depth(q, free_bodies.WALL)),
         many("100 balls in a bin", free_bodies.bin_of_balls(100, wall=wide), 0.6, lambda q: free_bodies.ball_depth(q, wide)),
         many("50 convex meshes in a bin", heap, 0.4, lambda q: mesh_depth(heap, q)),

@@ -36,7 +36,7 @@ def stack(n: int, friction: float = 0.5) -> Scene:
 
 
 def dominoes(n: int, push: float = 1.0) -> Scene:
-    """A row of dominoes, of which the first begins to topple."""
+    """A row of dominoes, of which the first is pushed [rad/s]: by 1 it falls back, by 3 they topple."""
     scene, (a, b, c), gap = floor("dominoes"), TILE, 0.05
     for k in range(n):
         scene.body(

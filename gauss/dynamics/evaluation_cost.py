@@ -6,7 +6,7 @@ do not predict the time of a motion.
 
 import warnings
 
-from gauss.dynamics.rules import Plan, Rejected
+from gauss.dynamics.rules import Plan, Rejected, reasons_in_words
 from gauss.dynamics.store import cached
 from gauss.errors import SlowRouteWarning, user_level
 from gauss.system import System
@@ -62,8 +62,9 @@ def warn_of_slow_route(system: System, plan: Plan, evaluations: int):
     if ratio < CLIFF or cost * evaluations < LEAST_WASTE:
         return
     text = f"an evaluation takes about {1e6 * cost:.0f} µs, {ratio:.0f} times as long as in the compiled loop"
-    why = "; ".join(dict.fromkeys(reason for rejected in plan.rejected for reason in rejected.why))
-    remedy = "write laws with gauss.math, so that they are traced" if "law" in why else "system.explain() lists the routes"
+    reasons = list(dict.fromkeys(reason for rejected in plan.rejected for reason in rejected.why))
+    why, is_of_laws = reasons_in_words(reasons), any("law" in reason for reason in reasons)
+    remedy = "write laws with gauss.math, so that they are traced" if is_of_laws else "system.explain() lists the routes"
 
     def warn():
         warnings.warn(f"{system.scene.name!r}: {text}: {why}; {remedy}.", SlowRouteWarning, stacklevel=user_level())

@@ -4,7 +4,7 @@ Of the rules that apply, the first whose conditions all hold gives the :class:`P
 conditions that they violate. The tables are in :mod:`gauss.dynamics.plan`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
@@ -14,6 +14,8 @@ from gauss.dynamics.stabilisation import Drift
 from gauss.errors import SimulationError
 from gauss.integrators import Integrator
 from gauss.system import System
+
+MOST_REASONS = 5  # violated conditions of a rule that are listed
 
 
 class Rejected(NamedTuple):
@@ -32,7 +34,13 @@ class Rejected(NamedTuple):
     why: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"{self.driver}, {self.dynamics} dynamics: {'; '.join(self.why)}"
+        return f"{self.driver}, {self.dynamics} dynamics: {reasons_in_words(self.why)}"
+
+
+def reasons_in_words(reasons: Sequence[str]) -> str:
+    """The first reasons, and how many more there are: a scene may have thousands of contacts."""
+    more = f"; and {len(reasons) - MOST_REASONS} more" if len(reasons) > MOST_REASONS else ""
+    return "; ".join(reasons[:MOST_REASONS]) + more
 
 
 @dataclass(frozen=True)
@@ -200,7 +208,8 @@ class RuleTable(NamedTuple):
             rejected.append(Rejected(rule.driver, rule.dynamics, tuple(against)))
         if wanted is not None:
             raise _refused(wanted, applicable, rejected)
-        raise SimulationError(self.refusal(ask, "; ".join(dict.fromkeys(why for found in rejected for why in found.why))))
+        reasons = dict.fromkeys(why for found in rejected for why in found.why)
+        raise SimulationError(self.refusal(ask, reasons_in_words(list(reasons))))
 
 
 def _refused(wanted: Plan, applicable: list[Rule], rejected: list[Rejected]) -> SimulationError:

@@ -54,7 +54,10 @@ class CornerOnBox(FeaturePair):
             around = _second(out) > self._rim(at)  # of an edge or corner: where two or three are positive
             apart, _, direction = ball(at, math.where(around, math.maximum(out, 0.0), 1.0), np.zeros(3), 0.0, 0.0)
             face = _one_hot(self._merits(at, x, out))
-            height = math.where(around, apart, face @ out)
+            height = face @ out
+            if self._is_of_a_box:  # it may be beside the face
+                height = math.where(reduce(math.maximum, out) - self._rim(at) > math.maximum(height, 0.0), far(at), height)
+            height = math.where(around, apart, height)
             normal = axes @ (_sides(x) * math.where(around, direction, face))
         return Touch(height - self.shape.radius, p - height * normal, normal)
 
@@ -77,12 +80,18 @@ class CornerOnBox(FeaturePair):
         """Width of a face beyond its rim: a ball turns round an edge, a corner without radius has to pass it."""
         return 0.0 if self.shape.is_round else reach(at)
 
+    @property
+    def _is_of_a_box(self) -> bool:
+        return isinstance(self.shape, Box)
+
     def _merits(self, at, x, out) -> np.ndarray:
-        """Scores of the three faces, highest of the nearest; at corners, of that farthest from the whole shape."""
+        """Scores of the three faces, highest of that which the shape is farthest out of; of a point, of the nearest one."""
         if self.shape.is_round:
             return out
         others = np.array([self._seen_from_box(at, k) for k in range(len(self.shape.corners))])
         separations = reduce(math.minimum, others * _sides(x)) - _half(self.box)
+        if self._is_of_a_box:
+            return separations
         nearly = reduce(math.maximum, out) - reach(at)
         return np.array([math.where(out[k] >= nearly, separations[k], -far(at)) for k in range(3)])
 

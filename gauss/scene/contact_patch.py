@@ -7,7 +7,7 @@ GJK and EPA: Gilbert, Johnson, Keerthi, IEEE J. Robot. Autom. 4, 1988; van den B
 IEEE Trans. Robot. 40, 2024). Clipping: Sutherland, Hodgman, Comm. ACM 17, 1974.
 """
 
-from math import dist, inf
+from math import dist, inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +43,7 @@ class ContactPoint(NamedTuple):
 
 
 Solid = Polytope | Segment | Oval | Revolved
+Corner = tuple[float, float, float, float]  # of a polygon over a face, in its axes, and its height [m]
 
 
 def solid_of(shape: Collider) -> Solid | None:
@@ -112,7 +113,7 @@ class SolidPair:
         """
         if self.second is None:
             assert isinstance(self.first, Polytope)
-            return spread(_below(self.first.vertices @ one.R.T + one.x, other.x, other.R[:, 2], reach))
+            return spread(_below(self.first.vertices, one, other, reach))
         nearest = self.nearest(one, other)
         return [] if nearest.gap > reach else self.around(nearest, one, other, reach)
 
@@ -142,15 +143,16 @@ class SolidPair:
             solids = self.first.in_coal(coal), self.second.in_coal(coal)
             places = coal.Transform3s(), coal.Transform3s()
             self.given = coal.distance, solids, places, request, coal.DistanceResult()
-        distance, (first, second), places, request, result = self.given
-        for place, pose in zip(places, (one, other), strict=True):
-            place.setRotation(pose.R)
-            place.setTranslation(pose.x)
+        distance, (first, second), (place, other_place), request, result = self.given
+        place.setRotation(one.R)
+        place.setTranslation(one.x)
+        other_place.setRotation(other.R)
+        other_place.setTranslation(other.x)
         for request.gjk_tolerance, request.epa_tolerance in self.tolerances:
             result.clear()
-            gap = distance(first, places[0], second, places[1], request, result)
-            normal = -np.array(result.normal)
-            if np.isfinite(normal).all() and abs(gap) < FAILED:
+            gap = distance(first, place, second, other_place, request, result)
+            normal = -result.normal
+            if isfinite(normal.dot(normal)) and abs(gap) < FAILED:
                 gap = self._separation(one, other, normal) if self.is_curved else gap
                 return ContactPoint(gap, np.array(result.getNearestPoint2()), normal)
         raise ArithmeticError("no nearest points")
@@ -167,58 +169,64 @@ class SolidPair:
     def patch(self, one: SolidPose, other: SolidPose, normal: np.ndarray, reach: float) -> tuple[list[ContactPoint], float]:
         """Corners of one face over the other, and the distance of the solids along its normal [m]."""
         assert self.second is not None
-        poses, solids = (one, other), (self.first, self.second)
-        toward = [pose.R.T @ d for pose, d in zip(poses, (-normal, normal), strict=True)]
-        faces = [solid.face(d) for solid, d in zip(solids, toward, strict=True)]
-        cosines = [-1.0 if f.normal is None else float(f.normal @ d) for f, d in zip(faces, toward, strict=True)]
+        toward = -normal.dot(one.R), normal.dot(other.R)
+        faces = self.first.face(toward[0]), self.second.face(toward[1])
+        cosines = [-1.0 if f.normal is None else f.normal.dot(d) for f, d in zip(faces, toward, strict=True)]
         k = 1 if cosines[1] >= cosines[0] else 0
         if cosines[k] < ACROSS:
             return [], -inf
-        own, far, face = poses[k], poses[1 - k], faces[k]
-        out = own.R @ face.normal
-        incident = solids[1 - k].face(-(far.R.T @ out))
-        seen = (incident.points @ far.R.T + (far.x - own.x)) @ own.R
-        across = float(((seen - face.points[0]) @ face.normal).min()) - incident.radius
-        points = _clipped(seen, face)
-        heights = (points - face.points[0]) @ face.normal - incident.radius
-        low = heights <= reach
-        heights, points = heights[low], points[low]
-        depths = heights + incident.radius if k == 1 else np.full(heights.size, incident.radius)
-        places = own.x + (points - depths[:, None] * face.normal) @ own.R.T
-        up = out if k == 1 else -out
-        found = [ContactPoint(height, place, up) for height, place in zip(heights.tolist(), places, strict=True)]
-        return found, across
+        own, far, distant = (other, one, self.first) if k else (one, other, self.second)
+        face, out = faces[k], own.R.dot(faces[k].normal)
+        incident = distant.face(-out.dot(far.R))
+        seen = incident.points.dot(far.R.T.dot(own.R)) + (far.x - own.x).dot(own.R)
+        heights = (seen - face.points[0]).dot(face.normal).tolist()
+        points = _clipped(list(zip(*seen.T.tolist(), heights, strict=True)), face)
+        low = [(x, y, z, height - incident.radius) for x, y, z, height in points if height - incident.radius <= reach]
+        across, up = min(heights) - incident.radius, out if k else -out
+        if not low:
+            return [], across
+        table = np.array(low)
+        depths = table[:, 3:] + incident.radius if k else incident.radius
+        places = own.x + (table[:, :3] - depths * face.normal).dot(own.R.T)
+        return [ContactPoint(point[3], place, up) for point, place in zip(low, places, strict=True)], across
 
 
-def _below(points: np.ndarray, at: np.ndarray, normal: np.ndarray, reach: float) -> list[ContactPoint]:
-    """Points near a half-space."""
-    heights = (points - at) @ normal
-    near = np.flatnonzero(heights <= reach)
-    return [ContactPoint(float(heights[k]), points[k] - heights[k] * normal, normal) for k in near]
+def _below(vertices: np.ndarray, one: SolidPose, plane: SolidPose, reach: float) -> list[ContactPoint]:
+    """Vertices of a solid near a half-space."""
+    normal = plane.R[:, 2]
+    heights = vertices.dot(normal.dot(one.R)) + normal.dot(one.x - plane.x)
+    near = heights <= reach
+    if not near.any():
+        return []
+    heights = heights[near]
+    places = one.x + vertices[near].dot(one.R.T) - heights[:, None] * normal
+    return [ContactPoint(height, place, normal) for height, place in zip(heights.tolist(), places, strict=True)]
 
 
-def _clipped(points: np.ndarray, face: Face) -> np.ndarray:
-    """Part of a polygon, edge or point over a face, in its axes."""
+def _clipped(points: list[Corner], face: Face) -> list[Corner]:
+    """Part of a polygon, edge or point over a face, in its axes, with heights over it."""
     assert face.sides is not None
-    depths = points @ face.sides[:, :3].T + face.sides[:, 3]
-    kept, closed = points.tolist(), len(points) > 2
-    for k in np.flatnonzero((depths < 0.0).any(axis=0)):
-        kept = _cut(kept, face.sides[k].tolist(), closed)
-    return np.array(kept).reshape(-1, 3)
+    closed = len(points) > 2
+    for side in face.sides.tolist():
+        points = _cut(points, side, closed)
+    return points
 
 
-def _cut(points: list[list[float]], side: list[float], closed: bool) -> list[list[float]]:
+def _cut(points: list[Corner], side: list[float], closed: bool) -> list[Corner]:
     """Part of a polygon or edge on the inner side of a plane."""
     a, b, c, d = side
-    depth = [a * x + b * y + c * z + d for x, y, z in points]
-    kept: list[list[float]] = []
+    depth = [a * x + b * y + c * z + d for x, y, z, _ in points]
+    if not points or min(depth) >= 0.0:
+        return points
+    kept: list[Corner] = []
     for k, p in enumerate(points):
         if depth[k] >= 0.0:
             kept.append(p)
         follows = (k + 1) % len(points)
         if (closed or follows) and (depth[k] < 0.0) != (depth[follows] < 0.0):
             share = depth[k] / (depth[k] - depth[follows])
-            kept.append([x + share * (y - x) for x, y in zip(p, points[follows], strict=True)])
+            (x, y, z, u), (x1, y1, z1, u1) = p, points[follows]
+            kept.append((x + share * (x1 - x), y + share * (y1 - y), z + share * (z1 - z), u + share * (u1 - u)))
     return kept
 
 

@@ -57,7 +57,7 @@ class Polytope:
 
     def face(self, direction: np.ndarray) -> Face:
         """Face most nearly across a direction."""
-        return self.faces[int(np.argmax(self.normals @ direction))]
+        return self.faces[int(self.normals.dot(direction).argmax())]
 
     def extent(self, directions: np.ndarray) -> np.ndarray:
         """Farthest that it reaches along directions (k, 3) from its centre [m]."""

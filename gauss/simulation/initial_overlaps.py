@@ -29,7 +29,7 @@ def resolve_overlaps(system: System, state: State | None = None) -> State:
     StateError
         If none is found: joints, or other shapes, keep some shapes in each other.
     SimulationError
-        If nothing can move.
+        If nothing can move, or shapes are so deep in each other that no gap leads out.
     """
     require(system, (System,), "resolve_overlaps")
     refuse_motionless(system, "resolve_overlaps")

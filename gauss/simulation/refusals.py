@@ -8,6 +8,8 @@ from gauss.integrators import Library
 from gauss.simulation.problem import Problem
 from gauss.system import System
 
+SHOWN = 5  # names of contacts in a message: a scene may have thousands
+
 
 def refuse(problem: Problem):
     """Raise an error if the start or the method does not apply to the scene, or not with its stabilisation."""
@@ -43,9 +45,10 @@ def _refuse_friction(problem: Problem):
     system, method = problem.system, problem.method
     rough = [name for name, contact in system.scene.contacts.items() if getattr(contact, "friction", 0.0)]
     if rough:
+        more = f" and {len(rough) - SHOWN} more" if len(rough) > SHOWN else ""
         raise SimulationError(
             f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
-            f"{', '.join(rough)}."
+            f"{', '.join(rough[:SHOWN])}{more}."
         )
     if method.name not in [explicit.name for explicit in integrators.EXPLICIT]:  # dense output of others costs a step each
         raise SimulationError(

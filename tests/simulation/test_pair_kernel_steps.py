@@ -123,6 +123,29 @@ def test_overlaps_at_the_start_are_named_and_resolved():
     assert np.abs(again.q - state.q).max() <= CLEARANCE
 
 
+def fingers(axis) -> gauss.Scene:
+    """Two equal pads, face to face and 1 mm deep in each other along y, that slide along an axis."""
+    scene = gauss.Scene("fingers", gravity=(0, 0, 0))
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        scene.body(name, mass=0.1, inertia=(1e-4,) * 3, position=(0.0, 0.0035 * side, 0.0))
+        scene.prismatic(f"{name} slides", "ground", name, at=(0.0, 0.0035 * side, 0.0), axis=axis)
+        scene.box(f"{name} pad", name, (0.016, 0.008, 0.016))
+    scene.contact("touch", "left pad", "right pad", friction=0.5)
+    return scene
+
+
+def test_pads_that_start_in_each_other_are_moved_apart_across_their_faces():
+    system = gauss.compile_scene(fingers(axis=(0, 1, 0)))
+    with pytest.raises(StateError, match=r"0.001 \[m, rad\] inside of 'touch'"):
+        gauss.Simulator(system, STEP)
+    assert gauss.resolve_overlaps(system).q == pytest.approx([-5e-4, 5e-4], abs=CLEARANCE)
+
+
+def test_overlaps_that_no_joint_opens_are_named():
+    with pytest.raises(StateError, match="'touch' stay in each other; its joints"):
+        gauss.resolve_overlaps(gauss.compile_scene(fingers(axis=(0, 0, 1))))
+
+
 def gripper() -> gauss.Scene:
     """Two balls that press a box of 1 kg between them with a force; friction 0.5."""
     scene = gauss.Scene("gripper")

@@ -1,11 +1,11 @@
-"""Motions with contacts against closed forms: blocks that rock, stand and turn, rimless wheel, top, row of balls."""
+"""Motions with contacts against closed forms: blocks that rock, stand, turn and topple, rimless wheel, top, row of balls."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
-from benchmarks.free_bodies import EDGE, free_body, stack
+from benchmarks.free_bodies import EDGE, dominoes, free_body, stack
 
 G = 9.81
 FIRST_ORDER = 3.0  # of errors over steps, relative: time stepping is of first order at impacts
@@ -13,6 +13,7 @@ DRIFT = 1e-9  # [m] of a stack in ten seconds
 ON_TABLE = 2e-3  # [m]: two steps at the speed of the table
 PRECESSION = 1e-6  # of an axis, by tolerances of 1e-9
 ORDER = 0.1  # of an order of convergence, found from two steps
+WAVE = 0.03  # of the time from one domino to the next: it is constant, and does not depend on the step
 ROUNDING = 1e-9  # relative, of motions whose contacts do not change
 
 
@@ -172,3 +173,18 @@ def test_a_row_of_balls_passes_on_its_speed_with_restitution(e):
     scene.contacts_all(restitution=e)
     final = moved(scene, 0.4, 1e-3).v[-1].reshape(n, 6)[-1, 0]
     assert final == pytest.approx((0.5 * (1 + e)) ** (n - 1), rel=ROUNDING)
+
+
+def test_dominoes_topple_one_after_the_other_at_a_constant_speed():
+    """The wave forgets how it began (Stronge, Proc. R. Soc. Lond. A 409, 1987); all of them lie on each other at the end."""
+    tilt, paces = np.cos(0.05), []
+    for step in (1e-3, 5e-4):
+        motion = moved(dominoes(14, push=3.0), 1.2, step)
+        q = motion.q.reshape(len(motion.t), -1, 7)
+        upright = 1.0 - 2.0 * (q[..., 4] ** 2 + q[..., 5] ** 2)
+        hit = np.array([np.interp(-tilt, -height, motion.t) for height in np.minimum.accumulate(upright).T])
+        pace = np.diff(hit)[8:]
+        assert pace == pytest.approx(np.full(pace.size, pace.mean()), rel=WAVE)
+        assert upright[-1].max() < 0.5
+        paces.append(pace.mean())
+    assert paces[0] == pytest.approx(paces[1], rel=WAVE)

@@ -14,7 +14,8 @@ from gauss.codegen import INTEGER, POINTER, Function, machine
 from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value
 from gauss.codegen.kernels.broad_phase import GridWriter
 
-PART = 16  # own rotation (9), centre (3), sizes (4) of a part in its body
+PART = 17  # own rotation (9), centre (3), sizes (4) of a part in its body, radius of the ball around it
+BALL = 16  # place of this radius
 MOVED = 31  # pose and velocities (24), sizes (4), centre of mass of the body (3)
 DISTANCE_INPUTS = 33  # rotation, centre and sizes of two shapes, length of the scene
 ROW_INPUTS = 2 * MOVED + 4  # columns of two shapes, length of the scene, signs
@@ -90,14 +91,17 @@ class _NearPairsWriter:
             self.extents[k * 3 + i] = size
 
     def _is_near(self, first: Value, second: Value) -> Value:
-        """Whether the boxes of two parts overlap, or the plane of the second reaches into that of the first."""
+        """Whether the boxes and balls of two parts overlap, or the plane of the second reaches into the box of the first."""
         r, one, other = self.r, self.moved.after(first * MOVED), self.moved.after(second * MOVED)
-        height, width, apart = r.number(0.0), r.number(0.0), r.number(-1.0)
+        height, width, apart, square = r.number(0.0), r.number(0.0), r.number(-1.0), r.number(0.0)
         for i in range(3):
             between, extent = one[9 + i] - other[9 + i], self.extents[first * 3 + i]
             normal = other[3 * i + 2]
             height, width = height + normal * between, width + r.absolute(normal) * extent
             apart = r.maximum(apart, r.absolute(between) - extent - self.extents[second * 3 + i])
+            square = square + between * between
+        near = self.own[first * PART + BALL] + self.own[second * PART + BALL] + self.settings[0]
+        apart = r.maximum(apart, square - near * near)
         is_plane = self.body[second * BODY + 1] > 0
         return r.choose(is_plane, height - width, apart) <= 0.0
 

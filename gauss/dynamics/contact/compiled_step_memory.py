@@ -11,6 +11,7 @@ from gauss.dynamics.contact.contact_changes import ModeChange, ModeRecord
 from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.system import State, System
 
+TIME, LARGEST, DOUBTFUL = STEP_SETTINGS.index("t"), LOOP_SETTINGS.index("largest"), RESULTS.index("doubtful")
 RECORDED = ("modes", "next_modes", "closed", "fresh", "counts")
 
 
@@ -53,8 +54,6 @@ class CompiledStepMemory:
     record: ModeRecord
     detection: NearDetection
     integers: dict[str, np.ndarray]
-    first_settings: np.ndarray
-    loop_settings: np.ndarray
     version = -1
 
     def __init__(self, code: CompiledSteps, layout: MemoryLayout, sizes: dict[str, int], extra: dict[str, tuple[str, int]]):
@@ -69,10 +68,10 @@ class CompiledStepMemory:
         self.at = {name: self.work[offsets[name] : offsets[name] + length] for name, length in lengths.items()}
 
     def set_first(self, system: System, resting: float, sliding: float, share: float, names: tuple, constants: dict):
-        """Settings of a step by their names, and of the loop, before its first step."""
+        """Settings of all steps by their names, and of the loop; those that differ from step to step are zero."""
         loop = {"pace": 1.0 / system.scale.time, "resting": resting, "sliding": sliding, "shares": share, "recorded": 1.0}
-        self.first_settings = np.array([constants.get(name, 0.0) for name in names])
-        self.loop_settings = np.array([loop.get(name, 0.0) for name in LOOP_SETTINGS])
+        self.at["settings"][:] = [constants.get(name, 0.0) for name in names]
+        self.at["loop"][:] = [loop.get(name, 0.0) for name in LOOP_SETTINGS]
         self.at["own"][:] = 1.0 / system.scale.coordinates
 
     def kernels(self) -> dict[str, int]:
@@ -103,13 +102,12 @@ class CompiledStepMemory:
         if self.version != self.detection.version:
             self.connect()
         at, record = self.at, self.record
-        at["q"][:], at["v"][:] = state.q, state.v
-        at["settings"][:], at["settings"][STEP_SETTINGS.index("t")] = self.first_settings, state.t
-        at["loop"][:], at["work"][:] = self.loop_settings, work
+        at["q"][:], at["v"][:], at["work"][:] = state.q, state.v, work
+        at["settings"][TIME], at["loop"][LARGEST] = state.t, 0.0
         before = record.kept()
         self.code.advance(*self.given, ends.size, address(ends), address(rows))
         _, _, changed, count = record.counts.tolist()
-        changes = record.recorded(at["changes"][: CHANGE * changed], before)
+        changes = record.recorded(at["changes"][: CHANGE * changed], before) if changed else []
         ended = int(self.integers["status"][0]) == FINISHED
-        doubtful = ended and bool(at["results"][RESULTS.index("doubtful")])
-        return LoopOfSteps(count, float(at["loop"][LOOP_SETTINGS.index("largest")]), changes, doubtful)
+        doubtful = ended and bool(at["results"][DOUBTFUL])
+        return LoopOfSteps(count, float(at["loop"][LARGEST]), changes, doubtful)

@@ -45,7 +45,7 @@ class NearDetection:
         self.pair = np.column_stack(np.nonzero(np.triu(self.law))) if is_listed else np.zeros((0, 2), dtype=np.int64)
         self.grid = grid_room(0 if is_listed else n)
         self.body = np.column_stack([table.body, table.kind == KINDS.index(HalfSpace), table.kind]).astype(np.int64)
-        self.own = np.concatenate([table.own, table.centre, table.sizes]).T.copy()
+        self.own = np.concatenate([table.own, table.centre, table.sizes, table.ball[None]]).T.copy()
         assert self.own.shape == (n, PART)
         least = table.sizes[:3].min(axis=0)
         self.edges = np.where(least > 0.0, 2.0 * least, np.inf)

@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem
 from gauss.dynamics.contact.overlaps import START_OVERLAP
-from gauss.errors import StateError
+from gauss.errors import SimulationError, StateError
 from gauss.system import State, retract
 
 REPETITIONS = 50
@@ -31,18 +31,27 @@ def resolved(stepper, state: State) -> State:
     ------
     StateError
         If none is found: the joints, or other shapes, keep some shapes in each other.
+    SimulationError
+        If shapes are so deep in each other that no gap leads out.
     """
     for _ in range(REPETITIONS):
         gap, K, H, _ = stepper.gaps_at(state)
         if not gap.size or gap.min() >= -CLEARANCE * START_OVERLAP:
+            stepper.refuse_penetration(state)  # overlaps that no gap shows
             return state
         n = np.zeros(0, dtype=int)
         laws = ContactLaws(np.arange(gap.size), n.reshape(0, 2), n, np.zeros(0), n, np.zeros(0))
         response = K @ H
-        force, _ = ContactProblem(response @ K.T, gap, laws).solve(np.zeros(gap.size))
+        W = response @ K.T
+        if not W.any():  # nothing that moves opens a gap
+            break
+        try:
+            force, _ = ContactProblem(W, gap, laws).solve(np.zeros(gap.size))
+        except SimulationError:  # no displacement opens all gaps
+            break
         state = stepper.projected(State(state.t, retract(stepper.system, state.q, force @ response), state.v))
     gap, _, _, names = stepper.gaps_at(state)
     raise StateError(
         f"t = {state.t:.6g} s: shapes of {names[int(np.argmin(gap))]!r} stay in each other; its joints or other shapes hold "
-        "them there. Move them apart with scene.start."
+        "them there. Move them apart with scene.start, or remove that contact."
     )

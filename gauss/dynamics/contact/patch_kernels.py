@@ -1,25 +1,27 @@
 """Patches of contact of two solids, called from machine code in place of the kernels of a pair of shapes.
 
-The distances of a pair are asked first; its patch is kept for the rows of its near points, which are asked next. The biases
-of rows are zero: a point of a patch moves on both solids, and is found anew in each step.
+The distances of a pair are asked first; its patch is kept for the rows of its near points, which machine code writes next.
+Biases are zero: a point of a patch moves on both solids, and is found anew in each step.
 """
 
 import _thread
 import ctypes
 from collections.abc import Callable
-from math import sqrt
+from functools import cache
 
 import numpy as np
 
+from gauss.codegen import Kernel, from_disk, write
 from gauss.codegen.kernel import SIGNATURE
-from gauss.codegen.kernels.near_pairs import DISTANCE_INPUTS, MOVED, ROW_INPUTS
-from gauss.dynamics.contact.pair_kernels import ROWS, Feature
+from gauss.codegen.kernels.near_pairs import DISTANCE_INPUTS
+from gauss.codegen.kernels.patch_rows import POINT, PatchRows
+from gauss.dynamics.contact.pair_kernels import Feature
+from gauss.rotations import cross
 from gauss.scene import Collider
-from gauss.scene.contact import STEEP_NORMAL
-from gauss.scene.contact_patch import SLOTS, ContactPoint, SolidPose
+from gauss.scene.contact import tangents
+from gauss.scene.contact_patch import SLOTS, SolidPose
 from gauss.scene.solid_pairs import PairOfSolids, solid_pair
 
-COM = 28  # first place of the centre of mass in a column of a shape
 FAR = 1e300  # distance of a point that a patch has not [m]
 
 
@@ -41,14 +43,15 @@ class PatchKernels:
     def __init__(self, shapes: Callable[[int], tuple[Collider, Collider]], count: np.ndarray, settings: np.ndarray):
         self.shapes, self.count, self.settings = shapes, count, settings
         self.pairs: dict[int, PairOfSolids] = {}
-        self.patch: list[ContactPoint] = []
-        self.features = [Feature(0, signs=(k,)) for k in range(SLOTS)]
-        unknown = np.array([-1.0, *[FAR] * (SLOTS - 1)])  # a contact whose row, asked next, is NaN: it is refused by name
+        self.patch = np.full((SLOTS, POINT), np.nan)  # points of the pair that was asked last; NaN: refused by name
+        self.features = [Feature(0, signs=(k, self.patch.ctypes.data)) for k in range(SLOTS)]
+        unknown = np.array([-1.0, *[FAR] * (SLOTS - 1)])  # a contact whose row, asked next, is NaN
         self.distances = _Entry(self._distances, DISTANCE_INPUTS, unknown)
-        self.rows = [_Entry(self._rows, ROW_INPUTS, np.full(ROWS, np.nan))]
+        self.rows = [patch_rows()]
 
     def _distances(self, given: np.ndarray, found: np.ndarray):
-        found[:], self.patch = FAR, []
+        found[:] = FAR
+        self.patch[0] = np.nan
         number = int(self.count[3])
         if number not in self.pairs:
             self.pairs[number] = solid_pair(*self.shapes(number))
@@ -56,30 +59,26 @@ class PatchKernels:
         if not pair.may_touch(places[9:12], places[25:28], reach):
             return
         given = given.copy()  # machine code writes over it
-        one, other = (SolidPose(own[:9].reshape(3, 3), own[9:12]) for own in (given[:16], given[16:32]))
-        self.patch = pair.points(one, other, reach)
-        for k, point in enumerate(self.patch):
-            found[k] = point.gap
-
-    def _rows(self, given: np.ndarray, found: np.ndarray):
-        gap, place, normal = self.patch[int(given[2 * MOVED + 1])]
-        px, py, pz = place.tolist()
-        row = [gap, px, py, pz]
-        axes = axes_of_contact(*normal.tolist())
-        for sign, start in ((1.0, COM), (-1.0, MOVED + COM)):
-            x, y, z = given[start : start + 3].tolist()
-            x, y, z = sign * (px - x), sign * (py - y), sign * (pz - z)
-            for a, b, c in axes:
-                row += [y * c - z * b, z * a - x * c, x * b - y * a, sign * a, sign * b, sign * c, 0.0, 0.0]
-        found[:] = [*row, 0.0, 0.0, 0.0]
+        one, other = SolidPose(given[:9].reshape(3, 3), given[9:12]), SolidPose(given[16:25].reshape(3, 3), given[25:28])
+        points = pair.points(one, other, reach)
+        if points:
+            self.patch[: len(points)] = [(point.gap, *point.place.tolist(), *point.normal.tolist()) for point in points]
+            found[: len(points)] = self.patch[: len(points), 0]
 
 
-def axes_of_contact(x: float, y: float, z: float) -> tuple[tuple[float, float, float], ...]:
-    """Normal and the two tangents of :func:`gauss.scene.contact.tangents`, in plain numbers."""
-    a, b, c = (-z, 0.0, x) if x * x > STEEP_NORMAL else (0.0, z, -y)
-    size = sqrt(a * a + b * b + c * c)
-    a, b, c = a / size, b / size, c / size
-    return (x, y, z), (a, b, c), (y * c - z * b, z * a - x * c, x * b - y * a)
+@cache
+def patch_rows() -> Kernel:
+    """Machine code of the row of a point, made once on a machine."""
+
+    def row(gap, place, normal, centre, other):
+        J = [
+            [*(sign * cross(arm, axis)), *(sign * axis), 0.0, 0.0]
+            for sign, arm in ((1.0, place - centre), (-1.0, place - other))
+            for axis in (normal, *tangents(normal))
+        ]
+        return [*gap, *place, *np.ravel(J), 0.0, 0.0, 0.0]
+
+    return from_disk((PatchRows,), lambda: Kernel(PatchRows(write(row, 1, 3, 3, 3, 3, name="patch_row")), batch=False))
 
 
 class _Entry:

@@ -130,6 +130,14 @@ class ShapeTable:
         return np.linalg.norm(self.centre, axis=0) + np.linalg.norm(half, axis=0) + radius
 
     @cached_property
+    def ball(self) -> np.ndarray:
+        """Radii (k,) of balls around the parts, about their centres; infinite of half-spaces [m]."""
+        around = np.linalg.norm(self.sizes[:3], axis=0) + self.sizes[3]  # of the boxes of meshes, whose vertices are nearer
+        shapes = (self.scene.shapes[part.shape] for part in self.parts)
+        nearer = [np.linalg.norm(s.hull[0], axis=1).max() if isinstance(s, ConvexMesh) else np.inf for s in shapes]
+        return np.where(self.kind == KINDS.index(HalfSpace), np.inf, np.minimum(around, nearer))
+
+    @cached_property
     def gaps(self) -> np.ndarray:
         """Numbers (k + 1,) of the gap functions before each contact, in the order of the scene."""
         return np.cumsum([0, *(len(contact.sides(self.scene)) for contact in self.contacts)])

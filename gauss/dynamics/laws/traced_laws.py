@@ -1,5 +1,6 @@
 """Laws of loads in compiled dynamics: traced laws become machine code, opaque ones are Python callbacks."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from hashlib import sha256
 
@@ -18,6 +19,7 @@ PROBE_ROUNDOFF = 1e-12  # of the values at all probes, relative to the largest: 
 ASIDE = 0.3  # distance of another state from the reference, in units of the coordinates
 UNTRACEABLE = ("TypeError: ", "TracerError: ")
 FIELDS = ("effort", "force", "moment")  # fields of loads that hold laws
+Probe = Callable[[State], Kinematics]  # kinematics of a state at which laws are compared
 
 
 class Laws:
@@ -54,6 +56,7 @@ class Laws:
         self.key = ""
         self.functions: list[tuple[str, Function]] = []
         self.motion: Kinematics | None = None
+        self.probed: dict[tuple[float, bytes, bytes], Kinematics] = {}
         for number, bound in enumerate(system.loads):
             found = [self._traced(law) for law in _laws(bound.load)]
             functions = [function for function in found if isinstance(function, Function)]
@@ -64,6 +67,7 @@ class Laws:
             else:
                 self.called.append(bound)
                 self.reasons[bound.load.name] = next(reason for reason in found if isinstance(reason, str))
+        self.probed.clear()
 
     def _traced(self, law) -> Function | str:
         """Traced law, or the reason why it is opaque."""
@@ -71,7 +75,14 @@ class Laws:
             return "it may change"
         if self.motion is None:
             self.motion = symbols(self.system)
-        return _confirmed(law, traced_law(law, self.motion), self.motion)
+        return _confirmed(law, traced_law(law, self.motion), self.motion, self._probe)
+
+    def _probe(self, state: State) -> Kinematics:
+        """Kinematics of a state at which laws are probed, the same for all of them."""
+        key = float(state.t), state.q.tobytes(), state.v.tobytes()
+        if key not in self.probed:
+            self.probed[key] = kinematics(self.system, state)
+        return self.probed[key]
 
     def fails(self, name: str) -> bool:
         """Whether a law of a load with opaque laws fails with symbols, so that it uses its arguments."""
@@ -121,11 +132,11 @@ def traced_law(law, motion: Kinematics) -> Function | str:
     return Function("law", [], values)
 
 
-def _confirmed(law, traced: Function | str, motion: Kinematics) -> Function | str:
+def _confirmed(law, traced: Function | str, motion: Kinematics, probe: Probe) -> Function | str:
     """Traced law, if it agrees with the law itself; a law that depends on the type of its argument does not."""
     if isinstance(traced, str):
         return traced
-    system, make = motion.system, lambda: _agrees(law, traced, motion)
+    system, make = motion.system, lambda: _agrees(law, traced, motion, probe)
     same = cached(system, (_agrees, _digest(system, traced)), make)
     return traced if same else "called with numbers it gives others than those that were traced"
 
@@ -136,7 +147,7 @@ def _digest(system: System, traced: Function) -> str:
     return cached(system, (_digest, ends), lambda: sha256(traced.text().encode()).hexdigest())
 
 
-def _agrees(law, traced: Function, motion: Kinematics) -> bool:
+def _agrees(law, traced: Function, motion: Kinematics, probe: Probe) -> bool:
     """Whether a law and its trace agree at the probe times; times at which the law fails do not count.
 
     A law of poses is also compared at another state: where it vanishes at the reference, only round-off could be compared.
@@ -149,7 +160,7 @@ def _agrees(law, traced: Function, motion: Kinematics) -> bool:
         states.append(replace(states[1], q=q, v=v))
     for state in states:
         try:
-            pairs.append(_values(law, traced, motion, state))
+            pairs.append(_values(law, traced, motion, state, probe))
         except Exception:  # the motion reports failures
             continue
     if any(np.shape(called) != np.shape(found) for called, found in pairs):
@@ -161,10 +172,10 @@ def _agrees(law, traced: Function, motion: Kinematics) -> bool:
     )
 
 
-def _values(law, traced: Function, motion: Kinematics, state: State) -> tuple[np.ndarray, np.ndarray]:
+def _values(law, traced: Function, motion: Kinematics, state: State, probe: Probe) -> tuple[np.ndarray, np.ndarray]:
     """Values of a law at a state, and those of its trace."""
     with preserved(law):
-        here = kinematics(motion.system, state) if arguments(law) > 1 else None
+        here = probe(state) if arguments(law) > 1 else None
         called = np.ravel(np.asarray(as_function(law)(state.t, here), dtype=float))
     symbols = [motion.state.t, *motion.state.q, *motion.state.v]
     folded = substitute(traced.outputs, symbols, [state.t, *state.q, *state.v])

@@ -106,7 +106,8 @@ class ContactMotion:
         begin, loop = self.state, self.stepper.run(self.state, self.work, ends, rows)
         if not loop.steps:
             return 0, False
-        self._note([begin.t, *ends], loop.changes)
+        if loop.changes:
+            self._note([begin.t, *ends], loop.changes)
         self.steps, self.largest = self.steps + loop.steps, max(self.largest, loop.largest)
         if loop.doubtful:
             before = begin if loop.steps == 1 else self._state_of(rows[loop.steps - 2])

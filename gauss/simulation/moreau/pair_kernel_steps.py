@@ -89,9 +89,7 @@ class PairKernelSteps:
         row = rows[-2] if len(rows) > 1 else row
         last = rows[-1]
         point[: layout.row] = last
-        mean = (last - row) / (last[0] - row[0])
-        point[layout.row : layout.row + n_v] = mean[-3 - n_v : -3]
-        point[layout.row + n_v : layout.row + n_v + 3] = mean[-3:]
+        point[layout.row : layout.row + n_v + 3] = (last[end:] - row[end:]) / (last[0] - row[0])  # of rates and work
         if self.gaps:
             point[layout.row + n_v + 3 :][: self.gaps] = motion.stepper.gap_forces()
 
