@@ -177,6 +177,20 @@ def test_curves_of_two_motions_say_which_side_they_are_of(motion):
         assert [both.count(f">{label}{side}<") for side in ("", ", left", ", right")] == [0, 1, 1]
 
 
+def test_meshes_of_both_motions_are_drawn(motion):
+    from gauss.io.visuals import Visual
+
+    triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    first, second = ([Visual(body, triangle, np.array([[0, 1, 2]]), (1.0, 1.0, 1.0))] for body in ("crank", "rocker"))
+    both = show(motion, visuals=first, beside=motion, beside_visuals=second, port=_free_port())
+    try:
+        for stage, body in zip(both.player.stages, ("crank", "rocker"), strict=True):
+            drawn = [handle for name, handle in stage.solids if name == body]
+            assert [len(handle.vertices) for handle in drawn] == [len(triangle)]
+    finally:
+        both.close()
+
+
 def test_pictures_between_samples_lie_on_the_motion():
     coarse = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 11))
     fine = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 41))
