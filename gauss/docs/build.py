@@ -11,7 +11,7 @@ from gauss.errors import FileError, extra
 
 HERE = Path(__file__).parent
 PACKAGES = ("furo", "joblib", "myst_parser", "sphinx_copybutton", "sphinx_design", "sphinx_gallery", "gymnasium")
-OF_EXAMPLES = ("casadi", "example_robot_data", "xarray")
+OF_EXAMPLES = ("casadi", "xarray")
 
 
 def build(output: Path, program, gallery: bool = True, strict: bool = False) -> Path:

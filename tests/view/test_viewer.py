@@ -19,6 +19,7 @@ from gauss.view.viewer.forms import forms
 from gauss.view.viewer.framing import FIELD, framing, joined
 from gauss.view.viewer.show import LOOPBACK, _free_port
 from gauss.view.viewer.shown import resampled
+from gauss.view.viewer.stage import own_colour
 
 FLOATS = 1e-6  # relative: positions travel in single precision
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -230,6 +231,8 @@ def test_terrain_is_drawn_and_lies_above_the_floor():
     assert len(drawn.faces) == 4
     assert (drawn.face_normals[:, 2] > 0.0).all()
     assert framing(motion).floor[2] < np.array(field.heights).min() + 0.3
+    seen = {own_colour(form) for form in forms(motion.system) if form.role == "contact"}
+    assert len(seen) == 2  # the ball is seen against it
 
 
 def test_meshes_of_a_robot_are_in_place():
