@@ -50,6 +50,10 @@ def show(
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
     """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
+    if film is not None and html is None and (beside is not None or dark):
+        raise FileError(
+            f"{film}: a film shows one motion on the light ground; --beside and --dark are for the viewer and --html."
+        )
     if Path(scene).suffix.lower() in import_module("gauss.io.load").RESULTS:
         thing = gauss.load_motion(scene)
         visuals = _kept(scene, thing.system.scene)
@@ -62,15 +66,16 @@ def show(
     viewer = import_module("gauss.view.viewer")  # its library takes long to import
     joints = _joints(thing, reactions)
     second = None if beside is None else gauss.load_motion(beside)
+    others = [] if second is None else _kept(str(beside), second.system.scene)
     look: dict[str, Any] = {"visuals": visuals, "joints": joints, "traces": trace}
     if html is not None:
-        written = viewer.export_html(thing, html, beside=second, dark=dark, **look)
+        written = viewer.export_html(thing, html, beside=second, beside_visuals=others, dark=dark, **look)
         typer.echo(f"viewer written to {written}")
     if film is not None:
         typer.echo(f"film written to {viewer.export_film(thing, film, **look)}")
     if html is not None or film is not None:
         return
-    running = viewer.show(thing, beside=second, dark=dark, port=port, browser=browser, **look)
+    running = viewer.show(thing, beside=second, beside_visuals=others, dark=dark, port=port, browser=browser, **look)
     typer.echo(f"{running.url} (Ctrl+C ends it)")
     running.wait()
 

@@ -10,6 +10,8 @@ from gauss.docs import generated, notebooks, reference
 from gauss.errors import FileError, extra
 
 HERE = Path(__file__).parent
+PACKAGES = ("furo", "joblib", "myst_parser", "sphinx_copybutton", "sphinx_design", "sphinx_gallery", "gymnasium")
+OF_EXAMPLES = ("casadi", "xarray")
 
 
 def build(output: Path, program, gallery: bool = True, strict: bool = False) -> Path:
@@ -40,7 +42,7 @@ def build(output: Path, program, gallery: bool = True, strict: bool = False) -> 
         If Sphinx or one of its extensions is not installed.
     """
     with extra("docs"):
-        for package in ("furo", "joblib", "myst_parser", "sphinx_copybutton", "sphinx_design", "sphinx_gallery"):
+        for package in (*PACKAGES, *(OF_EXAMPLES if gallery else ())):
             import_module(package)
         sphinx = import_module("sphinx.cmd.build")
     work = output / ".build"

@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 
-import gymnasium
 import numpy as np
 
-from gauss.errors import ArgumentError
+from gauss.errors import ArgumentError, extra
 from gauss.scene import Scene
+
+with extra("gym"):
+    import gymnasium
 
 
 def _never(q, v, u, y) -> np.ndarray:

@@ -93,7 +93,6 @@ def to_table(result):
 
 def write_netcdf(thing, path: Path) -> Path:
     """Write a result as netCDF 4, which any netCDF or HDF5 reader reads."""
-    library("h5netcdf")
     found = _labelled(thing)
     meshes = {name: {"zlib": True} for name in ("mesh_vertex", "mesh_triangle") if name in found}
     found.to_netcdf(path, engine="h5netcdf", encoding=meshes)
@@ -102,7 +101,6 @@ def write_netcdf(thing, path: Path) -> Path:
 
 def write_zarr(thing, path: Path) -> Path:
     """Write a result as a Zarr folder."""
-    library("zarr")
     _labelled(thing).to_zarr(path, mode="w", zarr_format=2, consolidated=True)
     return path
 

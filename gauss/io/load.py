@@ -90,6 +90,8 @@ def writer(path: Path, kind: str) -> Callable:
     ------
     FileError
         If the ending does not fit, or there is no such folder.
+    MissingPackageError
+        If the library of such files is not installed.
     """
     writers = WRITERS[kind]
     if path.suffix.lower() not in writers:
@@ -97,6 +99,10 @@ def writer(path: Path, kind: str) -> Callable:
         raise FileError(f"{path}: a {NAMES.get(kind, kind)} is written as {' or '.join(writers)}.{remedy}")
     if not path.parent.is_dir():
         raise FileError(f"{path}: there is no folder {str(path.parent)!r}.")
+    wanted, library = LIBRARIES.get(path.suffix.lower(), ("", ""))
+    if wanted:
+        with extra(wanted):
+            import_module(library)
     return writers[path.suffix.lower()]
 
 
@@ -232,6 +238,7 @@ LABELLED = {
     ".h5": _later("gauss.io.dataset", "write_netcdf"),
     ".zarr": _later("gauss.io.dataset", "write_zarr"),
 }
+LIBRARIES = {".nc": ("results", "h5netcdf"), ".h5": ("results", "h5netcdf"), ".zarr": ("sweep", "zarr")}  # and their extras
 TABLES = {".csv": _table("write_csv"), ".json": _table("write_json")}
 RESULTS = {".npz": _table("write_arrays")} | TABLES | LABELLED
 WRITERS: dict[str, dict[str, Callable]] = {  # by the name of the class: most are not imported yet

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from gauss.errors import ArgumentError, require
 from gauss.simulation import Trajectory
-from gauss.system import coordinate_units
+from gauss.system import coordinate_rates, coordinate_units
 from gauss.view.plots import FLOOR, scalar_coordinates
 from gauss.view.style import check_format, legend, looks, saved
 
@@ -15,7 +15,9 @@ MOST = 6  # coordinates of a figure when none are named
 def plot_comparison(motions, coordinates=None, path=None, labels=None) -> Figure:
     """Figure of several motions: each coordinate against time, and the sizes of its differences from the first motion.
 
-    Motions may have samples at different times; differences are taken where both last, between samples by straight lines.
+    Motions may have samples at different times: differences are taken at those of the motion with fewer, where both last; the
+    other is interpolated by cubics of its coordinates and rates, with an error of the order h⁴ of its steps. Motions at the
+    same times (``simulate(…, times=…)``) are compared exactly.
 
     Parameters
     ----------
@@ -64,11 +66,10 @@ def plot_comparison(motions, coordinates=None, path=None, labels=None) -> Figure
     figure = Figure(figsize=(11, 1.0 + 2.2 * len(names)), layout="constrained")
     rows = figure.subplots(len(names), 2, sharex=True, squeeze=False)
     for (axes, apart), name in zip(rows, names, strict=True):
-        first = columns[0][name]
         for k, (motion, own) in enumerate(zip(motions, columns, strict=True)):
             axes.plot(motion.t, own[name], label=given[k], **looks(k))
             if k:
-                t, size = _difference(motions[0].t, first, motion.t, own[name])
+                t, size = _difference(motions[0], motion, name)
                 apart.semilogy(t, size + FLOOR, label=f"{given[k]} − {given[0]}", **looks(k))
         axes.set_ylabel(f"{name} [{units[name]}]")
         apart.set_ylabel(f"difference [{units[name]}]")
@@ -91,7 +92,23 @@ def _names(columns: list[dict], wanted) -> list[str]:
     return names
 
 
-def _difference(t, first, own_t, own) -> tuple[np.ndarray, np.ndarray]:
-    """Times that both motions last, those of the first, and the size of the difference there."""
-    both = (t >= own_t[0]) & (t <= own_t[-1])
-    return t[both], abs(np.interp(t[both], own_t, own) - first[both])
+def _difference(first: Trajectory, second: Trajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the motion with fewer samples, as long as both last, and the size of the difference there."""
+    fewer, more = sorted((first, second), key=len)
+    t = fewer.t
+    both = (t >= more.t[0]) & (t <= more.t[-1])
+    return t[both], abs(_between(more, name, t[both]) - scalar_coordinates(fewer)[name][both])
+
+
+def _between(motion: Trajectory, name: str, t: np.ndarray) -> np.ndarray:
+    """Coordinate at times between samples; where two samples share a time, at an impact, a cubic ends at either side."""
+    k = np.clip(np.searchsorted(motion.t, t, side="right") - 1, 0, max(len(motion) - 2, 0))
+    ends = np.minimum(np.stack([k, k + 1]), len(motion) - 1)
+    h = motion.t[ends[1]] - motion.t[ends[0]]
+    s = np.divide(t - motion.t[ends[0]], h, out=np.zeros_like(t), where=h > 0.0)
+    column = list(coordinate_units(motion.system)).index(name)
+    start, end = motion.q[ends, column]
+    kept, place = np.unique(ends, return_inverse=True)
+    slopes = np.array([coordinate_rates(motion.system, motion.q[i], motion.v[i])[column] for i in kept])
+    rate, later = h * slopes[place.reshape(ends.shape)]
+    return start + s * rate + s**2 * (3 * (end - start) - 2 * rate - later) + s**3 * (2 * (start - end) + rate + later)

@@ -12,7 +12,7 @@ import pytest
 import gauss
 import gauss.__main__
 from gauss.cli.common import tolerances
-from gauss.errors import FileError
+from gauss.errors import FileError, MissingPackageError
 from tests.support.files import call
 
 ROOT = Path(__file__).parents[2]
@@ -179,6 +179,13 @@ def test_output_of_another_kind_is_refused_at_once(command, ending, remedy, tmp_
     result = call(*command, "--run" if command[0] == "linkage" else "--duration", 1e9, "--output", path)
     assert isinstance(result.exception, FileError) and remedy in str(result.exception)
     assert not path.exists()
+
+
+@pytest.mark.parametrize("ending, library", [(".nc", "h5netcdf"), (".h5", "h5netcdf"), (".zarr", "zarr")])
+def test_output_whose_library_is_missing_is_refused_before_the_motion(ending, library, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    result = call("run", "pendulum", "--duration", 1e9, "--output", tmp_path / f"motion{ending}")
+    assert isinstance(result.exception, MissingPackageError) and f"{library} is not installed" in str(result.exception)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the device that is full is one of Linux")

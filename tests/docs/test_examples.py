@@ -3,6 +3,7 @@
 import ast
 import re
 import runpy
+import sys
 import warnings
 from pathlib import Path
 
@@ -11,10 +12,17 @@ import pytest
 from gauss.docs.order import SECTIONS
 from gauss.docs.uses import examples
 from gauss.io.catalog import folder
+from gauss.versions import version_of
+from tests.support.extras import others
 
 SCRIPTS = examples()
 LINES, ISSUE_LINES = 60, 15  # of a script; of the code of a script about an issue
-OPTIONAL = {"gym": "gymnasium", "robot:": "example_robot_data", "sweep(": "xarray"}  # what a text needs
+OPTIONAL = {  # what a text needs
+    "gym": "gymnasium",
+    "optimal_motion": "casadi",
+    "robot:": "example-robot-data",
+    "sweep(": "xarray",
+}
 LONG = ("control/mppi.py", "arms/panda.py")  # run by other tests, or take more than two seconds
 
 
@@ -46,13 +54,16 @@ def test_scripts_are_short_and_have_a_title(script):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: str(path.relative_to(folder() / "examples")))
-def test_scripts_run(script, capsys):
+def test_scripts_run_with_the_extra_of_the_documentation(script, capsys, monkeypatch):
     name = str(script.relative_to(folder() / "examples"))
     if name in LONG:
         pytest.skip("long")
     text = script.read_text(encoding="utf-8")
     for needed in {package for word, package in OPTIONAL.items() if word in text}:
-        pytest.importorskip(needed)
+        if version_of(needed) is None:
+            pytest.skip(f"{needed} is not installed")
+    for module in others("docs"):
+        monkeypatch.setitem(sys.modules, module, None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # redundant rows leave reactions open, and say so
         runpy.run_path(str(script), run_name="__main__")

@@ -79,7 +79,7 @@ def test_meshes_that_are_lost_are_named(robot, loss):
         assert visuals_of(scene) == []
 
 
-def test_the_command_line_shows_the_meshes_of_a_saved_motion(robot, monkeypatch):
+def test_the_command_line_shows_the_meshes_of_saved_motions(robot, monkeypatch):
     viewer = pytest.importorskip("gauss.view.viewer", exc_type=ImportError)
     from typer.testing import CliRunner
 
@@ -88,8 +88,10 @@ def test_the_command_line_shows_the_meshes_of_a_saved_motion(robot, monkeypatch)
     path, given = _saved(robot, ".nc", "free"), {}
     robot.unlink()
     monkeypatch.setattr(viewer, "export_html", lambda thing, path, **options: given.update(options) or path)
-    assert CliRunner().invoke(app, ["show", str(path), "--html", str(robot.with_suffix(".html"))]).exit_code == 0
-    assert [visual.body for visual in given["visuals"]] == ["base", "arm"]
+    arguments = ["show", str(path), "--beside", str(path), "--html", str(robot.with_suffix(".html"))]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    for meshes in ("visuals", "beside_visuals"):
+        assert [visual.body for visual in given[meshes]] == ["base", "arm"]
 
 
 def test_a_scene_that_no_robot_gave_has_no_meshes_to_lose(tmp_path):

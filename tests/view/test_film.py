@@ -125,3 +125,13 @@ def test_the_command_line_writes_films(tmp_path, scene):
     path = tmp_path / f"{scene}.gif"
     result = CliRunner().invoke(app, ["show", scene, "--duration", "0.1", "--gif", str(path), *OF_A_SCENE[scene]])
     assert result.exit_code == 0 and path.exists() and f"film written to {path}" in result.output.replace("\n", "")
+
+
+@pytest.mark.parametrize("option", [("--dark",), ("--beside", "motion.nc")])
+def test_what_a_film_cannot_show_is_refused_before_the_motion(tmp_path, option):
+    from typer.testing import CliRunner
+
+    from gauss.cli import app
+
+    arguments = ["show", "pendulum", "--duration", "1e9", "--gif", str(tmp_path / "film.gif"), *option]
+    assert isinstance(CliRunner().invoke(app, arguments).exception, FileError)

@@ -19,6 +19,7 @@ from gauss.view.viewer.forms import forms
 from gauss.view.viewer.framing import FIELD, framing, joined
 from gauss.view.viewer.show import LOOPBACK, _free_port
 from gauss.view.viewer.shown import resampled
+from gauss.view.viewer.stage import own_colour
 
 FLOATS = 1e-6  # relative: positions travel in single precision
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -177,6 +178,20 @@ def test_curves_of_two_motions_say_which_side_they_are_of(motion):
         assert [both.count(f">{label}{side}<") for side in ("", ", left", ", right")] == [0, 1, 1]
 
 
+def test_meshes_of_both_motions_are_drawn(motion):
+    from gauss.io.visuals import Visual
+
+    triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    first, second = ([Visual(body, triangle, np.array([[0, 1, 2]]), (1.0, 1.0, 1.0))] for body in ("crank", "rocker"))
+    both = show(motion, visuals=first, beside=motion, beside_visuals=second, port=_free_port())
+    try:
+        for stage, body in zip(both.player.stages, ("crank", "rocker"), strict=True):
+            drawn = [handle for name, handle in stage.solids if name == body]
+            assert [len(handle.vertices) for handle in drawn] == [len(triangle)]
+    finally:
+        both.close()
+
+
 def test_pictures_between_samples_lie_on_the_motion():
     coarse = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 11))
     fine = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 41))
@@ -216,6 +231,8 @@ def test_terrain_is_drawn_and_lies_above_the_floor():
     assert len(drawn.faces) == 4
     assert (drawn.face_normals[:, 2] > 0.0).all()
     assert framing(motion).floor[2] < np.array(field.heights).min() + 0.3
+    seen = {own_colour(form) for form in forms(motion.system) if form.role == "contact"}
+    assert len(seen) == 2  # the ball is seen against it
 
 
 def test_meshes_of_a_robot_are_in_place():

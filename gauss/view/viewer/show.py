@@ -116,6 +116,7 @@ def show(
     joints=(),
     traces=None,
     beside: Trajectory | None = None,
+    beside_visuals=(),
     dark: bool = False,
     port: int = 8080,
     browser: bool = False,
@@ -137,6 +138,8 @@ def show(
         Bodies and frames that leave a trace; the bodies that carry no others when not given.
     beside : Trajectory, optional
         Second motion, which plays beside the first at the same times.
+    beside_visuals : iterable
+        Meshes of the bodies of the second motion.
     dark : bool
         Whether the ground is dark at first.
     port : int
@@ -159,7 +162,7 @@ def show(
     with socket.socket() as probe:
         if probe.connect_ex((LOOPBACK, port)) == 0:
             raise FileError(f"port {port} is taken, perhaps by another viewer; choose another one with port=.")
-    second = None if beside is None else shown(beside, 2 * FRAMES)
+    second = None if beside is None else shown(beside, 2 * FRAMES, beside_visuals)
     viewer = Viewer(shown(thing, 2 * FRAMES, visuals, joints, traces), port, dark, second)
     if browser:
         webbrowser.open(viewer.url)
@@ -173,6 +176,7 @@ def page(
     joints=(),
     traces=None,
     beside: Trajectory | None = None,
+    beside_visuals=(),
     dark: bool = False,
     frames: int = FRAMES,
 ) -> Page:
@@ -182,7 +186,7 @@ def page(
 
     Parameters
     ----------
-    thing, visuals, joints, traces, beside, dark
+    thing, visuals, joints, traces, beside, beside_visuals, dark
         As for :func:`show`.
     frames : int
         Pictures per second.
@@ -205,7 +209,7 @@ def page(
     try:
         stages = [ViewerStage(server, what, dark)]
         if beside is not None:
-            stages.append(ViewerStage(server, shown(beside, frames), beside=stages[0]))
+            stages.append(ViewerStage(server, shown(beside, frames, beside_visuals), beside=stages[0]))
         stages[0].make_room(stages[-1] if len(stages) > 1 else None, aside=0.0)
         times = max((stage.trajectory.t for stage in stages), key=lambda t: float(t[-1]))
         recording = server.get_scene_serializer()

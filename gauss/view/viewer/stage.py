@@ -9,13 +9,14 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS
 from gauss.view.viewer.cameras import ASIDE, shifted
-from gauss.view.viewer.forms import forms, size
+from gauss.view.viewer.forms import BodyMesh, forms, size
 from gauss.view.viewer.framing import FIELD, framing, joined
 from gauss.view.viewer.ground import ground, sky
 from gauss.view.viewer.shown import Shown, resampled
 from gauss.view.viewer.touches import touches
 
 STEEL, CONTACT = (0.32, 0.34, 0.38), (0.85, 0.65, 0.3)  # colours of joints and shapes of contact
+LAND = (0.6, 0.66, 0.58)  # colour of shapes of contact on the ground
 ARROW = 0.35  # longest arrow, of the size of the mechanism
 RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contact forces
 FAINT = 1e-3  # of the largest contact force: smaller ones are not drawn
@@ -23,6 +24,11 @@ POINT = 0.016  # radius of a contact point, of the size of the mechanism
 SKY_LIGHT, GROUND_LIGHT, DIFFUSE = (255, 255, 255), (170, 175, 185), 3.2  # of the light that casts no shadows
 SMOOTHNESS, FINEST_PATH = 6, 6000  # points of a path for each picture, and most of them
 ROLES = ("link", "joint", "contact", "frame", "path")
+
+
+def own_colour(form: BodyMesh) -> tuple[float, float, float] | None:
+    """Colour of a joint or of a shape of contact; None of a link, which has that of its body."""
+    return LAND if (form.role, form.body) == ("contact", GROUND) else {"joint": STEEL, "contact": CONTACT}.get(form.role)
 
 
 class ViewerStage:
@@ -130,8 +136,7 @@ class ViewerStage:
         self.parts: dict[str, list] = {role: [] for role in ROLES}
         for number, form in enumerate(forms(self.trajectory.system, visuals)):
             parent = f"{self.root}/ground" if form.body == GROUND else f"{bodies}/{_path(form.body)}"
-            role = {"joint": STEEL, "contact": CONTACT}.get(form.role)
-            colour = form.colour or role or self.colours.get(form.body, STEEL)
+            colour = form.colour or own_colour(form) or self.colours.get(form.body, STEEL)
             faces, vertices = np.asarray(form.mesh.faces, np.uint32), np.asarray(form.mesh.vertices, np.float32)
             handle = scene.add_mesh_simple(f"{parent}/{form.role} {number}", vertices, faces, color=colour, side="double")
             self.parts[form.role].append(handle)
