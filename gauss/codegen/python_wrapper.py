@@ -237,8 +237,9 @@ def _target(out, shape: Shape) -> np.ndarray:
     """Writeable array of doubles of a shape, each in a place of its own; memory of other libraries is shared (DLPack)."""
     array = _as_array(out)
     fits = isinstance(array, np.ndarray) and array.dtype == float and array.dtype.isnative and array.shape == shape
-    repeats = fits and array.size and any(length > 1 and not stride for length, stride in zip(shape, array.strides, strict=True))
-    if not fits or repeats or not array.flags.writeable:
+    if fits and array.size:
+        fits = not any(length > 1 and not stride for length, stride in zip(shape, array.strides, strict=True))
+    if not fits or not array.flags.writeable:
         words = f"{shape[0]}" if len(shape) == 1 else f"shape {shape} of"
         raise StateError(f"out: expected a writeable array of {words} doubles, got {described(out)}.")
     return array

@@ -397,8 +397,8 @@ MISTAKES = {
     "few": (lambda s, q, v: s.function("mass_matrix", independent=()), StateError, r"expected \d+ different .* got none"),
     "argument": (lambda s, q, v: s.evaluate("bias_forces", q), StateError, "bias_forces: expected v as well"),
     "masked": (lambda s, q, v: s.mass_matrix(np.ma.array(q, mask=q > q.min())), StateError, r"q: expected \d+ numbers"),
-    "beside": (lambda s, q, v: s.function("forward_dynamics", "momentum"), ArgumentError, "forward_dynamics: compiled alone"),
-    "of parameter": (lambda s, q, v: s.parameter_derivatives("mass"), ArgumentError, "'mass': expected 'gravity', or a kind"),
+    "beside": (lambda s, q, v: s.function("forward_dynamics", "momentum"), ArgumentError, "forward_dynamics: compiled"),
+    "of parameter": (lambda s, q, v: s.parameter_derivatives("mass"), ArgumentError, "'mass': expected 'gravity', or"),
     "one out": (
         lambda s, q, v: s.acceleration_derivatives(q, v, v, out=(np.zeros((s.n_v, s.n_v)),) * 3),
         StateError,
