@@ -115,6 +115,10 @@ class InconsistentConstraintsWarning(UserWarning):
     """Redundant constraints are inconsistent by no more than typed digits."""
 
 
+class RecordedMotionWarning(UserWarning):
+    """Coordinates of a recorded motion do not meet the loop constraints."""
+
+
 class BalanceWarning(UserWarning):
     """The energy balance of a motion does not close: its integration is inaccurate."""
 

@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import prod
 
 import numpy as np
@@ -201,7 +201,10 @@ class PythonWrapper:
         several, shapes = len(self.shapes) > 1, [(*lead, *shape) for shape in self.shapes]
         if several and not (isinstance(out, tuple | list) and len(out) == len(shapes)):
             raise StateError(f"out: expected {len(shapes)} writeable arrays of doubles, got {described(out)}.")
-        return [_target(given, shape) for given, shape in zip(out if several else (out,), shapes, strict=True)]
+        found = [_target(given, shape) for given, shape in zip(out if several else (out,), shapes, strict=True)]
+        if any(np.shares_memory(one, other) for one, other in combinations(found, 2)):
+            raise StateError(f"out: expected {len(shapes)} arrays, one for each result, got arrays that share memory.")
+        return found
 
     def _into(self, out, targets: list[np.ndarray], found):
         """Write results to the given arrays, where they are not there already."""
@@ -234,8 +237,9 @@ def _target(out, shape: Shape) -> np.ndarray:
     """Writeable array of doubles of a shape, each in a place of its own; memory of other libraries is shared (DLPack)."""
     array = _as_array(out)
     fits = isinstance(array, np.ndarray) and array.dtype == float and array.dtype.isnative and array.shape == shape
-    repeats = fits and any(length > 1 and not stride for length, stride in zip(shape, array.strides, strict=True))
-    if not fits or repeats or not array.flags.writeable:
+    if fits and array.size:
+        fits = not any(length > 1 and not stride for length, stride in zip(shape, array.strides, strict=True))
+    if not fits or not array.flags.writeable:
         words = f"{shape[0]}" if len(shape) == 1 else f"shape {shape} of"
         raise StateError(f"out: expected a writeable array of {words} doubles, got {described(out)}.")
     return array
@@ -254,7 +258,9 @@ def _as_array(given):
 
 
 def as_doubles(given) -> np.ndarray | None:
-    """Array of doubles, the given one if it is; None if it cannot be converted."""
+    """Array of doubles, the given one if it is; None if it cannot be converted, or entries are masked."""
+    if isinstance(given, np.ma.MaskedArray) and np.ma.is_masked(given):
+        return None
     try:
         array = np.asarray(_as_array(given))
         return array.astype(float, copy=False) if array.dtype.kind in CONVERTIBLE_KINDS else None

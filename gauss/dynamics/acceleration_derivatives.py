@@ -74,14 +74,17 @@ def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tu
     Not numbers where a loop that cannot move has another pose than in the scene.
     """
     n, loaded = system.n_v, LoadedMechanism(system, loads, t, q, v, load)
-    rates, multipliers = loaded.motion()
-    m, unit, zero = multipliers.size, np.eye(n), np.zeros(n)
+    unit, zero = np.eye(n), np.zeros(n)
     composites = None if loaded.forces else _composite_bodies(system, q, v)
     if composites is not None:
-        by_q, by_v = _of_open_tree(system, composites, loaded.effort, q, v, rates)
         M = _factored(system, composites.mass_matrix())
+        rates = M.solve(loaded.effort - composites.tree.inverse_dynamics(zero))
+        by_q, by_v = _of_open_tree(system, composites, loaded.effort, q, v, rates)
         solved = lambda columns: np.array([M.solve(column) for column in columns.T]).T  # noqa: E731
         return solved(-by_q), solved(-by_v), _mirrored(solved(unit))
+
+    rates, multipliers = loaded.motion()
+    m = multipliers.size
 
     def changes(t, q, v, load, rates, multipliers):
         """Changes with accelerations and multipliers as inputs, which are fixed."""

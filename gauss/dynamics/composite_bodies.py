@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Expression
-from gauss.dynamics.aba import add, inertia_to_inner
 from gauss.dynamics.link_frames import Link
 from gauss.dynamics.rnea import JointKinematics, KinematicTree, apply
 from gauss.rotations import congruent, cross, skew
@@ -195,11 +194,38 @@ def _to_inner(link: Link, kin: JointKinematics, forces: np.ndarray) -> np.ndarra
     return forces
 
 
-def composite_inertias(tree: KinematicTree) -> dict:
-    """Inertia of each link with all links that it carries, in its link frame."""
-    found = {body: tree.links[body].inertia for body in tree.joint_kinematics}
+def first_moments(tree: KinematicTree) -> dict[int, tuple[float, np.ndarray]]:
+    """Mass, and mass times its centre (3,) in the link frame, of each link with all links that it carries."""
+    found = {body: (tree.links[body].inertia[2][0, 0], tree.links[body].first) for body in tree.joint_kinematics}
     for edge in reversed(tree.edges):
         if edge.inner >= 0:
-            carried = inertia_to_inner(tree.links[edge.outer], tree.joint_kinematics[edge.outer], found[edge.outer])
-            found[edge.inner] = add(found[edge.inner], carried)
+            link, kin, (mass, first) = tree.links[edge.outer], tree.joint_kinematics[edge.outer], found[edge.outer]
+            carried = link.R @ (kin.R @ first + mass * kin.p) + mass * link.p
+            found[edge.inner] = found[edge.inner][0] + mass, found[edge.inner][1] + carried
     return found
+
+
+def composite_inertias(tree: KinematicTree) -> dict:
+    """Inertia of each link with all links that it carries, in its link frame: those of rigid bodies, I, m c and m."""
+    moments = first_moments(tree)
+    inertias = {body: tree.links[body].inertia[0] for body in moments}
+    for edge in reversed(tree.edges):
+        if edge.inner >= 0:
+            link, kin, (mass, first) = tree.links[edge.outer], tree.joint_kinematics[edge.outer], moments[edge.outer]
+            turned = _about_inner(kin.R, kin.p, mass, kin.R @ first, inertias[edge.outer])
+            first = kin.R @ first + mass * kin.p
+            turned = _about_inner(link.R, link.p, mass, link.R @ first, turned)
+            inertias[edge.inner] = inertias[edge.inner] + turned
+    return {body: (inertias[body], skew(first), mass * np.eye(3)) for body, (mass, first) in moments.items()}
+
+
+def _about_inner(R, p, mass, first, inertia) -> np.ndarray:
+    """Inertia (3, 3), turned by R and about an origin from which the present one lies at p; ``first`` is m c, turned.
+
+    I + 2 (p · g) 1 − p gᵀ − g pᵀ with g = m c + m p / 2.
+    """
+    g = first + (mass / 2.0) * p
+    (x, y, z), added = 2.0 * p * g, np.outer(-p, g) - np.outer(g, p)
+    added[np.diag_indices(3)] = y + z, x + z, x + y
+    found = congruent(R, inertia) + added
+    return np.array([[found[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])

@@ -63,14 +63,17 @@ def link_frames(subsystem: Subsystem) -> dict[int, Link]:
     links = {-1: ground} | {
         body: _link(subsystem, edge, frames, turns[body], first[edge.inner] is edge) for body, edge in edges.items()
     }
-    masses = {body: _mass(subsystem, body, links[body]) for body in edges}
-    for edge in reversed(subsystem.tree):
-        joint, link = subsystem.joints[edge.constraint], links[edge.outer]
-        kept, given = _split(joint.pair.kind, masses[edge.outer])
-        if edge.inner >= 0:
-            masses[edge.inner] = masses[edge.inner].plus(_moved(given, link.R @ link.turn, link.p))
-        links[edge.outer] = link._replace(inertia=(kept.inertia, skew(kept.first), kept.mass * np.eye(3)), first=kept.first)
+    for body, kept in _regrouped(subsystem, links).items():
+        if body >= 0:
+            inertia = kept.inertia, skew(kept.first), kept.mass * np.eye(3)
+            links[body] = links[body]._replace(inertia=inertia, first=kept.first)
     return links
+
+
+def ground_share(subsystem: Subsystem, links: dict[int, Link]) -> tuple[float, np.ndarray]:
+    """Mass, and mass times its centre (3,) in world, of what is regrouped to the ground: it stays in its place."""
+    share = _regrouped(subsystem, links)[-1]
+    return share.mass, share.first
 
 
 @singledispatch
@@ -117,6 +120,17 @@ def _mass(subsystem: Subsystem, body: int, link: Link) -> Mass:
     com = -link.R_central.T @ link.p_central
     central = link.R_central.T @ np.diag(J) @ link.R_central
     return Mass(mass, mass * com, central + mass * (com @ com * np.eye(3) - np.outer(com, com)))
+
+
+def _regrouped(subsystem: Subsystem, links: dict[int, Link]) -> dict[int, Mass]:
+    """Inertia of each link about its origin, with shares of outer ones that act as if they belonged to it; −1: ground."""
+    masses = {-1: Mass(0.0, np.zeros(3), np.zeros((3, 3)))}
+    masses |= {edge.outer: _mass(subsystem, edge.outer, links[edge.outer]) for edge in subsystem.tree}
+    for edge in reversed(subsystem.tree):
+        joint, link = subsystem.joints[edge.constraint], links[edge.outer]
+        masses[edge.outer], given = _split(joint.pair.kind, masses[edge.outer])
+        masses[edge.inner] = masses[edge.inner].plus(_moved(given, link.R @ link.turn, link.p))
+    return masses
 
 
 def _split(kind: str, own: Mass) -> tuple[Mass, Mass]:

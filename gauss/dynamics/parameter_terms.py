@@ -45,6 +45,8 @@ def size_of(system: System, parameter: str) -> int:
     kind, _, name = parameter.partition(":")
     if parameter == GRAVITY:
         return 3
+    if not name:
+        raise ArgumentError(f"parameter {parameter!r}: expected 'gravity', or a kind and a name, as in 'mass:body'.")
     if kind in OF_BODIES:
         _known(parameter, name, system.structure.bodies)
         return OF_BODIES[kind]

@@ -143,6 +143,11 @@ def _arguments(terms) -> list[str]:
 def _request(system: System, name: str, reference: str) -> Request:
     """Request for a name such as "jacobian:hand"."""
     own, _, frame = name.partition(":") if isinstance(name, str) else (name, "", "")
+    if own == "forward_dynamics":
+        raise ArgumentError(
+            "forward_dynamics: compiled alone, for all coordinates; call system.forward_dynamics(q, v, load) beside other "
+            "functions, and take the independent accelerations of its result."
+        )
     if own not in TERMS:
         raise ArgumentError(f"no function {own!r} of a state. {did_you_mean(str(own), TERMS)}")
     term = TERMS[own]

@@ -12,8 +12,9 @@ import numpy as np
 from gauss import rotations
 from gauss.codegen import Scalar, forward
 from gauss.dynamics import energies
-from gauss.dynamics.composite_bodies import CompositeBodies, composite_inertias
+from gauss.dynamics.composite_bodies import CompositeBodies, composite_inertias, first_moments
 from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.link_frames import ground_share
 from gauss.dynamics.mechanism import loop_constraints
 from gauss.dynamics.rnea import KinematicTree, apply, force_to_inner
 from gauss.rotations import cross
@@ -185,10 +186,27 @@ class StateTerms:
         return {body: p + R @ local[body] for body, (R, p) in tree.poses.items() if body >= 0}
 
     @cached_property
+    def mass_shares(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Share of all mass, an origin (3,) and the first moments of the share about it (3,), over all mass, in world.
+
+        Those of what the ground carries at each of its joints, and of what is regrouped to the ground.
+        """
+        tree, total, moments = self.still, self.system.Phi[3::6].sum(), first_moments(self.still)
+        mass, first = ground_share(tree.subsystem, tree.links)
+        found = [(mass / total, np.zeros(3), first / total)]
+        for body in (edge.outer for edge in tree.edges if edge.inner < 0):
+            (R, p), (mass, first) = tree.poses[body], moments[body]
+            found.append((mass / total, p, R @ (first / total)))
+        return found
+
+    @cached_property
     def center_of_mass(self) -> np.ndarray:
         """Centre of mass of all bodies (3,) in world."""
-        masses = self.system.Phi[3::6] / self.system.Phi[3::6].sum()
-        return sum((mass * self.centers[body] for body, mass in enumerate(masses) if mass), np.zeros(3))
+        return sum((share * p + first for share, p, first in self.mass_shares), np.zeros(3))
+
+    def from_center_of_mass(self, point) -> np.ndarray:
+        """Vector (3,) from the centre of mass to a point; exact where the point is the origin of a share."""
+        return sum((share * (point - p) - first for share, p, first in self.mass_shares), np.zeros(3))
 
     @cached_property
     def tree_momentum_matrix(self) -> np.ndarray:
@@ -196,11 +214,11 @@ class StateTerms:
         tree, A = self.still, np.zeros((6, self.system.n_v), dtype=object)
         for edge in tree.edges:
             place, (R, p) = tree.subsystem.joints[edge.constraint].v, tree.poses[edge.outer]
-            S = tree.joint_kinematics[edge.outer].S
+            S, lever = tree.joint_kinematics[edge.outer].S, p - self.center_of_mass
             for column, along in zip(range(place.start, place.stop), S.T, strict=True):
                 moment, force = np.split(apply(self.composites[edge.outer], along), 2)
                 force = R @ force
-                A[:, column] = np.concatenate([R @ moment + cross(p - self.center_of_mass, force), force])
+                A[:, column] = np.concatenate([R @ moment + cross(lever, force), force])
         return A
 
     @cached_property
@@ -212,7 +230,7 @@ class StateTerms:
         for edge in (edge for edge in tree.edges if edge.inner < 0):
             R, p = tree.poses[edge.outer]
             force = R @ gathered[edge.outer][3:]
-            moment = R @ gathered[edge.outer][:3] + cross(p - self.center_of_mass, force)
+            moment = R @ gathered[edge.outer][:3] + cross(self.from_center_of_mass(p), force)
             total = total + np.concatenate([moment, force])
         return total
 

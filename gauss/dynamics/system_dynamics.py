@@ -77,7 +77,7 @@ class SystemDynamics(Store):
         from gauss.dynamics.accelerations import forward_dynamics_on_device
         from gauss.dynamics.state_functions import state_function
 
-        if names == ("forward_dynamics",):
+        if names == ("forward_dynamics",) and independent is None:
             return self.forward_dynamics(system) if device is None else forward_dynamics_on_device(system, device)
         found = state_function(system, names, reference, independent, device)
         return made_from(found, _function_again, system, names, reference, independent) if device is None else found

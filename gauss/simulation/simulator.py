@@ -60,6 +60,8 @@ class SimulatorState(NamedTuple):
         Steps since then.
     contacts : object
         Contacts that the next step starts from, where the point does not hold them.
+    of : tuple
+        Step and methods of the simulator; any where empty.
     """
 
     point: bytes
@@ -67,6 +69,7 @@ class SimulatorState(NamedTuple):
     begun: float
     steps: int
     contacts: Any = None
+    of: tuple = ()
 
 
 class Simulator:
@@ -129,8 +132,9 @@ class Simulator:
             self.inputs, self.output_names = tuple(whole.inputs), tuple(whole.outputs)
             if not isinstance(method, FixedStep):
                 raise SimulationError(f"integrator {integrator!r} chooses its steps; a Simulator has fixed ones: use 'rk4'.")
+            n_u = len(self.inputs)
             if self.inputs:
-                problem = problem._replace(held=HeldInputs(self.system, _zero(len(self.inputs)), 1.0, 0.0, 1.0))
+                problem = problem._replace(held=HeldInputs(self.system, lambda t, q, v: np.zeros(n_u), 1.0, 0.0, 1.0))
             plan = plan_of(problem.question)
             if (plan.driver, plan.dynamics) not in STEPS:
                 why = "; ".join(map(str, plan.rejected)) or "nothing in it can move"
@@ -144,18 +148,17 @@ class Simulator:
             self._loop: Any = run.prepared_steps()  # machine code, or steps that are called as it is
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
-        n_u = len(self.inputs)
         self._u = self._point[run.layout.size - n_u :]
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
-        self._begun, self._steps, self._methods = 0.0, 0, (integrator, stabilisation)
+        self._begun, self._steps, self._options = 0.0, 0, (self.step_size, integrator, stabilisation)
         self._switches, self._warned = bool(run.program.watch), False
         self._measure: Callable[[np.ndarray], np.ndarray] | None = None
         self._bind()
         self.reset()
 
     def __reduce__(self):
-        return _again, ((self.system, self.step_size, *self._methods), self.snapshot())
+        return _again, ((self.system, *self._options), self.snapshot())
 
     @property
     def program(self) -> Program:
@@ -337,8 +340,8 @@ class Simulator:
 
     def snapshot(self) -> SimulatorState:
         """Present state of the simulator, to the last bit; of the same scene and step, any simulator can restore it."""
-        run = self._run
-        return SimulatorState(self._point.tobytes(), bytes(run.control), self._begun, self._steps, run.kept())
+        point, run = self._point.tobytes(), self._run
+        return SimulatorState(point, bytes(run.control), self._begun, self._steps, run.kept(), self._options)
 
     def restore(self, snapshot: SimulatorState):
         """Continue from a snapshot.
@@ -346,12 +349,12 @@ class Simulator:
         Raises
         ------
         SimulationError
-            If it is of another system.
+            If it is of another system, step or method.
         """
         require(snapshot, (SimulatorState,), "restore")
         point = np.frombuffer(snapshot.point)
-        if point.shape != self._point.shape:
-            raise SimulationError("restore: the snapshot is of another system.")
+        if point.shape != self._point.shape or snapshot.of not in ((), self._options):
+            raise SimulationError("restore: the snapshot is of another system, step or method.")
         self._point[:] = point
         ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
         self._begun, self._steps = snapshot.begun, snapshot.steps
@@ -392,8 +395,3 @@ def _floats(u) -> np.ndarray | None:
         return np.asarray(u, dtype=float)
     except (TypeError, ValueError, RuntimeError):  # the last of torch
         return None
-
-
-def _zero(count: int) -> Callable:
-    """Control law of zero inputs."""
-    return lambda t, q, v: np.zeros(count)

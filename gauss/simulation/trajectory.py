@@ -1,5 +1,6 @@
 """Result of a simulation: times, coordinates q, rates v, work, poses of the bodies, statistics, events."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -14,11 +15,14 @@ from gauss.codegen import content_key, trace
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.outputs import FORCES, INERTIAL, OF_JOINTS, joint_forces, measured, shape_of
 from gauss.dynamics.rules import Plan
-from gauss.errors import StateError, did_you_mean
+from gauss.dynamics.state_functions import distance_of_loops
+from gauss.errors import RecordedMotionWarning, StateError, did_you_mean
 from gauss.shapes import Shaped
 from gauss.simulation.motion_records import EnergyRecord, Event, Stats
 from gauss.system import State, System
 
+LOOKED_AT = 20  # samples of a recorded motion whose loops are looked at: noise is in all of them
+RECORDED_RESIDUAL = 1e-6  # of loop constraints, relative to their scales: above that of any integrator
 MANY = 300  # samples above which machine code is compiled: numpy takes about as long for so many
 
 
@@ -116,8 +120,16 @@ class Trajectory:
         ------
         StateError
             If sizes do not fit, numbers are not finite, times do not increase, or a quaternion is not unit.
+
+        Warns
+        -----
+        RecordedMotionWarning
+            If coordinates do not meet the loop constraints at one of some samples.
         """
-        times, samples = np.array(t, dtype=float), np.array(q, dtype=float)
+        try:
+            times, samples = np.array(t, dtype=float), np.array(q, dtype=float)
+        except (TypeError, ValueError):
+            raise StateError(f"from_coordinates: expected numbers t (k,) and q (k, {system.n_q}), got others.") from None
         if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0).all() or len(samples) != len(times):
             raise StateError(
                 f"from_coordinates: expected at least two increasing times t (k,) and coordinates q (k, {system.n_q}), got "
@@ -128,6 +140,7 @@ class Trajectory:
         rates = spline_rates(system, times, samples) if v is None else np.array(v, dtype=float)
         if rates.shape != (len(times), system.n_v) or not np.isfinite(rates).all():
             raise StateError(f"from_coordinates: expected finite rates v ({len(times)}, {system.n_v}), got {rates.shape}.")
+        _warn_of_loops(system, times, samples)
         work = np.full((len(times), 3), np.nan)
         return cls(system, times, samples, rates, work, Stats(0, 0, 0, 0, 0.0, np.nan, "recorded"))
 
@@ -304,3 +317,16 @@ def spline_rates(system: System, t: np.ndarray, q: np.ndarray) -> np.ndarray:
             turning = [2.0 * rotations.multiply(rotations.conjugate(Q), rate)[1:] for Q, rate in pairs]
             rates[:, joint.v.start + plain : joint.v.stop] = turning
     return rates
+
+
+def _warn_of_loops(system: System, times: np.ndarray, samples: np.ndarray):
+    """Warn of the worst of some samples of a recorded motion, if it does not meet the loop constraints."""
+    if not system.has_closures:
+        return
+    places = np.unique(np.linspace(0, len(times) - 1, LOOKED_AT).astype(int))
+    off = {k: distance_of_loops(system, State(times[k], samples[k], np.zeros(system.n_v))) for k in map(int, places)}
+    worst = max(off, key=lambda k: off[k])
+    if not off[worst] <= RECORDED_RESIDUAL:
+        words = f"recorded motion of {system.scene.name!r} does not meet its loop constraints: at t = {times[worst]:g} s "
+        words += f"by {off[worst]:.2g} of their scales. Its forces are wrong; system.projected makes states that meet them."
+        warnings.warn(words, RecordedMotionWarning, stacklevel=3)

@@ -38,7 +38,7 @@ class NamedPlaces:
         StateError
             If there is none.
         """
-        found = self._joints_by_name.get(name)
+        found = self._joints_by_name.get(name) if isinstance(name, str) else None
         if found is None:
             raise StateError(f"no joint {name!r}. {did_you_mean(name, [joint.name for joint in self.joints])}")
         return found
@@ -78,6 +78,6 @@ class NamedPlaces:
         StateError
             If there is none.
         """
-        if name not in self.frames:
+        if not isinstance(name, str) or name not in self.frames:
             raise StateError(f"no body or frame {name!r}. {did_you_mean(name, self.frames)}")
         return self.frames[name]

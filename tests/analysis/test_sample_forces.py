@@ -1,6 +1,7 @@
 """Forces of all samples in one pass: those of machine code are those of certified solutions, each sample is solved once."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 import gauss
 from gauss.analysis import sample_forces
 from gauss.dynamics.sample_multipliers import sample_multipliers
-from gauss.errors import StateError
+from gauss.errors import RecordedMotionWarning, StateError
 from tests.support import mechanisms
 
 AGREEMENT = 1e-11  # relative to the largest multiplier of the motion
@@ -106,6 +107,7 @@ def test_a_recorded_motion_has_the_rates_and_forces_of_the_simulated_one():
         ([0.0], [[0.0, 0.0]], None, "at least two increasing times"),
         ([0.0, 0.0], np.zeros((2, 2)), None, "at least two increasing times"),
         ([0.0, 1.0], np.zeros((3, 2)), None, r"coordinates q \(k, 2\), got shapes \(2,\) and \(3, 2\)"),
+        ([0.0, 1.0], "ab", None, "expected numbers t"),
         ([0.0, 1.0], np.zeros((2, 3)), None, "q: expected 2 finite numbers"),
         ([0.0, 1.0], np.zeros((2, 2)), np.zeros((2, 1)), r"finite rates v \(2, 2\), got \(2, 1\)"),
     ],
@@ -113,3 +115,13 @@ def test_a_recorded_motion_has_the_rates_and_forces_of_the_simulated_one():
 def test_recordings_that_do_not_fit_are_refused(t, q, v, words):
     with pytest.raises(StateError, match=words):
         gauss.Trajectory.from_coordinates(gauss.compile_scene(mechanisms.rods(2)), t, q, v)
+
+
+def test_recordings_that_leave_the_loop_constraints_are_warned_of():
+    motion = gauss.simulate(gauss.load("four_bar"), 0.1, times=np.linspace(0.0, 0.1, 101), progress=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gauss.Trajectory.from_coordinates(motion.system, motion.t, motion.q)
+    noise = np.random.default_rng(0).uniform(-1e-4, 1e-4, motion.q.shape)
+    with pytest.warns(RecordedMotionWarning, match="does not meet its loop constraints: at t = "):
+        gauss.Trajectory.from_coordinates(motion.system, motion.t, motion.q + noise)

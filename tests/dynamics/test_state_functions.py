@@ -326,6 +326,8 @@ def test_arrays_of_any_strides_types_and_libraries_give_the_same(arm):
     assert arm.bias_forces(Q, V, out=other) is other and np.array_equal(other.array, expected)
     rates = V.copy()
     assert np.array_equal(arm.bias_forces(Q, rates, out=rates), expected)  # over one of the arguments
+    empty = np.zeros((9, 0)), np.zeros((9, 0, arm.n_v)), np.zeros((9, 0))
+    assert arm.loop_constraints(Q, V, out=empty) is empty  # of no loops
     parts = np.zeros((9, 3, 3)), np.zeros((9, 3))
     frame = list(arm.frames)[-1]
     assert arm.forward_kinematics(Q, frame, out=parts) is parts
@@ -394,6 +396,14 @@ MISTAKES = {
     "no coordinates": (lambda s, q, v: s.null_space(q), ArgumentError, "expected the names of independent joints"),
     "few": (lambda s, q, v: s.function("mass_matrix", independent=()), StateError, r"expected \d+ different .* got none"),
     "argument": (lambda s, q, v: s.evaluate("bias_forces", q), StateError, "bias_forces: expected v as well"),
+    "masked": (lambda s, q, v: s.mass_matrix(np.ma.array(q, mask=q > q.min())), StateError, r"q: expected \d+ numbers"),
+    "beside": (lambda s, q, v: s.function("forward_dynamics", "momentum"), ArgumentError, "forward_dynamics: compiled"),
+    "of parameter": (lambda s, q, v: s.parameter_derivatives("mass"), ArgumentError, "'mass': expected 'gravity', or"),
+    "one out": (
+        lambda s, q, v: s.acceleration_derivatives(q, v, v, out=(np.zeros((s.n_v, s.n_v)),) * 3),
+        StateError,
+        "out: expected 3 arrays, one for each result, got arrays that share memory",
+    ),
     "out": (lambda s, q, v: s.mass_matrix(q, out=np.zeros(3)), StateError, r"out: expected a writeable array of shape"),
 }
 

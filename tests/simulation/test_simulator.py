@@ -55,6 +55,17 @@ def test_a_restored_simulator_continues_bit_for_bit(model, joint, integrator):
     assert ends[0] == ends[1]
 
 
+def test_snapshots_of_other_steps_or_methods_are_refused():
+    scene = gauss.load("cart_pole")
+    kept = gauss.Simulator(scene, STEP).snapshot()
+    for other in (gauss.Simulator(scene, 2 * STEP), gauss.Simulator(scene, STEP, "semi_implicit_euler")):
+        other.step(n=3)
+        before = other.snapshot()
+        with pytest.raises(SimulationError, match="of another system, step or method"):
+            other.restore(kept)
+        assert other.snapshot() == before
+
+
 def test_many_steps_in_one_call_are_single_steps():
     one, many = (simulator("cart_pole", "rail", None) for _ in range(2))
     one.step([0.5])

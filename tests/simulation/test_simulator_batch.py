@@ -36,6 +36,52 @@ def test_motions_are_those_of_single_simulators(model, joint):
         np.testing.assert_allclose(values[2], sim.outputs[name], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("model, joint", MOTIONS)
+def test_motions_after_a_restored_snapshot_are_those_before_bit_for_bit(model, joint):
+    many = gauss.SimulatorBatch(scene_of(model, joint), STEP, batch=BATCH)
+    values, ends = np.cos(np.arange(3.0 * BATCH)).reshape(3, BATCH, 1) if joint else [None] * 3, []
+    with np.errstate(all="ignore"), pytest.warns(PainleveWarning) if model == "painleve_rod" else np.errstate():
+        many.step(values[0], n=7)
+        kept = many.snapshot()
+        for _ in range(2):
+            for u in values:
+                many.step(u, n=3)
+            ends.append((many.t, many.q, many.v, many.output_vectors()))
+            many.step(n=2)
+            many.restore(kept)
+    assert many.t == pytest.approx(7 * STEP)
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_snapshot_keeps_which_motions_diverged():
+    many = gauss.SimulatorBatch(scene_of("cart_pole", "rail"), STEP, batch=BATCH)
+    v = np.zeros((BATCH, 2))
+    v[1] = 1e200
+    many.restart([1], many.q[1:2], v[1:2])
+    many.step(n=5)
+    kept = many.snapshot()
+    many.reset()
+    assert not many.diverged.any()
+    many.restore(kept)
+    assert list(np.flatnonzero(many.diverged)) == [1] and np.isnan(many.q[1]).any()
+
+
+OF_OTHERS = {
+    "step": lambda scene: gauss.SimulatorBatch(scene, 2 * STEP, batch=BATCH),
+    "number": lambda scene: gauss.SimulatorBatch(scene, STEP, batch=BATCH + 1),
+    "method": lambda scene: gauss.SimulatorBatch(scene, STEP, batch=BATCH, integrator="semi_implicit_euler"),
+    "system": lambda scene: gauss.SimulatorBatch(scene_of("four_bar", "A"), STEP, batch=BATCH),
+}
+
+
+@pytest.mark.parametrize("other", OF_OTHERS)
+def test_snapshots_of_others_are_refused(other):
+    scene = scene_of("cart_pole", "rail")
+    with pytest.raises(SimulationError, match="of another system, step, method or number of motions"):
+        gauss.SimulatorBatch(scene, STEP, batch=BATCH).restore(OF_OTHERS[other](scene).snapshot())
+
+
 def test_starts_restarts_and_divergence_leave_the_others_alone():
     scene = scene_of("cart_pole", "rail")
     many, other = (gauss.SimulatorBatch(scene, STEP, batch=BATCH, threads=k) for k in (1, 2))

@@ -1,7 +1,9 @@
 """Batch of simulators: motions that Python advances together, each with inputs of its own."""
 
 from collections.abc import Callable
+from copy import copy
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,6 +32,24 @@ from gauss.simulation.simulator import Simulator, SimulatorState, random_changes
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import warn_of_passages
 from gauss.system import State, System, retract
+
+
+class SimulatorBatchState(NamedTuple):
+    """State of a batch of simulators, opaque.
+
+    Attributes
+    ----------
+    of : tuple
+        Step [s], number of motions, method.
+    kept : tuple
+        What the motions continue from.
+    flags : tuple
+        Number of steps, whether a warning was given, inputs, marks of motions and their reasons.
+    """
+
+    of: tuple
+    kept: tuple
+    flags: tuple
 
 
 class SimulatorBatch:
@@ -107,9 +127,7 @@ class SimulatorBatch:
         self.reset()
 
     def __reduce__(self):
-        given = self.system, self.step_size, self._size, self.integrator, self.threads
-        flags = self._steps, self._warned, self._u.copy(), self.diverged.copy(), self.unconfirmed.copy(), dict(self.reasons)
-        return _again, (given, self._batch.kept(), flags)
+        return _again, ((self.system, *self._options, self.threads), self.snapshot())
 
     def _compiled(self, method: FixedStep) -> tuple[Callable, Callable[[np.ndarray], np.ndarray]]:
         """Maker of a batch at some initial states, and machine code of the outputs."""
@@ -122,6 +140,10 @@ class SimulatorBatch:
         program = batch_program(system, Laws(system), method)(ask.system, ask.laws, memory=memory, inputs=held)
         loop = fixed_step_code(system, method, held)
         return partial(FixedStepBatch, loop), output_kernel(program, system, method.nonsmooth, batch=True)
+
+    @property
+    def _options(self) -> tuple:
+        return self.step_size, self._size, self.integrator
 
     @property
     def has_time_laws(self) -> bool:
@@ -264,6 +286,27 @@ class SimulatorBatch:
         self._batch.points[:, k] = np.delete(np.frombuffer(alone.snapshot().point), slice(end, end + more))
         return True
 
+    def snapshot(self) -> SimulatorBatchState:
+        """Present state of all motions, to the last bit; any batch of the same scene, step and size can restore it."""
+        flags = self._steps, self._warned, self._u.copy(), self.diverged.copy(), self.unconfirmed.copy(), dict(self.reasons)
+        return SimulatorBatchState(self._options, tuple(map(copy, self._batch.kept())), flags)
+
+    def restore(self, snapshot: SimulatorBatchState):
+        """Continue all motions from a snapshot.
+
+        Raises
+        ------
+        SimulationError
+            If it is of another system, step, method or number of motions.
+        """
+        require(snapshot, (SimulatorBatchState,), "restore")
+        if snapshot.of != self._options or snapshot.kept[0].shape != self._batch.points.shape:
+            raise SimulationError("restore: the snapshot is of another system, step, method or number of motions.")
+        self._batch.keep(*snapshot.kept)
+        self._steps, self._warned, u, diverged, unconfirmed, reasons = snapshot.flags
+        self._u[:], self.diverged, self.unconfirmed = u, diverged.copy(), unconfirmed.copy()
+        self.reasons = dict(reasons)
+
     @property
     def t(self) -> float:
         """Time [s]."""
@@ -308,11 +351,10 @@ def _chosen(which, batch: int) -> np.ndarray:
         ) from error
 
 
-def _again(given: tuple, kept: tuple, flags: tuple) -> SimulatorBatch:
+def _again(given: tuple, snapshot: SimulatorBatchState) -> SimulatorBatch:
     """Batch of the same arguments in the same states, in another process."""
     many = SimulatorBatch(*given)
-    many._batch.keep(*kept)
-    many._steps, many._warned, many._u[:], many.diverged[:], many.unconfirmed[:], many.reasons = flags
+    many.restore(snapshot)
     return many
 
 
