@@ -29,6 +29,7 @@ from gauss.dynamics.projection import fixed_columns
 from gauss.errors import ArgumentError, MissingPackageError, SimulationError, StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.system import State, System, coordinate_rates
+from gauss.system.coordinate_names import displacement_names, rate_names
 
 STEADY = 1e-8  # share of the accelerations that forces could cause, below which a state is an equilibrium
 MARGINAL = 1e-7  # share of the fastest rate below which real parts count as zero: round-off of double eigenvalues is √ε
@@ -254,12 +255,11 @@ def linearise(
     forces, input_names = _input_columns(system, state, inputs)
     by_q, by_v, response = _acceleration_changes(changes, tangents, forces)
     A = np.block([[moving[places], rate[places]], [by_q[free], by_v[free]]])
-    names = system.coordinates
     B = np.concatenate([np.zeros((k, forces.shape[1])), response[free]])
     rows, direct, output_names = _output_rows(system, state, outputs, places, load)
     along_q = np.concatenate([N, np.zeros((system.n_v, rate.shape[1]))], axis=1)
     along = np.concatenate([along_q, np.concatenate([D, rate], axis=1), np.concatenate([by_q, by_v], axis=1)])
-    states = (*(names[p] for p in places), *(f"{names[p]} rate" for p in free))
+    states = (*(displacement_names(system)[p] for p in places), *(rate_names(system)[p] for p in free))
     own, unit = system.accelerations(state, load), system.scale.rates / system.scale.time
     C, places, A, B, N, states = _without_integrals(system, rows @ along, places, A, B, N, states)
     is_equilibrium = bool(
@@ -277,7 +277,7 @@ def _acceleration_changes(changes: AccelerationChanges, tangents: Tangents, forc
 
 
 def _without_integrals(system: System, C, places, A, B, N, states):
-    """The model without the integrals over time of states of one's own on which nothing depends; states have their names."""
+    """The model without the integrals over time of states of one's own on which nothing depends."""
     own = system.scene.states
     used = A.any(axis=0) | C.any(axis=0)
     integrals = np.array(
@@ -285,8 +285,7 @@ def _without_integrals(system: System, C, places, A, B, N, states):
     )
     kept = used | ~integrals
     moved = kept[: len(places)]
-    names = {f"{name} rate": name for name in own} | {name: f"integral of {name}" for name in own}
-    named = tuple(names.get(name, name) for name in np.array([*states, None], dtype=object)[:-1][kept])
+    named = tuple(np.array([*states, None], dtype=object)[:-1][kept])
     left = [place for place, is_kept in zip(places, moved, strict=True) if is_kept]
     return C[:, kept], left, A[np.ix_(kept, kept)], B[kept], N[:, moved], named
 
