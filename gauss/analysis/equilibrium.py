@@ -1,7 +1,7 @@
 """Equilibria: states at rest in which no coordinate accelerates, and forces on the coordinates that are kept.
 
-Newton's method on q̈(ξ, τ) = 0 for displacements ξ along the constraints and forces τ, with the exact derivatives of
-the accelerations; steps are halved until the accelerations decrease, and projected onto the constraints. Whether an
+Newton's method on q̈(ξ, τ, x) = 0, ẋ = 0 for displacements ξ along the constraints, forces τ and states of one's own x, with
+the exact derivatives; steps are halved until the accelerations decrease, and projected onto the constraints. Whether an
 equilibrium is stable follows from the eigenvalues of its linear model.
 """
 
@@ -12,7 +12,7 @@ from numbers import Real
 import numpy as np
 
 from gauss.analysis.derivatives import derivatives
-from gauss.analysis.frozen_time import state_at
+from gauss.analysis.frozen_time import own_states, resting, state_at
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import generator, named_arguments
@@ -82,7 +82,7 @@ def equilibrium(
     Returns
     -------
     StaticEquilibrium
-        State, energy, forces on the kept coordinates, linear model.
+        State, energy, forces on the kept coordinates, linear model. States of one's own, as currents, rest as well.
 
     Warns
     -----
@@ -159,17 +159,13 @@ def equilibria(
 
 def _compiled(system: System | Scene, name: str) -> System:
     require(system, (System, Scene), name)
-    system = compile_scene(system) if isinstance(system, Scene) else system
-    if system.scene.states:
-        names = ", ".join(map(repr, system.scene.states))
-        raise SimulationError(f"{name}: the states {names} have values at rest, too; simulate until nothing moves.")
-    return system
+    return compile_scene(system) if isinstance(system, Scene) else system
 
 
 def _random(system: System, base: State, rng: np.random.Generator, held: list[int], keep) -> State:
     """Assembled state far from another one, with the kept coordinates of that."""
     away = np.pi * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
-    away[held] = 0.0
+    away[held + own_states(system)] = 0.0
     return system.initial_state(retract(system, base.q, away), t=base.t, keep=keep or None)
 
 
@@ -191,18 +187,18 @@ def _load(system: System, loads) -> np.ndarray:
 
 def _found(system: System, start: State, held: list[int], load: np.ndarray) -> StaticEquilibrium:
     """Equilibrium by Newton's method from a start."""
-    state, forces = replace(start, v=np.zeros(system.n_v)), np.zeros(len(held))
+    state, forces, values = resting(system, start), np.zeros(len(held)), own_states(system)
     total = load.copy()
-    unit = system.scale.rates / system.scale.time
-    own = system.accelerations(state, total)
-    kicks = KICKS
+    own, kicks, unit = system.accelerations(state, total), KICKS, system.scale.rates / system.scale.time
     for _ in range(STEPS):
-        if np.abs(own / unit).max(initial=0.0) <= AT_REST**1.25:
+        slopes = derivatives(system, state, total)
+        left = np.abs(own / _units(system, state, slopes.v, values))
+        if left.max(initial=0.0) <= AT_REST**1.25:
             break
-        slopes, tangents = derivatives(system, state, total), Tangents(system, state, tuple(held))
-        N = tangents.position
-        change = np.concatenate([slopes.q @ N, slopes.load[:, held]], axis=1) / unit[:, None]
+        N = Tangents(system, state, (*held, *values)).position
+        change = np.concatenate([slopes.q @ N, slopes.load[:, held], slopes.v[:, values]], axis=1) / unit[:, None]
         sizes = np.concatenate([_lengths(system, N), np.full(len(held), system.scale.energy)])
+        sizes = np.append(sizes, np.maximum(1.0, np.abs(state.v[values])))
         step = -sizes * np.linalg.lstsq(change * sizes, own / unit, rcond=1e-12)[0]
         longest = np.abs(step[: N.shape[1]] / sizes[: N.shape[1]]).max(initial=0.0)
         share = min(1.0, LONGEST / longest) if longest else 1.0
@@ -213,14 +209,16 @@ def _found(system: System, start: State, held: list[int], load: np.ndarray) -> S
             break
         if not moved:  # Newton's method is caught where the slope is singular: go where the forces pull
             kicks -= 1
-            q = retract(system, state.q, own * LONGEST / np.abs(own / system.scale.coordinates).max())
+            pull = np.where(np.isin(np.arange(system.n_v), values), 0.0, own)
+            q = retract(system, state.q, pull * LONGEST / np.abs(own / system.scale.coordinates).max())
             state = project_positions(system, replace(state, q=q), POSITION_STEPS, tuple(held))
             own = system.accelerations(state, total)
-    if not np.abs(own / unit).max(initial=0.0) <= AT_REST:
-        worst = int(np.abs(own / unit).argmax())
+    if not left.max(initial=0.0) <= AT_REST:
+        worst = int(left.argmax())
+        words = f"changes by {own[worst]:.3g} /s" if worst in values else f"accelerates by {own[worst]:.3g} rad/s² or m/s²"
         raise SimulationError(
             f"scene {system.scene.name!r}: no equilibrium was found near this start: {system.coordinates[worst]!r} still "
-            f"accelerates by {own[worst]:.3g} rad/s² or m/s². Start elsewhere, or ask gauss.equilibria for random starts."
+            f"{words}. Start elsewhere, or ask gauss.equilibria for random starts."
         )
     if moving := violations(system, state):
         raise SimulationError(
@@ -235,13 +233,15 @@ def _found(system: System, start: State, held: list[int], load: np.ndarray) -> S
 
 def _line_search(system: System, state: State, own, step, share: float, N, kept):
     """First share of a step, halved again and again, that decreases the accelerations."""
-    (held, load, forces), k = kept, N.shape[1]
+    (held, load, forces), k, values = kept, N.shape[1], own_states(system)
     unit = system.scale.rates / system.scale.time
     size = np.linalg.norm(own / unit)
     while share >= LEAST_SHARE:
         q = retract(system, state.q, N @ (share * step[:k]))
-        tried = project_positions(system, replace(state, q=q), POSITION_STEPS, tuple(held))
-        more, total = forces + share * step[k:], load.copy()
+        v = state.v.copy()
+        v[values] += share * step[k + len(held) :]
+        tried = project_positions(system, replace(state, q=q, v=v), POSITION_STEPS, tuple(held))
+        more, total = forces + share * step[k : k + len(held)], load.copy()
         total[held] += more
         try:
             found = system.accelerations(tried, total)
@@ -253,6 +253,13 @@ def _line_search(system: System, state: State, own, step, share: float, N, kept)
     return state, own, forces, False
 
 
+def _units(system: System, state: State, slopes: np.ndarray, values: list[int]) -> np.ndarray:
+    """Units (n_v,) of accelerations, and of rates of states of one's own: what their values alone would cause."""
+    unit = system.scale.rates / system.scale.time
+    unit[values] += np.abs(slopes[np.ix_(values, values)]) @ np.abs(state.v[values])
+    return unit
+
+
 def _lengths(system: System, N: np.ndarray) -> np.ndarray:
     """Unit of each independent displacement."""
     return 1.0 / np.maximum(np.abs(N / system.scale.coordinates[:, None]).max(axis=0, initial=0.0), 1e-300)
@@ -260,13 +267,14 @@ def _lengths(system: System, N: np.ndarray) -> np.ndarray:
 
 def _are_same(system: System, one: StaticEquilibrium, other: StaticEquilibrium) -> bool:
     """Whether two equilibria have the same poses, or belong to one family, along which neither energy nor slopes change."""
-    poses = [kinematics(system, found.state) for found in (one, other)]
+    poses, values = [kinematics(system, found.state) for found in (one, other)], own_states(system)
     far = [np.abs(a - b).max(initial=0.0) for a, b in zip(poses[0].R, poses[1].R, strict=True)]
     near = [np.abs(a - b).max(initial=0.0) / system.scale.length for a, b in zip(poses[0].x, poses[1].x, strict=True)]
-    if max([*far, *near], default=0.0) <= SAME:
+    apart = np.abs(one.state.v - other.state.v)[values] / np.maximum(1.0, np.abs(one.state.v[values]))
+    if max([*far, *near, *apart], default=0.0) <= SAME:
         return True
-    values = [np.sort_complex(found.model.eigenvalues) for found in (one, other)]
-    size = max(np.abs(part).max(initial=0.0) for part in values)
-    in_family = any((np.abs(part) <= np.sqrt(SAME) * size).any() for part in values)
+    roots = [np.sort_complex(found.model.eigenvalues) for found in (one, other)]
+    size = max(np.abs(part).max(initial=0.0) for part in roots)
+    in_family = any((np.abs(part) <= np.sqrt(SAME) * size).any() for part in roots)
     alike = np.abs(one.energy - other.energy) <= SAME * system.scale.energy
-    return bool(in_family and alike and (np.abs(values[0] - values[1]) <= np.sqrt(SAME) * size).all())
+    return bool(in_family and alike and (np.abs(roots[0] - roots[1]) <= np.sqrt(SAME) * size).all())

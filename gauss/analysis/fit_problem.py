@@ -23,7 +23,7 @@ from gauss.dynamics.parametrised_system import parametrised
 from gauss.errors import ArgumentError, GaussError, SceneError, StateError, did_you_mean
 from gauss.scene import Scene
 from gauss.scene.named_numbers import POSITIVE, scene_of, value_of
-from gauss.system.coordinate_names import coordinate_units, rate_units
+from gauss.system.coordinate_names import state_names
 
 DIFFERENCE = 1e-5  # of parameters in their units: errors of central differences are 1e-10 of them
 UNIDENTIFIABLE = 1e-8  # singular values below this share of the largest: round-off of the derivatives
@@ -76,7 +76,7 @@ class FitProblem:
 
     def _places(self) -> list[int]:
         """Places of the measured columns in a state."""
-        known = [*coordinate_units(self.system), *(f"{name} rate" for name in rate_units(self.system))]
+        known = list(state_names(self.system))
         for name in self.columns:
             if name not in known:
                 raise ArgumentError(f"fit_motion: nothing measured is called {name!r}. {did_you_mean(name, known)}")

@@ -1,6 +1,7 @@
 """Laws of time in results of one instant: an equilibrium and a linear model hold for the values at one time only."""
 
 import warnings
+from dataclasses import replace
 from math import isfinite
 from numbers import Real
 
@@ -46,11 +47,23 @@ def state_at(system: System, given: State | None, t: float | None, what: str) ->
             raise ArgumentError(f"{what}: t: the given state has a time of its own, {given.t:g} s; give one of the two.")
         return given
     start = system.initial_state(t=float(t or 0.0))
-    found = system.initial_state(start.q, np.zeros(system.n_v), start.t)
+    found = system.initial_state(start.q, resting(system, start).v, start.t)
     if t is None and (names := timed_laws(system, found)):
         words = f"the laws of {', '.join(map(repr, names))} depend on time; the result holds for t = {found.t:g} s only"
         warnings.warn(f"{what}: {words}. Name a time by t= [s].", TimeDependenceWarning, stacklevel=user_level())
     return found
+
+
+def own_states(system: System) -> list[int]:
+    """Places in v of states of one's own."""
+    return [k for k, name in enumerate(system.coordinates) if name in system.scene.states]
+
+
+def resting(system: System, state: State) -> State:
+    """State without rates; states of one's own, as currents and pressures, keep their values."""
+    v, own = np.zeros(system.n_v), own_states(system)
+    v[own] = state.v[own]
+    return replace(state, v=v)
 
 
 def timed_laws(system: System, state: State) -> tuple[str, ...]:

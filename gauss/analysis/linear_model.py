@@ -21,6 +21,7 @@ from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, write
 from gauss.dynamics import compile_scene
+from gauss.dynamics.consistent_states import refuse_off_constraints
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.outputs import FORCES, measured
@@ -28,9 +29,10 @@ from gauss.dynamics.projection import fixed_columns
 from gauss.errors import ArgumentError, MissingPackageError, SimulationError, StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.system import State, System, coordinate_rates
+from gauss.system.coordinate_names import displacement_names, rate_names
 
 STEADY = 1e-8  # share of the accelerations that forces could cause, below which a state is an equilibrium
-MARGINAL = 1e-7  # real parts below this share of the largest eigenvalue count as zero: round-off of double eigenvalues is √ε
+MARGINAL = 1e-7  # share of the fastest rate below which real parts count as zero: round-off of double eigenvalues is √ε
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,14 @@ class LinearModel:
     @property
     def stability(self) -> str:
         """Whether it is "stable", "marginal" or "unstable", by the largest real part of the eigenvalues."""
-        found = self.eigenvalues
-        size = np.abs(found).max(initial=0.0)
-        largest = found.real.max(initial=-np.inf)
-        return "marginal" if abs(largest) <= MARGINAL * size else "stable" if largest < 0.0 else "unstable"
+        largest = self.eigenvalues.real.max(initial=-np.inf)
+        return "marginal" if abs(largest) <= self._zero else "stable" if largest < 0.0 else "unstable"
+
+    @property
+    def _zero(self) -> float:
+        """Real parts [1/s] that are round-off: of the eigenvalues, and of the time of the scene, as at neutral rest."""
+        own = 1.0 / self.system.scale.time if self.displacements.shape[1] else 0.0
+        return MARGINAL * max(np.abs(self.eigenvalues).max(initial=0.0), own)
 
     def modes(self) -> LinearModes:
         """Eigenmodes."""
@@ -139,7 +145,7 @@ class LinearModel:
         if not self.inputs:
             raise SimulationError("lqr: expected a model with inputs; name some in linearise, or by scene.input.")
         left = self.uncontrollable()
-        moving = left.eigenvalues.real >= -MARGINAL * np.abs(self.eigenvalues).max(initial=0.0)
+        moving = left.eigenvalues.real >= -self._zero
         if moving.any():
             named = str(LinearModes(left.eigenvalues[moving], left.shapes[moving], left.coordinates))
             raise SimulationError(
@@ -219,7 +225,8 @@ def linearise(
     ArgumentError
         If inputs or outputs are no names, or a time is given beside a state.
     StateError
-        If a name is none of the scene, or the independent coordinates do not determine the others.
+        If a name is none of the scene, the state is off the constraints, or the independent coordinates do not determine the
+        others.
     SimulationError
         If the system cannot be compiled, or its accelerations have no derivatives in this state.
 
@@ -233,6 +240,7 @@ def linearise(
     require(system, (System, Scene), "linearise")
     system = compile_scene(system) if isinstance(system, Scene) else system
     state = state_at(system, state, t, "linearise")
+    refuse_off_constraints(system, state, "linearise")
     changes = AccelerationChanges(system, state, load)
     tangents = Tangents(changes.system, state)
     N, rate = tangents.position, tangents.rate
@@ -247,12 +255,11 @@ def linearise(
     forces, input_names = _input_columns(system, state, inputs)
     by_q, by_v, response = _acceleration_changes(changes, tangents, forces)
     A = np.block([[moving[places], rate[places]], [by_q[free], by_v[free]]])
-    names = system.coordinates
     B = np.concatenate([np.zeros((k, forces.shape[1])), response[free]])
     rows, direct, output_names = _output_rows(system, state, outputs, places, load)
     along_q = np.concatenate([N, np.zeros((system.n_v, rate.shape[1]))], axis=1)
     along = np.concatenate([along_q, np.concatenate([D, rate], axis=1), np.concatenate([by_q, by_v], axis=1)])
-    states = (*(names[p] for p in places), *(f"{names[p]} rate" for p in free))
+    states = (*(displacement_names(system)[p] for p in places), *(rate_names(system)[p] for p in free))
     own, unit = system.accelerations(state, load), system.scale.rates / system.scale.time
     C, places, A, B, N, states = _without_integrals(system, rows @ along, places, A, B, N, states)
     is_equilibrium = bool(
@@ -270,7 +277,7 @@ def _acceleration_changes(changes: AccelerationChanges, tangents: Tangents, forc
 
 
 def _without_integrals(system: System, C, places, A, B, N, states):
-    """The model without the integrals over time of states of one's own on which nothing depends; states have their names."""
+    """The model without the integrals over time of states of one's own on which nothing depends."""
     own = system.scene.states
     used = A.any(axis=0) | C.any(axis=0)
     integrals = np.array(
@@ -278,8 +285,7 @@ def _without_integrals(system: System, C, places, A, B, N, states):
     )
     kept = used | ~integrals
     moved = kept[: len(places)]
-    names = {f"{name} rate": name for name in own} | {name: f"integral of {name}" for name in own}
-    named = tuple(names.get(name, name) for name in np.array([*states, None], dtype=object)[:-1][kept])
+    named = tuple(np.array([*states, None], dtype=object)[:-1][kept])
     left = [place for place, is_kept in zip(places, moved, strict=True) if is_kept]
     return C[:, kept], left, A[np.ix_(kept, kept)], B[kept], N[:, moved], named
 

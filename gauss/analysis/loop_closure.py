@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.analysis.tangents import RANK_TOLERANCE, Tangents
+from gauss.analysis.tangents import RANK_TOLERANCE, Tangents, row_lengths
 from gauss.codegen import Kernel, write
 from gauss.dynamics.assembly_search import RESIDUAL_TOLERANCE
 from gauss.dynamics.mechanism import loop_residual
@@ -32,8 +32,7 @@ def closed(system: System, state: State, held=()) -> tuple[State, bool]:
     for _ in range(NEWTON_STEPS):
         phi = kernel(np.concatenate([[found.t], found.q]))
         J = Tangents(system, found).position_rows[:, free] * units
-        lengths = np.linalg.norm(J, axis=1)
-        lengths[lengths == 0.0] = 1.0  # rows are angles and lengths, whose units must not decide on the rank
+        lengths = row_lengths(J)
         xi = np.zeros(system.n_v)
         xi[free] = -units * np.linalg.lstsq(J / lengths[:, None], phi / lengths, rcond=RANK_TOLERANCE)[0]
         longest = np.abs(xi / system.scale.coordinates).max(initial=0.0)

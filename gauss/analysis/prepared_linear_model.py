@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gauss.analysis.frozen_time import resting
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.linear_model_each import LinearModelOfEach, output_names
 from gauss.arguments import named_arguments
@@ -134,7 +135,7 @@ def prepare_linear_model(
     plan = LINEAR_MODELS.plan(Question(system, Laws(system)))
     if state is None:
         start = system.initial_state()
-        state = system.initial_state(start.q, np.zeros(system.n_v), start.t)
+        state = system.initial_state(start.q, resting(system, start).v, start.t)
     model = linearise(system, state, inputs=inputs, outputs=outputs, independent=independent)
     positions, rates, own = _places(model)
     if not set(positions) <= set(rates) and len(positions) + own == len(rates):  # equally good coordinates, chosen twice

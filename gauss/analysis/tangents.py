@@ -17,13 +17,17 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import qr
 
+from gauss.backends.rank import COARSEST_LOOP_RANK, numerical_rank
 from gauss.codegen import Kernel, forward, write
 from gauss.dynamics.conditions import refuse_motionless
 from gauss.dynamics.mechanism import Mechanism, loop_residual
+from gauss.dynamics.projection import position_residual_of, relative
 from gauss.dynamics.store import cached
 from gauss.system import State, System, coordinate_rates, whole
 
 RANK_TOLERANCE = 1e-9  # singular values below this share of the largest are zero
+ROUND_OFF = 1e-13  # rows below this share of the longest bind nothing
+TIES = 1e-6  # share by which one of equally good coordinates is preferred to the next one
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ class Tangents:
     @cached_property
     def position(self) -> np.ndarray:
         """N_q (n_v, k)."""
-        return _basis(self.position_rows, self.held, self._units)
+        return _basis(self.position_rows, self.held, self._units, self._residual)
 
     @cached_property
     def position_rows(self) -> np.ndarray:
@@ -66,7 +70,7 @@ class Tangents:
     @cached_property
     def rate(self) -> np.ndarray:
         """N_v (n_v, l)."""
-        return _basis(self._rate_rows, self.held, self._units)
+        return _basis(self._rate_rows, self.held, self._units, self._residual)
 
     @cached_property
     def change(self) -> np.ndarray:
@@ -104,6 +108,12 @@ class Tangents:
     @property
     def _units(self) -> np.ndarray:
         return self.system.scale.coordinates
+
+    @cached_property
+    def _residual(self) -> float:
+        """Position residual of the state, in shares of the scales of the rows."""
+        system = self.system
+        return relative(system, position_residual_of(system, self.state)) if system.has_closures else 0.0
 
     @cached_property
     def _rate_rows(self) -> np.ndarray:
@@ -147,17 +157,26 @@ def _kernel(system: System) -> tuple[Kernel, np.ndarray]:
     return Kernel(function, batch=False), np.cumsum(sizes[:-1])
 
 
-def _basis(rows: np.ndarray, held, units: np.ndarray) -> np.ndarray:
-    """Null space (n, k) of rows, unit rows at the places that pivoting in the units chooses as independent."""
+def row_lengths(rows: np.ndarray, residual: float = 0.0) -> np.ndarray:
+    """Lengths (m,) by which rows (m, n) are divided, so that units do not decide on the rank; 1 for rows of round-off."""
+    lengths = np.linalg.norm(rows, axis=1)
+    return np.where(lengths > max(ROUND_OFF, residual) * lengths.max(initial=0.0), lengths, 1.0)
+
+
+def _basis(rows: np.ndarray, held, units: np.ndarray, residual: float) -> np.ndarray:
+    """Null space (n, k) of rows, unit rows at the places that pivoting in the units chooses as independent.
+
+    A residual η of the state makes redundant rows look independent by η, and the answer wrong by η/σ for the least singular
+    value σ: a rank tolerance of √η balances the two.
+    """
     n = units.size
     bound = np.concatenate([rows * units, np.eye(n)[list(held)]])
-    lengths = np.linalg.norm(bound, axis=1, keepdims=True)
-    _, sizes, Vt = np.linalg.svd(bound / np.where(lengths > 0.0, lengths, 1.0), full_matrices=True)
-    rank = int((sizes > RANK_TOLERANCE * sizes.max(initial=0.0)).sum())
+    _, sizes, Vt = np.linalg.svd(bound / row_lengths(bound, residual)[:, None], full_matrices=True)
+    rank = numerical_rank(sizes, float(np.clip(np.sqrt(residual), RANK_TOLERANCE, COARSEST_LOOP_RANK)))
     N = Vt[rank:].T
     if not N.shape[1]:
         return N
-    _, _, order = qr(N.T, pivoting=True)
+    _, _, order = qr(N.T * (1.0 - TIES * np.arange(n)), pivoting=True)
     chosen = np.sort(order[: N.shape[1]])
     N = np.linalg.solve(N[chosen].T, N.T).T
     N = units[:, None] * N / units[chosen]

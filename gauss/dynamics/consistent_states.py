@@ -22,7 +22,7 @@ from gauss.dynamics.projection import (
     velocity_residual_of,
     within_limits,
 )
-from gauss.errors import AssemblyError, InconsistentConstraintsWarning, StartWarning, listed, user_level
+from gauss.errors import AssemblyError, InconsistentConstraintsWarning, StartWarning, StateError, listed, user_level
 from gauss.system import State, System
 
 SHOWN = 4  # constraints or joints that a message names before it counts
@@ -158,6 +158,34 @@ def _is_met(system: System, state: State) -> bool:
     return not violations(system, state)
 
 
+def refuse_off_constraints(system: System, state: State, what: str):
+    """Refuse a state that is farther from its constraints than numbers of few digits explain.
+
+    Raises
+    ------
+    StateError
+        With the residuals of the constraints.
+    """
+    if system.has_closures and _distance(system, state) > TYPED_DIGITS_RESIDUAL:
+        raise StateError(
+            f"{what}: the state does not meet its constraints: {_named(violations(system, state))}; system.projected and "
+            "system.initial_state make states that do."
+        )
+
+
+def _distance(system: System, state: State) -> float:
+    """Largest residual of positions or rates, in shares of the scales of the rows."""
+    motion = kinematics(system, state)
+    of_rates = relative_velocity_residual(system, velocity_residual_of(system, motion), state.v)
+    return max(relative(system, position_residual(motion)), of_rates)
+
+
+def _named(found: dict[str, str]) -> str:
+    """Violated constraints with their residuals, the largest first."""
+    more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+    return "; ".join(f"{name!r} {amount}" for name, amount in list(found.items())[:SHOWN]) + more
+
+
 def _keeps(system: System, start: State, kept: State, held) -> bool:
     units, scale = system.scale.coordinates[held], system.scale
     moved = (np.abs(scalar_coordinates(system, start) - scalar_coordinates(system, kept))[held] / units).max()
@@ -175,22 +203,17 @@ def _check_start(system: System, state: State, where: str, pose: AssembledPose):
     found = violations(system, state)
     if not found:
         return
-    words = "; ".join(f"{name!r} {amount}" for name, amount in list(found.items())[:SHOWN])
-    more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-    phi = relative(system, position_residual_of(system, state))
-    if (
-        max(phi, relative_velocity_residual(system, velocity_residual_of(system, kinematics(system, state)), state.v))
-        <= TYPED_DIGITS_RESIDUAL
-    ):
+    words = _named(found)
+    if _distance(system, state) <= TYPED_DIGITS_RESIDUAL:
         warnings.warn(
-            f"constraints contradict each other a little: {words}{more} in the pose of least violation, which is used. "
+            f"constraints contradict each other a little: {words} in the pose of least violation, which is used. "
             "Give lengths and frames with all their digits.",
             InconsistentConstraintsWarning,
             stacklevel=4,
         )
         return
     worst = next(iter(found))
-    message = f"constraint {worst!r} cannot be met {where}: {words}{more} in the closest pose found. "
+    message = f"constraint {worst!r} cannot be met {where}: {words} in the closest pose found. "
     at_limit = _at_limits(system, state)
     if at_limit:
         message += f"At a limit: {', '.join(at_limit)}. "

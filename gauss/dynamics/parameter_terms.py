@@ -56,7 +56,12 @@ def size_of(system: System, parameter: str) -> int:
             raise ArgumentError(f"parameter {parameter!r}: beside relations, there are no derivatives by places of joints.")
         return OF_JOINTS[kind]
     loads = {bound.load.name: bound.load for bound in system.loads}
-    _known(parameter, name, loads)
+    if name not in loads:
+        words = ", ".join(f'"{one}:NAME"' for one in (*OF_BODIES, *OF_JOINTS))
+        raise StateError(
+            f'parameter {parameter!r}: expected "{GRAVITY}", {words}, or "NUMBER:NAME" of a load, as in "stiffness:spring". '
+            f"{did_you_mean(name or kind, loads)}"
+        )
     given = loads[name]
     numbers = vars(given.element if isinstance(given, Slipping) else given)
     fields = [field for field, value in numbers.items() if isinstance(value, float)]

@@ -22,6 +22,25 @@ def rate_units(system) -> dict[str, str]:
     return dict(zip(system.coordinates, units, strict=True))
 
 
+def displacement_names(system) -> list[str]:
+    """Names of displacements along every entry of v; a state of one's own moves along its integral."""
+    own = system.scene.states
+    return [f"integral of {name}" if name in own else name for name in system.coordinates]
+
+
+def rate_names(system) -> list[str]:
+    """Names of the entries of v as states; states of one's own have their names."""
+    own = system.scene.states
+    return [name if name in own else f"{name} rate" for name in system.coordinates]
+
+
+def state_names(system) -> dict[str, str]:
+    """Name → unit of every entry of q, then of v, as states; states of one's own have their names, and q their integrals."""
+    coordinates, rates, own = coordinate_units(system), rate_units(system), system.scene.states
+    named = {f"integral of {name}" if name in own else name: unit for name, unit in coordinates.items()}
+    return named | {name if name in own else f"{name} rate": "1" if name in own else unit for name, unit in rates.items()}
+
+
 def force_units(system) -> dict[str, str]:
     """Name → unit of the generalised force along every entry of v: "N m" or "N"."""
     return {name: "N m" if unit == "rad/s" else "N" for name, unit in rate_units(system).items()}

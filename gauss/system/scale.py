@@ -180,6 +180,8 @@ def _turns(system, length, mass, coordinates) -> float:
     """Time in which the quickest start, or prescribed motion, goes by one unit."""
     scene, found = system.scene, []
     for name, start in scene.starts.items():
+        if name in scene.states:  # values of any unit, no rates
+            continue
         joint = system.joint(name)
         found.append(_inverse(np.abs(np.asarray(start.rate) / coordinates[joint.v]).max(initial=0.0)))
     for part in [*scene.relations.values(), *scene.set_valued.values()]:

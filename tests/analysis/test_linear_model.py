@@ -17,6 +17,7 @@ STEP = 1e-5  # of central differences, in units of the scene
 DIFFERENCES = 1e-6  # relative to the largest entry of A: truncation h² and round-off ε / h
 EXACT = 1e-9  # closed forms
 ENERGY_STEP, ENERGY_SLOPE = 1e-3, 1e-5  # of second differences of energies, and what they leave: h², and round-off over h²
+OFF, CHANGED = 1e-8, 1e-4  # distance of a state from its constraints, and share of A that it changes: over singular values
 RICCATI = 1e-8  # gains by two solvers of the Riccati equation, relative
 SCENES = {
     "open": lambda: gauss.load("double_pendulum"),
@@ -98,6 +99,32 @@ def test_a_free_body_turns_stably_about_its_extreme_axes(axis, is_stable):
 def test_freedoms_of_a_loop_with_redundant_rows_are_counted_once():
     model = gauss.linearise(gauss.load("bricard"))
     assert model.A.shape == (2, 2)
+
+
+@pytest.mark.parametrize("name", ["bricard", "parallelogram", "four_bar", "cardan"])
+def test_states_a_little_off_their_constraints_have_the_same_freedoms(name):
+    """Redundant rows contradict each other there; rates are those of the coordinates, in which no other is better."""
+    system, rng = gauss.compile_scene(gauss.load(name)), np.random.default_rng(2)
+    moved = gauss.simulate(system, 0.3, rtol=1e-10, atol=1e-10)
+    state = system.state(moved.q[-1], moved.v[-1])
+    model = gauss.linearise(system, state)
+    assert model.states == (model.states[0], f"{model.states[0]} rate")
+    away = replace(state, q=retract(system, state.q, OFF * rng.normal(size=system.n_v)))
+    A = gauss.linearise(system, away, independent=model.states[:1]).A
+    assert A == pytest.approx(model.A, abs=CHANGED * np.abs(model.A).max())
+
+
+@pytest.mark.parametrize("change", [lambda s: replace(s, q=s.q + 1e-3), lambda s: replace(s, v=np.eye(4)[0])])
+def test_states_far_from_their_constraints_are_refused(change):
+    system = gauss.compile_scene(gauss.load("four_bar"))
+    with pytest.raises(StateError, match="'D'"):
+        gauss.linearise(system, change(system.initial_state()))
+
+
+@pytest.mark.parametrize("name", ["cardan", "turntable"])
+def test_neutral_rest_is_marginal(name):
+    """A balanced joint stays wherever it is put: both its eigenvalues are zero."""
+    assert {one.stability for one in gauss.equilibria(gauss.load(name), starts=8)} == {"marginal"}
 
 
 @pytest.mark.parametrize("name", ["pendulum", "four_bar", "bricard"])

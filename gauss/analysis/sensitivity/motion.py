@@ -31,6 +31,7 @@ from gauss.errors import ArgumentError, SimulationError, require
 from gauss.scene import Scene
 from gauss.simulation.tolerances import step_count
 from gauss.system import State, System, coordinate_rates
+from gauss.system.coordinate_names import displacement_names, rate_names
 
 
 class Piece(Protocol):
@@ -144,8 +145,8 @@ class Motion:
             np.array([coordinate_rates(system, self.start.q, column) for column in N.T]).reshape(N.shape[1], system.n_q).T
         )
         still = np.zeros((system.n_q, rate.shape[1]))
-        names = [system.coordinates[k] for k in tangents.independent_coordinates]
-        names += [f"{system.coordinates[k]} rate" for k in tangents.independent_rates]
+        names = [displacement_names(system)[k] for k in tangents.independent_coordinates]
+        names += [rate_names(system)[k] for k in tangents.independent_rates]
         return np.block([[moved, still], [D, rate]]), tuple(names)
 
     def _smoothly(self):

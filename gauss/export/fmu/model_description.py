@@ -7,7 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 from gauss.errors import ArgumentError
 from gauss.system import State, System
-from gauss.system.coordinate_names import coordinate_units, rate_units
+from gauss.system.coordinate_names import state_names
 from gauss.versions import VERSION
 
 
@@ -53,13 +53,6 @@ class UnitNames:
             name = f"{kind} {name}"
         self.taken.add(name)
         return name
-
-
-def state_names(system: System) -> dict[str, str]:
-    """Names and units of the states: coordinates, then rates; states of one's own have their names."""
-    coordinates, rates, own = coordinate_units(system), rate_units(system), system.scene.states
-    named = {f"integral of {name}" if name in own else name: unit for name, unit in coordinates.items()}
-    return named | {name if name in own else f"{name} rate": "1" if name in own else unit for name, unit in rates.items()}
 
 
 def variables(system: System, start: State, parameters: Mapping[str, float]) -> dict[str, list[Variable]]:
