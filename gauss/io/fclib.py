@@ -175,12 +175,15 @@ def _numbers(group, name: str) -> np.ndarray:
 
 def _own(group, name: str):
     """Group or data set of the file itself, not of another one that it names."""
-    is_linked = isinstance(group.get(name, getlink=True), hdf5().ExternalLink)
-    found = None if is_linked else group[name]
-    is_set = isinstance(found, hdf5().Dataset)
-    if is_linked or found.file.filename != group.file.filename or (is_set and (found.external or found.is_virtual)):
-        raise ValueError(f"{name} stands in another file, which is not opened.")
-    if is_set:
+    elsewhere = ValueError(f"{name} stands in another file, which is not opened.")
+    if isinstance(group.get(name, getlink=True), hdf5().ExternalLink):
+        raise elsewhere
+    found = group[name]
+    if found.file.filename != group.file.filename:
+        raise elsewhere
+    if isinstance(found, hdf5().Dataset):
+        if found.external or found.is_virtual:
+            raise elsewhere
         require_small(found.nbytes)
     return found
 

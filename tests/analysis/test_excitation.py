@@ -76,6 +76,7 @@ def test_a_linkage_is_identified_by_its_crank(name):
     np.testing.assert_allclose(fit.base_values, wanted, rtol=0.0, atol=1e-8 * np.abs(wanted).max())
 
 
+@pytest.mark.slow
 def test_loops_that_do_not_close_are_refused():
     scene = gauss.load("four_bar")
     scene.starts.clear()
@@ -111,6 +112,7 @@ def _stopped(scene: str, joint: str):
     return found, start, {"independent": ["A"]} if system.has_closures else {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum", "four_bar"])
 def test_series_keep_stops(name):
     scene, start, options = _stopped(name, "A")
@@ -121,6 +123,7 @@ def test_series_keep_stops(name):
         gauss.excitation(scene, 5.0, harmonics=2, trials=3, limits=wide, **options)
 
 
+@pytest.mark.slow
 def test_stops_of_joints_that_follow_are_kept():
     scene, _, options = _stopped("four_bar", "C")
     with pytest.raises(gauss.errors.SimulationError, match="stops of other joints"):

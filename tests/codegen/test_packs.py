@@ -51,6 +51,7 @@ def chains(count: int, seed: int, odd: int = 0):
     return write(function, SHARED + OWN * count), seeds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [400, 15], ids=["in one piece", "in pieces"])
 @pytest.mark.parametrize("count", [2, 3, 5, 8])
 def test_packs_round_like_single_operations(count, length, monkeypatch):

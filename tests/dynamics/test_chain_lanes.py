@@ -121,6 +121,7 @@ def _inputs(system):
     ]
 
 
+@pytest.mark.slow
 @wide
 @pytest.mark.parametrize("name", [*WALKERS, *LOOPS])
 def test_lanes_round_like_single_operations(name):
@@ -138,6 +139,7 @@ def test_lanes_round_like_single_operations(name):
         assert found[accelerations] == pytest.approx(expected, rel=0.0, abs=ROUNDING * np.abs(expected).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*WALKERS, *LOOPS])
 def test_the_function_is_that_of_the_certified_solution(name):
     system = gauss.compile_scene((WALKERS | LOOPS)[name]())
@@ -147,6 +149,7 @@ def test_the_function_is_that_of_the_certified_solution(name):
         assert found == pytest.approx(exact, rel=0.0, abs=CERTIFIED * np.abs(exact).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_random_walkers(seed):
     legs, odd = 3 + seed % 4, seed % 3
@@ -177,6 +180,7 @@ def test_equal_numbers_belong_to_each_chain_once(name):
     assert own <= set(found[places])
 
 
+@pytest.mark.slow
 @wide
 def test_laws_in_python_are_called_beside_the_lanes():
     scene = walker(4, 1)

@@ -57,6 +57,7 @@ def relative(found, expected) -> float:
     return np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-300)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, size, step", [("mass", 1, 0.1), ("com", 3, 0.05), ("inertia", 6, 1e-3), ("gravity", 3, 1.0)])
 def test_inertial_parameters_of_a_tree(kind, size, step):
     scene = sprung_tree()
@@ -143,6 +144,7 @@ def test_lengths_of_a_loop_along_closed_linkages():
 PARAMETERS_OF_LOOPS = {"mass:coupler": 1, "com:coupler": 3, "inertia:crank": 6, "stiffness:S": 1}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", PARAMETERS_OF_LOOPS)
 def test_parameters_of_a_loop(parameter):
     scene = gauss.load("four_bar")
@@ -160,6 +162,7 @@ def test_parameters_of_a_loop(parameter):
 BY_INDEPENDENT = {"A": ("mass:coupler", "com:coupler", "inertia:rocker", "gravity"), "D": ("com:rocker", "mass:crank")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", BY_INDEPENDENT)
 def test_parameters_for_independent_coordinates(joint):
     """Accelerations and efforts of the independent coordinate, against scenes with other parameters."""
@@ -179,6 +182,7 @@ def test_parameters_for_independent_coordinates(joint):
         assert relative(found, by_difference(scene, parameter, found.shape[1], efforts, 1e-5)) <= OF_STEPS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["A", "B"])
 @pytest.mark.parametrize("parameter", ["child_at:A", "parent_at:B", "parent_at:C", "child_at:D"])
 def test_lengths_of_a_loop_for_independent_coordinates(joint, parameter):
@@ -204,6 +208,7 @@ def test_lengths_of_a_loop_for_independent_coordinates(joint, parameter):
     assert not by_place[:, 2].any()  # across the plane: the rows that it would contradict are redundant
 
 
+@pytest.mark.slow
 def test_all_coordinates_of_a_tree_are_independent():
     system = gauss.compile_scene(sprung_tree())
     state, a = random_state(system, np.random.default_rng(6)), np.linspace(-1.0, 1.0, system.n_v)
@@ -218,6 +223,7 @@ def test_all_coordinates_of_a_tree_are_independent():
             assert relative(found, expected) <= EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", ["B", "D"])
 @pytest.mark.parametrize("parameter", ["stiffness:S", "damping:S"])
 def test_constants_of_loads_along_joints_of_a_loop(joint, parameter):

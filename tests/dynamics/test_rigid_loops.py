@@ -94,6 +94,7 @@ CALLS = [(name, ()) for name in TERMS if name != "null_space"]
 CALLS += [(name, ("root",)) for name in TERMS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, independent", CALLS, ids=lambda part: part if isinstance(part, str) else "".join(part))
 def test_functions_of_a_state_are_those_of_its_pose_or_refuse_it(name, independent):
     """The twin is written in the mirrored pose: its coordinates are less by those of this pose, its functions the same."""

@@ -31,6 +31,7 @@ def solid(kind: str):
     return MAKE[kind](scene, "A")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_nearest_point_is_that_of_coal(kind):
     field, shape, rng, seen = land(rotation=(0.1, 0.2, 0.3), at=(0.1, 0.2, 0.3)), solid(kind), np.random.default_rng(3), 0

@@ -179,6 +179,7 @@ DIVERGING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("integrator", DIVERGING)
 def test_motions_that_diverge_are_marked_and_the_others_are_not_affected(integrator, threads):

@@ -33,6 +33,7 @@ def flat(scene):
     scene.height_field("land", "ground", np.zeros((11, 31)), (3.0, 1.0), rotation=(0, 0, 0.3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_a_level_field_is_a_plane(kind):
     ends = []
@@ -47,6 +48,7 @@ def test_a_level_field_is_a_plane(kind):
     assert ends[0].v[-1] == pytest.approx(ends[1].v[-1], abs=AS_ON_A_PLANE / STEP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True])
 def test_feet_are_balls_at_their_points(turned):
     places, ends = np.array([(0.2, 0.1, -0.2), (0.2, -0.1, -0.2), (-0.2, 0.0, -0.2)]), []
@@ -84,6 +86,7 @@ def test_a_ball_in_a_valley_presses_on_both_sides():
     assert pressed == pytest.approx([0.5 * G * np.hypot(1.0, slope)] * 2, rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_bodies_stay_above_hills(kind):
     rng, scene = np.random.default_rng(6), gauss.Scene("hills")
