@@ -97,7 +97,6 @@ class Program:
         self.loads = laws.traced if family is None else family.system.loads
         self.inputs = tuple(system.scene.inputs) if inputs else ()
         self.loads = [*self.loads, *input_loads(system)] if inputs else self.loads
-        self.is_plain = family is None
         self.pattern = system if family is None else family.pattern  # a system of numbers alone
         self.layout = PointLayout(system.n_q, system.n_v, memory, self.inputs if family is None else family.parameters)
 
@@ -109,7 +108,7 @@ class Program:
     @cached_property
     def watch(self) -> SwitchingFunctions:
         """Switching functions of its laws and constraints."""
-        return SwitchingFunctions(self.system, watched_functions(self.system, self.laws) if self.is_plain else self.laws)
+        return SwitchingFunctions(self.system, watched_functions(self.pattern, self.laws))
 
     @property
     def projects(self) -> bool:

@@ -18,6 +18,7 @@ from gauss.simulation.motion_records import Event, Stats
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
+from gauss.simulation.undetected_switching import SPARSE_STEP
 from gauss.system import State, System, coordinate_rates
 
 
@@ -78,7 +79,8 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
     start, end, switching, n_q, n_v = problem.start, problem.end, problem.switching, system.n_q, system.n_v
     times = np.array([start.t, end]) if samples is None else np.union1d([start.t, end], samples)
     y0 = np.concatenate([start.q, start.v, np.zeros(3)])
-    solve = partial(_solve, problem, derivative)
+    asked: list[float] = []  # times at which opaque laws of the state are called
+    solve = partial(_solve, problem, _noted(derivative, asked) if switching.called else derivative)
     events: list[Event] = []
 
     def across(before: float, after: float, y: np.ndarray) -> np.ndarray:
@@ -100,6 +102,8 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
     if switching.watch is not None:
         stats = stats._replace(unseen=found.steps or 1)  # libraries do not locate switching events
+    if switching.called and np.diff(np.sort([start.t, *asked, end])).max() > SPARSE_STEP * (end - start.t):
+        stats = stats._replace(opaque=", ".join(switching.called))
     q, v = (np.reshape([getattr(state, part) for state in states], (len(states), n)) for part, n in (("q", n_q), ("v", n_v)))
     whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
     if found.interruption is not None:
@@ -111,6 +115,16 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
         off = f"compiled accelerations that {method.name!r} used are off by {worst:.1e}; use 'dop853'."
         raise SimulationError(f"t = {end:.6g} s: {off}", whole)
     return whole
+
+
+def _noted(derivative: Callable, times: list[float]) -> Callable:
+    """Rates whose times are added to a list."""
+
+    def rates(t: float, y: np.ndarray) -> np.ndarray:
+        times.append(float(t))
+        return derivative(t, y)
+
+    return rates
 
 
 def _solve(problem: Problem, derivative: Callable, times: np.ndarray, y0: np.ndarray) -> LibrarySolution:

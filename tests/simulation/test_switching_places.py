@@ -176,3 +176,91 @@ def test_bumps_of_a_constraint_are_never_passed_over(bump, width, integrator):
     )[0]
     assert delay > 1e3 * DELAYS  # a bump that is passed over delays nothing
     assert motion.q[-1, 0] == pytest.approx(20.0 - delay, abs=DELAYS)
+
+
+def _carriage(press=0.0, mass=0.5):
+    """Half a kilogram on a rail at 1 m/s, and another across it, on which a force may press."""
+    scene = gauss.Scene("carriage", gravity=(0.0, 0.0, 0.0))
+    for name in ("carriage", "slide"):
+        scene.body(name, mass)
+    scene.prismatic("x", "ground", "carriage", axis=(1.0, 0.0, 0.0))
+    scene.prismatic("y", "carriage", "slide", axis=(0.0, 1.0, 0.0))
+    scene.start("x", rate=1.0)
+    if press:
+        scene.drive("y", force=-press)
+    return scene
+
+
+def _bell(x, width=0.002, height=0.05):
+    return height * gm.exp(-(((x - 6.1) / width) ** 2))
+
+
+WAYS = {  # in which a function of the user leads the slide
+    "constraint": lambda scene: scene.constrain("guide", lambda at: at.coordinate("y") - _bell(at.coordinate("x"))),
+    "cam": lambda scene: scene.cam("guide", "x", "y", _bell),
+    "curve": lambda scene: scene.on_curve("guide", "slide", "ground", lambda p: p[1] - _bell(p[0])),
+    "mode": lambda scene: scene.constrain(  # a kink far behind divides the motion into modes
+        "guide", lambda at: at.coordinate("y") - _bell(at.coordinate("x")) - gm.maximum(0.0, at.coordinate("x") - 40.0)
+    ),
+}
+
+
+def _delay(width=0.002, height=0.05):
+    """Delay on the bell at the pace √(2 energy) = 1 m/s, of (1 + f′²/2) ẋ² = 1."""
+    slope = lambda u: -2.0 * height / width * u * np.exp(-u * u)  # noqa: E731
+    return quad(lambda u: width * (np.sqrt(1.0 + 0.5 * slope(u) ** 2) - 1.0), -9.0, 9.0, points=[-1, 0, 1], limit=500)[0]
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "taylor"])
+@pytest.mark.parametrize("way", WAYS)
+def test_bumps_are_met_however_a_function_of_the_user_leads(way, integrator):
+    scene = _carriage()
+    WAYS[way](scene)
+    motion = gauss.simulate(scene, 20.0, integrator=integrator, rtol=1e-10, atol=1e-10, progress=False)
+    assert motion.q[-1, 0] == pytest.approx(20.0 - _delay(), abs=DELAYS)
+
+
+def test_bumps_are_met_in_sweeps():
+    """The delay does not depend on the mass."""
+
+    def scene(mass):
+        made = _carriage(mass=mass)
+        made.cam("guide", "x", "y", _bell)
+        return made
+
+    for together in (False, True):
+        found = gauss.sweep(scene, {"mass": [0.5, 2.0]}, 20.0, together=together, samples=3, rtol=1e-10, progress=False)
+        assert found.q[:, -1, 0].to_numpy() == pytest.approx(20.0 - _delay(), abs=DELAYS)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "taylor"])
+def test_transmissions_with_a_ratio_at_one_place_turn_there(integrator):
+    """ẏ = f(x) ẋ: y is the integral of the ratio."""
+    scene = _carriage()
+    scene.transmission("guide", "y", "x", lambda at: _bell(at.coordinate("x")))
+    motion = gauss.simulate(scene, 20.0, integrator=integrator, rtol=1e-10, atol=1e-12, progress=False)
+    assert motion.q[-1, 1] == pytest.approx(0.05 * 0.002 * ROOT_PI, rel=1e-6)
+
+
+def test_bumps_are_met_while_a_gap_of_the_user_is_closed():
+    """Energy ½ (1 + f′²/2) ẋ² + P f is kept; the force P holds the slide on the bump."""
+    press, width, height = 1e5, 5e-3, 1e-6
+    scene = _carriage(press=press)
+    scene.one_sided("guide", lambda at: at.coordinate("y") - _bell(at.coordinate("x"), width, height))
+    motion = gauss.simulate(scene, 20.0, rtol=1e-10, atol=1e-12, progress=False)
+
+    def late(u):
+        f, slope = height * np.exp(-u * u), -2.0 * height / width * u * np.exp(-u * u)
+        return width * (np.sqrt((1.0 + 0.5 * slope**2) / (1.0 - 2.0 * press * f)) - 1.0)
+
+    delay = quad(late, -9.0, 9.0, points=[-1, 0, 1], limit=500)[0]
+    assert delay > 1e4 * DELAYS
+    assert motion.q[-1, 0] == pytest.approx(20.0 - delay, abs=DELAYS)
+
+
+@pytest.mark.parametrize("integrator", ["cvode_bdf", "scipy_lsoda"])
+def test_opaque_laws_of_places_that_other_libraries_pass_over_are_warned_of(integrator):
+    system = gauss.compile_scene(beside(lambda t, m: math.exp(-(((float(m.coordinate("x")) - 7.31) / 0.005) ** 2))))
+    for _ in range(2):
+        found = verdict(lambda: moved(system, 20.0, integrator=integrator, rtol=1e-8)[3:], [0.005 * ROOT_PI])
+        assert found in ("warned", "right")

@@ -7,9 +7,11 @@ import numpy as np
 from gauss.codegen import Expression, Function
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws, symbols
-from gauss.scene import Constraint
+from gauss.scene import Cam, Constraint, OnCurve, OneSidedConstraint, Relation, Transmission
 from gauss.system import System
 from gauss.system.relations import Rows, place_relations
+
+OWN = (Cam, Constraint, OnCurve, OneSidedConstraint, Transmission)  # kinds of relations made of functions of the user
 
 
 class WatchedFunctions(NamedTuple):
@@ -25,8 +27,8 @@ class WatchedFunctions(NamedTuple):
 
 
 def watched_functions(system: System, laws: Laws) -> Laws | WatchedFunctions:
-    """Traced laws of loads, and residuals of constraints of the user."""
-    own = [relation for relation in system.scene.relations.values() if type(relation) is Constraint]
+    """Traced laws of loads, and residuals of constraints that functions of the user make."""
+    own = [relation for relation in system.scene.relations.values() if _is_own(relation)]
     if not own:
         return laws
     motion, relations = symbols(system), place_relations(system, own)
@@ -42,6 +44,14 @@ def residual_functions(system: System) -> WatchedFunctions:
     pairs = zip(system.relations.placed, system.relations.rows(motion), strict=True)
     traced = [(placed.name, Function("constraint", [], _residuals(rows, placed.velocities))) for placed, rows in pairs]
     return WatchedFunctions(motion, traced)
+
+
+def _is_own(relation: Relation) -> bool:
+    """Whether a function of the user makes a relation, or that of which it is a mode or a closed gap."""
+    whole = relation
+    while hasattr(whole, "whole"):
+        whole = whole.whole
+    return isinstance(whole, OWN)
 
 
 def _residuals(rows: Rows, velocities: int) -> list[Expression]:

@@ -71,7 +71,7 @@ def taylor_step(program: Program, shares=None) -> TaylorStep:
         WATCHED,
         write(finish, size, 1, n, name="finish"),
         write(renew, size, name="renew"),
-        write(defect, size, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs else None,
+        write(defect, size, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs or program.watch else None,
         system.n_q,
         project,
         program.point_check,
