@@ -30,7 +30,9 @@ LARGE_TREE_BODIES = (
 )
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
 MOST_COUPLING_WORK = 10_000  # operations for couplings above which kernels are as fast, and compiled in a fifth of the time
-MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops are slower
+# Pairs of loops that share a joint of the tree, per body, above which kernels of loops are slower than straight-line code,
+# and, where this is too long, up to which they are made within seconds
+MOST_SHARED_JOINTS, MOST_SHARED_BY_KERNELS = 100, 500
 WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
@@ -81,18 +83,24 @@ def has_large_loops(system) -> bool:
         return False
     if system.n_v <= WIDE and _loop_work(subsystems) <= MOST_WORK and _coupling_work(subsystems) <= MOST_COUPLING_WORK:
         return False
-    return sum(subsystem.shared_joints for subsystem in subsystems) <= MOST_SHARED_JOINTS * _n_bodies(subsystems)
+    if _share_few_joints(subsystems):
+        return True
+    return _share_few_joints(subsystems, MOST_SHARED_BY_KERNELS) and _loop_work(subsystems) > MOST_WORK
 
 
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled as one smooth function; none if they are."""
-    reasons = [f"{name!r} is unilateral" for name in system.scene.contacts]
-    reasons += _limits_and_losses(system.scene)
-    if not system.subsystems:
-        reasons.append("nothing in it can move")
-    if not has_large_loops(system) and (work := _loop_work(system.subsystems)) > MOST_WORK:
+    reasons, is_short = kernel_obstacles(system), has_large_loops(system) and _share_few_joints(system.subsystems)
+    if not is_short and (work := _loop_work(system.subsystems)) > MOST_WORK:
         reasons.append(f"its loops share so many links that straight-line code would have about {work:.0e} operations")
     return reasons
+
+
+def kernel_obstacles(system) -> list[str]:
+    """Reasons why they are not compiled as kernels of links and loops, either."""
+    reasons = [f"{name!r} is unilateral" for name in system.scene.contacts]
+    reasons += _limits_and_losses(system.scene)
+    return reasons if system.subsystems else [*reasons, "nothing in it can move"]
 
 
 def _limits_and_losses(scene) -> list[str]:
@@ -108,6 +116,11 @@ def _coupling_work(subsystems) -> int:
     """Work of the couplings alone."""
     coupled = [subsystem for subsystem in subsystems if subsystem.couplings]
     return _loop_work(coupled) - _loop_work([replace(subsystem, couplings=()) for subsystem in coupled])
+
+
+def _share_few_joints(subsystems, most: int = MOST_SHARED_JOINTS) -> bool:
+    """Whether no more pairs of loops share a joint of the tree than so many per body."""
+    return sum(subsystem.shared_joints for subsystem in subsystems) <= most * _n_bodies(subsystems)
 
 
 def _n_bodies(subsystems) -> int:
@@ -128,6 +141,11 @@ def named(backend) -> str:
 def compilable(ask: Question) -> list[str]:
     """The forward dynamics are one smooth function."""
     return obstacles(ask.system) if ask.system.dynamics is not None else ["it was built without machine code"]
+
+
+def compilable_by_kernels(ask: Question) -> list[str]:
+    """The forward dynamics are smooth, as kernels of links and loops."""
+    return kernel_obstacles(ask.system) if ask.system.dynamics is not None else ["it was built without machine code"]
 
 
 def traced_laws(ask: Question) -> list[str]:

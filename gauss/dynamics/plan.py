@@ -38,6 +38,7 @@ from gauss.dynamics.conditions import (
     callbacks,
     closed_form_contacts,
     compilable,
+    compilable_by_kernels,
     contacts_alone,
     definite_mass_matrix,
     explicit,
@@ -153,13 +154,14 @@ def _without_feedback(ask: Question) -> bool:
 
 
 _CODE = own_backend, compilable
+_KERNELS = own_backend, compilable_by_kernels
 _WHOLE = *_CODE, written_out, traced_laws, narrow
 _DENSE_STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem
 _STEP, _CALLING_STEP = (*_DENSE_STEP, smooth(traced_laws)), (*_DENSE_STEP, callbacks, few_contact_operations)
 _PAIR_KERNELS = own_backend, takes_pair_kernels
 _ALONE = _both(_smooth, _by_accelerations)
 _LOOP = *_WHOLE, no_inputs_of_series
-_KERNEL_LOOP = *_CODE, callbacks, explicit, no_held_inputs
+_KERNEL_LOOP = *_KERNELS, callbacks, explicit, no_held_inputs
 _CALLING_LOOP = *_CODE, callbacks, explicit, written_out
 
 MOTIONS = RuleTable(
@@ -181,7 +183,7 @@ MOTIONS = RuleTable(
         Rule("compiled loop", "tree recursion", "certified", _both(_ALONE, large_tree), _KERNEL_LOOP),
         Rule("compiled loop", "callbacks", "certified", _both(_ALONE, has_opaque_laws), _CALLING_LOOP),
         Rule("samples", "compiled", "certified", _both(_held, _by_accelerations)),
-        Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
+        Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNELS),
         Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
         Rule("Python loop", "compiled", "certified", _ALONE, (*_CODE, written_out)),
         Rule("library", "certified", when=_both(_library, _by_accelerations)),
@@ -215,7 +217,7 @@ def _of_states(*laws: Condition) -> tuple[Rule, ...]:
     """Rules of single states; ``laws`` are conditions on laws beside straight-line code."""
     return (
         _unilateral(*laws),
-        Rule("state", "call graph", "certified", large_loops, (compilable,)),
+        Rule("state", "call graph", "certified", large_loops, (compilable_by_kernels,)),
         Rule("state", "tree recursion", "certified", large_tree, (compilable,)),
         Rule("state", "embedded loops", "compiled", has_loops, (written_out, compilable, *laws, regular_fronts)),
         Rule("state", "compiled", "certified", conditions=(written_out, compilable, *laws)),

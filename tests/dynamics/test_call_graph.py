@@ -11,7 +11,7 @@ from gauss.analysis.crosscheck.pinocchio_dynamics import instant
 from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.codegen import Kernel
 from gauss.dynamics.assemble import position_residual
-from gauss.dynamics.conditions import has_large_loops
+from gauss.dynamics.conditions import has_large_loops, obstacles
 from gauss.dynamics.engines.call_graph import CallGraphKernels, call_graph_code, refined_call_graph
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
@@ -257,6 +257,17 @@ def test_explain_says_which_way_is_taken():
     plans = [motion_plan(mechanisms.ladder(n)) for n in (50, 5)]
     assert [plan.dynamics for plan in plans] == ["call graph", "embedded loops"]
     assert has_large_loops(gauss.compile_scene(gauss.load("hung_chain", n=200)))
+
+
+@pytest.mark.slow
+def test_platforms_in_a_stack_are_called_loop_by_loop():
+    """Each loop is coupled with all others, through the platforms below: too much for straight-line code."""
+    system = gauss.compile_scene(mechanisms.platforms(8))
+    assert motion_plan(system).dynamics == "call graph" and obstacles(system)
+    state = consistent_state(system)
+    found, solution = system.accelerations(state), gauss.solve(gauss.assemble(system, state))
+    assert str(solution.status) == "solved"
+    assert np.abs(found - solution.qdd).max() <= AGREED * np.abs(solution.qdd).max()
 
 
 @pytest.mark.slow
