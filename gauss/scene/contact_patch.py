@@ -176,19 +176,19 @@ class SolidPair:
         if cosines[k] < ACROSS:
             return [], -inf
         own, far, distant = (other, one, self.first) if k else (one, other, self.second)
-        face, out = faces[k], own.R.dot(faces[k].normal)
+        face, upward = faces[k], faces[k].normal
+        assert upward is not None  # its cosine is not that of an edge
+        out = own.R.dot(upward)
         incident = distant.face(-out.dot(far.R))
         seen = incident.points.dot(far.R.T.dot(own.R)) + (far.x - own.x).dot(own.R)
-        heights = (seen - face.points[0]).dot(face.normal).tolist()
-        points = _clipped(list(zip(*seen.T.tolist(), heights, strict=True)), face)
-        low = [(x, y, z, height - incident.radius) for x, y, z, height in points if height - incident.radius <= reach]
-        across, up = min(heights) - incident.radius, out if k else -out
+        heights = (seen - face.points[0]).dot(upward).tolist()
+        across, low = min(heights) - incident.radius, _low(seen, heights, face, reach + incident.radius)
         if not low:
             return [], across
-        table = np.array(low)
-        depths = table[:, 3:] + incident.radius if k else incident.radius
-        places = own.x + (table[:, :3] - depths * face.normal).dot(own.R.T)
-        return [ContactPoint(point[3], place, up) for point, place in zip(low, places, strict=True)], across
+        table, up = np.array(low), out if k else -out
+        depths = table[:, 3:] if k else incident.radius
+        places = own.x + (table[:, :3] - depths * upward).dot(own.R.T)
+        return [ContactPoint(p[3] - incident.radius, place, up) for p, place in zip(low, places, strict=True)], across
 
 
 def _below(vertices: np.ndarray, one: SolidPose, plane: SolidPose, reach: float) -> list[ContactPoint]:
@@ -203,13 +203,13 @@ def _below(vertices: np.ndarray, one: SolidPose, plane: SolidPose, reach: float)
     return [ContactPoint(height, place, normal) for height, place in zip(heights.tolist(), places, strict=True)]
 
 
-def _clipped(points: list[Corner], face: Face) -> list[Corner]:
-    """Part of a polygon, edge or point over a face, in its axes, with heights over it."""
+def _low(seen: np.ndarray, heights: list[float], face: Face, highest: float) -> list[Corner]:
+    """Corners that are no higher than ``highest`` of the part of a polygon, edge or point that is over a face."""
     assert face.sides is not None
-    closed = len(points) > 2
+    points, closed = list(zip(*seen.T.tolist(), heights, strict=True)), len(heights) > 2
     for side in face.sides.tolist():
         points = _cut(points, side, closed)
-    return points
+    return [point for point in points if point[3] <= highest]
 
 
 def _cut(points: list[Corner], side: list[float], closed: bool) -> list[Corner]:

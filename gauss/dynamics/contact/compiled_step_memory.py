@@ -11,7 +11,7 @@ from gauss.dynamics.contact.contact_changes import ModeChange, ModeRecord
 from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.system import State, System
 
-TIME, LARGEST, DOUBTFUL = STEP_SETTINGS.index("t"), LOOP_SETTINGS.index("largest"), RESULTS.index("doubtful")
+TIME_PLACE, ERROR_PLACE, DOUBT_PLACE = STEP_SETTINGS.index("t"), LOOP_SETTINGS.index("largest"), RESULTS.index("doubtful")
 RECORDED = ("modes", "next_modes", "closed", "fresh", "counts")
 
 
@@ -103,11 +103,11 @@ class CompiledStepMemory:
             self.connect()
         at, record = self.at, self.record
         at["q"][:], at["v"][:], at["work"][:] = state.q, state.v, work
-        at["settings"][TIME], at["loop"][LARGEST] = state.t, 0.0
+        at["settings"][TIME_PLACE], at["loop"][ERROR_PLACE] = state.t, 0.0
         before = record.kept()
         self.code.advance(*self.given, ends.size, address(ends), address(rows))
         _, _, changed, count = record.counts.tolist()
         changes = record.recorded(at["changes"][: CHANGE * changed], before) if changed else []
         ended = int(self.integers["status"][0]) == FINISHED
-        doubtful = ended and bool(at["results"][DOUBTFUL])
-        return LoopOfSteps(count, float(at["loop"][LARGEST]), changes, doubtful)
+        doubtful = ended and bool(at["results"][DOUBT_PLACE])
+        return LoopOfSteps(count, float(at["loop"][ERROR_PLACE]), changes, doubtful)
