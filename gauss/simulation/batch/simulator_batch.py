@@ -21,6 +21,7 @@ from gauss.dynamics.scene_compilation import compile_scene
 from gauss.errors import SimulationError, StateError, did_you_mean, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
+from gauss.simulation.arguments import random_changes
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, batch_program, contact_state_size, fixed_step_code, one_by_one
@@ -28,7 +29,7 @@ from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import numbers_in_words, real_numbers
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.passed_switching import StepsAhead
-from gauss.simulation.simulator import Simulator, SimulatorState, random_changes
+from gauss.simulation.simulator import Simulator, SimulatorState
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import warn_of_passages
 from gauss.system import State, System, retract
