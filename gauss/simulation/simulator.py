@@ -7,7 +7,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -308,7 +308,7 @@ class Simulator:
             if rest.size:
                 self._loop.call(*self._given, rest.size)
 
-    def _refuse(self, steps: int, why: str):
+    def _refuse(self, steps: int, why: str) -> NoReturn:
         """Return to the state before the call, after so many steps, and raise a SimulationError."""
         t, self._point[:], self._steps = self.t, self._before, steps
         raise SimulationError(f"t = {t:.6g} s: {why}; shorten the step.")
