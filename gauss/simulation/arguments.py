@@ -1,5 +1,7 @@
 """Arguments of a motion, checked: from what a user gives to the initial value problem that drivers solve."""
 
+from numbers import Real
+
 import numpy as np
 
 from gauss import integrators
@@ -203,3 +205,19 @@ def sample_times(times, start: float, duration: float):
     if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # False for NaN, too
         raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
     return np.minimum(samples, end)
+
+
+def random_changes(seed, spread: float, shape: tuple[int, ...]) -> np.ndarray:
+    """Changes of initial states, uniform up to ``spread``.
+
+    Raises
+    ------
+    SimulationError
+        If the seed or the spread is none.
+    """
+    if not isinstance(spread, Real) or not 0.0 <= spread < np.inf:
+        raise SimulationError(f"spread: expected a number ≥ 0, got {spread!r}.")
+    try:
+        return np.random.default_rng(seed).uniform(-spread, spread, shape)
+    except (TypeError, ValueError) as error:
+        raise SimulationError(f"seed: expected a whole number ≥ 0, got {seed!r}.") from error

@@ -155,6 +155,14 @@ def real_numbers(value) -> np.ndarray | None:
     return found.astype(float) if found.dtype.kind in "biuf" else None
 
 
+def numbers_in_words(numbers: np.ndarray | None) -> str:
+    """What stands in place of finite numbers of a shape, for a message; None: no numbers."""
+    if numbers is None:
+        return "others"
+    bad = np.argwhere(~np.isfinite(numbers))
+    return f"shape {numbers.shape}" + (f" with {numbers[tuple(bad[0])]} in row {bad[0, 0]}" if bad.size else "")
+
+
 def _called(law: Callable) -> Callable:
     """Law (t, q, v).
 

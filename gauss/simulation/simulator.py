@@ -7,8 +7,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from numbers import Real
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
-from gauss.simulation.arguments import checked_problem
+from gauss.simulation.arguments import checked_problem, random_changes
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_runs import fixed_run
 from gauss.simulation.held_inputs import HeldInputs, checked_inputs
@@ -148,7 +147,9 @@ class Simulator:
             self._loop: Any = run.prepared_steps()  # machine code, or steps that are called as it is
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
-        self._u = self._point[run.layout.size - n_u :]
+        self._u, self._before = self._point[run.layout.size - n_u :], self._point.copy()
+        self._reached = self._point[1 : 1 + run.layout.n_q + run.layout.n_v]
+        self._still = np.zeros(self._reached.size)
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps, self._options = 0.0, 0, (self.step_size, integrator, stabilisation)
@@ -234,10 +235,11 @@ class Simulator:
         ------
         SimulationError
             If a value is not finite, a prescribed motion jumps, or a step fails; the message says why. After a failed step
-            the state is that before it.
+            the state is one before it.
         """
         if u is not None:
             self._set(u)
+        self._before[:] = self._point
         if n == 1:
             self._steps += 1
             self._times[0] = self._begun + self._steps * self.step_size
@@ -252,6 +254,8 @@ class Simulator:
             raise
         if self._run.control.status:
             self._recover(n)
+        if not isfinite(self._reached.dot(self._still)):  # NaN if an entry is not finite
+            self._refuse(self._steps - n, "the motion is not finite")
         if self._switches and self._run.control.unseen:
             self._warn_of_switching()
 
@@ -297,12 +301,17 @@ class Simulator:
             reached = int(np.searchsorted(ends, self._point[0], side="right"))
             self._steps = before + reached
             if status != LoopStatus.UNSOLVED or not isinstance(self._run, CompiledMoreauRun | PairKernelSteps):
-                raise SimulationError(f"t = {self.t:.6g} s: {FAILURES.get(status, status.name)}; shorten the step.")
+                self._refuse(before, FAILURES.get(status, status.name))
             self._point[:] = self._run.repeated(self._point, float(ends[reached]))
             rest = ends[reached + 1 :]
             self._steps, self._times[: rest.size] = before + n, rest
             if rest.size:
                 self._loop.call(*self._given, rest.size)
+
+    def _refuse(self, steps: int, why: str) -> NoReturn:
+        """Return to the state before the call, after so many steps, and raise a SimulationError."""
+        t, self._point[:], self._steps = self.t, self._before, steps
+        raise SimulationError(f"t = {t:.6g} s: {why}; shorten the step.")
 
     @property
     def t(self) -> float:
@@ -372,22 +381,6 @@ def _again(given: tuple, snapshot: SimulatorState) -> Simulator:
 def _unchecked(n: int) -> np.ndarray:
     """Grid (n, 2) of steps that are checked every few steps, not where a call ends."""
     return np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
-
-
-def random_changes(seed, spread: float, shape: tuple[int, ...]) -> np.ndarray:
-    """Changes of initial states, uniform up to ``spread``.
-
-    Raises
-    ------
-    SimulationError
-        If the seed or the spread is none.
-    """
-    if not isinstance(spread, Real) or not 0.0 <= spread < np.inf:
-        raise SimulationError(f"spread: expected a number ≥ 0, got {spread!r}.")
-    try:
-        return np.random.default_rng(seed).uniform(-spread, spread, shape)
-    except (TypeError, ValueError) as error:
-        raise SimulationError(f"seed: expected a whole number ≥ 0, got {seed!r}.") from error
 
 
 def _floats(u) -> np.ndarray | None:

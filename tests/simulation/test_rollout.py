@@ -121,6 +121,7 @@ def test_what_cannot_be_rolled_out_says_why():
     "q0, v0, options, words",
     [
         ([0.0], [[0.0]], {}, r"q0: expected finite numbers of shape \(batch, 1\)"),
+        ([[0.0], [0.0]], [[0.0], [np.inf]], {}, r"v0: expected finite numbers .*, got shape \(2, 1\) with inf in row 1"),
         ([[0.0]], [[0.0], [1.0]], {}, "as many starts"),
         ([[np.nan]], [[0.0]], {}, "q0: expected finite"),
         ([[0.0]], [[0.0]], {"steps": 0}, "steps: expected a positive whole number, got 0"),

@@ -66,6 +66,22 @@ def test_snapshots_of_other_steps_or_methods_are_refused():
         assert other.snapshot() == before
 
 
+@pytest.mark.parametrize("n", [1, 40])
+@pytest.mark.parametrize("size", [1e6, 1e12])
+def test_motions_that_diverge_end_with_an_error_in_the_state_before_the_call(n, size):
+    scene = gauss.load("double_pendulum")
+    scene.input("u", "A"), scene.input("w", "B")
+    sim = gauss.Simulator(scene, 10 * STEP)
+    with np.errstate(all="ignore"), pytest.raises(SimulationError, match="not finite|not confirm"):
+        for k in range(40):
+            before = sim.state
+            sim.step([(-1) ** k * size, size], n)
+    assert sim.t == before.t and np.array_equal(sim.state.q, before.q) and np.isfinite(sim.state.v).all()
+    sim.reset()
+    sim.step([0.0, 0.0], n)
+    assert np.isfinite(sim.state.q).all() and sim.t == pytest.approx(n * 10 * STEP)
+
+
 def test_many_steps_in_one_call_are_single_steps():
     one, many = (simulator("cart_pole", "rail", None) for _ in range(2))
     one.step([0.5])

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import StateError
-from gauss.simulation.held_inputs import real_numbers
+from gauss.simulation.held_inputs import numbers_in_words, real_numbers
 from gauss.system import UNIT_QUATERNION, State, System
 
 CONSISTENT = 1e-9  # largest residual, relative to the sizes of the constraints and to the rates, of a consistent state
@@ -23,8 +23,7 @@ def columns(system: System, q0, v0) -> np.ndarray:
     for name, given, size in (("q0", q0, system.n_q), ("v0", v0, system.n_v)):
         array = real_numbers(given)
         if array is None or array.ndim != 2 or array.shape[1] != size or not len(array) or not np.isfinite(array).all():
-            got = "others" if array is None else f"shape {array.shape}"
-            raise StateError(f"{name}: expected finite numbers of shape (batch, {size}), got {got}.")
+            raise StateError(f"{name}: expected finite numbers of shape (batch, {size}), got {numbers_in_words(array)}.")
         parts.append(array.T)
     if parts[0].shape[1] != parts[1].shape[1]:
         raise StateError(f"q0 and v0: expected as many starts of each, got {parts[0].shape[1]} and {parts[1].shape[1]}.")

@@ -21,14 +21,15 @@ from gauss.dynamics.scene_compilation import compile_scene
 from gauss.errors import SimulationError, StateError, did_you_mean, require
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
+from gauss.simulation.arguments import random_changes
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, batch_program, contact_state_size, fixed_step_code, one_by_one
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
-from gauss.simulation.held_inputs import real_numbers
+from gauss.simulation.held_inputs import numbers_in_words, real_numbers
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.passed_switching import StepsAhead
-from gauss.simulation.simulator import Simulator, SimulatorState, random_changes
+from gauss.simulation.simulator import Simulator, SimulatorState
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import warn_of_passages
 from gauss.system import State, System, retract
@@ -264,8 +265,8 @@ class SimulatorBatch:
     def _set(self, u):
         given, shape = real_numbers(u), (self._size, len(self.inputs))
         if given is None or given.shape != shape or not np.isfinite(given).all():
-            got = "others" if given is None else f"shape {given.shape}"
-            raise SimulationError(f"u: expected finite numbers of shape ({shape[0]} motions, {shape[1]} inputs), got {got}.")
+            expected = f"({shape[0]} motions, {shape[1]} inputs)"
+            raise SimulationError(f"u: expected finite numbers of shape {expected}, got {numbers_in_words(given)}.")
         self._u[:, 0] = given
 
     def _repeated(self, k: int, before: np.ndarray, n: int) -> bool:
