@@ -50,13 +50,9 @@ def show(
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
     """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
-    if film is not None and html is None and (beside is not None or dark):
-        raise FileError(
-            f"{film}: a film shows one motion on the light ground; --beside and --dark are for the viewer and --html."
-        )
+    _refuse_for_films(film if html is None else None, beside, dark)
     if Path(scene).suffix.lower() in import_module("gauss.io.load").RESULTS:
-        thing = gauss.load_motion(scene)
-        visuals = _kept(scene, thing.system.scene)
+        thing, visuals = _saved(scene)
     else:
         found = load(scene, root, read)
         found = found if isinstance(found, gauss.Scene) else found.system.scene
@@ -64,20 +60,32 @@ def show(
         found = started(found, start, speed)
         thing = gauss.simulate(found, duration, integrator=integrator, step=step) if duration > 0 else found
     viewer = import_module("gauss.view.viewer")  # its library takes long to import
-    joints = _joints(thing, reactions)
-    second = None if beside is None else gauss.load_motion(beside)
-    others = [] if second is None else _kept(str(beside), second.system.scene)
-    look: dict[str, Any] = {"visuals": visuals, "joints": joints, "traces": trace}
+    look: dict[str, Any] = {"visuals": visuals, "joints": _joints(thing, reactions), "traces": trace}
+    second, others = (None, []) if beside is None else _saved(str(beside))
+    both = look | {"beside": second, "beside_visuals": others, "dark": dark}
     if html is not None:
-        written = viewer.export_html(thing, html, beside=second, beside_visuals=others, dark=dark, **look)
-        typer.echo(f"viewer written to {written}")
+        typer.echo(f"viewer written to {viewer.export_html(thing, html, **both)}")
     if film is not None:
         typer.echo(f"film written to {viewer.export_film(thing, film, **look)}")
     if html is not None or film is not None:
         return
-    running = viewer.show(thing, beside=second, beside_visuals=others, dark=dark, port=port, browser=browser, **look)
+    running = viewer.show(thing, port=port, browser=browser, **both)
     typer.echo(f"{running.url} (Ctrl+C ends it)")
     running.wait()
+
+
+def _refuse_for_films(film: Path | None, beside: Path | None, dark: bool):
+    """Refuse options that mean nothing for a film alone."""
+    if film is not None and (beside is not None or dark):
+        raise FileError(
+            f"{film}: a film shows one motion on the light ground; --beside and --dark are for the viewer and --html."
+        )
+
+
+def _saved(path: str) -> tuple:
+    """Motion of a file, and its meshes."""
+    motion = gauss.load_motion(path)
+    return motion, _kept(path, motion.system.scene)
 
 
 def _kept(path: str, scene: "gauss.Scene") -> list:

@@ -15,9 +15,9 @@ MOST = 6  # coordinates of a figure when none are named
 def plot_comparison(motions, coordinates=None, path=None, labels=None) -> Figure:
     """Figure of several motions: each coordinate against time, and the sizes of its differences from the first motion.
 
-    Motions may have samples at different times: differences are taken at those of the motion with fewer, where both last; the
-    other is interpolated by cubics of its coordinates and rates, with an error of the order h⁴ of its steps. Motions at the
-    same times (``simulate(…, times=…)``) are compared exactly.
+    Motions may have samples at different times: differences are taken at those of the motion with fewer, where both last;
+    the other is interpolated by cubics of its coordinates and rates, with an error of the order h⁴ of its steps. Motions at
+    the same times (``simulate(…, times=…)``) are compared exactly.
 
     Parameters
     ----------

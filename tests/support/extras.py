@@ -9,6 +9,7 @@ from gauss.versions import DISTRIBUTION
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
 LINE = re.compile(r"([\w.-]+)(?:\[([\w,-]+)\])?")  # distribution and its extras in a line of requirements
+Named = tuple[str, tuple[str, ...]]  # a distribution and some of its extras
 OF_EXTRA = re.compile(r"""extra == ['"]([\w-]+)['"]""")
 
 
@@ -23,7 +24,8 @@ def others(extra: str) -> set[str]:
 
 def _closure(extra: str) -> set[str]:
     """Distributions that come with an extra."""
-    found, todo = set(), [(DISTRIBUTION, (extra,))]
+    found: set[Named] = set()
+    todo: list[Named] = [(DISTRIBUTION, (extra,))]
     while todo:
         entry = todo.pop()
         if entry not in found:
@@ -32,8 +34,8 @@ def _closure(extra: str) -> set[str]:
     return {name for name, _ in found}
 
 
-def _named(line: str) -> tuple[str, tuple[str, ...]]:
-    name, extras = LINE.match(line).groups()
+def _named(line: str) -> Named:
+    name, extras = LINE.findall(line)[0]
     return re.sub(r"[-_.]+", "-", name).lower(), tuple(extras.split(",")) if extras else ()
 
 
