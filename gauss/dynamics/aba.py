@@ -265,9 +265,9 @@ class ArticulatedBody:
             of_biases = of_biases + self.eliminations[body].U.T @ biases.get(body, ZERO)
         passed = {}
         for edge, _ in cluster:
-            body, (U, D_inverse, inertia) = edge.outer, self.eliminations[edge.outer]
-            own = forces.get(body, ZERO) + apply(inertia, biases.get(body, ZERO))
-            passed[body] = own + U @ (D_inverse @ (u - of_biases))
+            body, elimination = edge.outer, self.eliminations[edge.outer]
+            own = forces.get(body, ZERO) + apply(elimination.projected, biases.get(body, ZERO))
+            passed[body] = own + elimination.U @ (elimination.D_inverse @ (u - of_biases))
         return u, passed
 
     def _to_inner(self, edge: Edge, force):

@@ -81,7 +81,8 @@ def _states(system: System, equal: EqualChains) -> Iterator[tuple[int, ...]]:
 def _parametrised(system: System, laws: Laws, kinds: list[EqualChains]) -> tuple[ParametrisedSystem, list, dict[str, float]]:
     """System with parameters for the numbers in which chains differ, names of equal ones by kind, and their values."""
     found, _ = numbers(system)
-    graph, entries, twins = Graph(shared=True), found.astype(object), [[] for _ in kinds]
+    graph, entries = Graph(shared=True), found.astype(object)
+    twins: list[list[list[str]]] = [[] for _ in kinds]
     for equal, own in zip(kinds, twins, strict=True):
         for places in _equal_numbers(system, equal):
             if len(set(found[places])) > 1:
