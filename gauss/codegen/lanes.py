@@ -39,6 +39,7 @@ class Lanes:
         self.kind = kind(width)
         self._constants: dict[float, TextValue] = {}
         self._intrinsics: dict[str, ir.Function] = {}
+        self._opposites: dict[int, tuple[ir.Value, ir.Value]] = {}  # −x and x, by the identity of −x
         self.sincos_values: dict[int, tuple[ir.Value, ir.Value]] = {}
 
     def constant(self, value: float) -> ir.Constant:
@@ -113,7 +114,11 @@ class Lanes:
         if op in FUSED:
             return self.fused(op, *x)
         if op == "neg":
-            return b.fneg(x[0])
+            found = b.fneg(x[0])
+            self._opposites[id(found)] = found, x[0]
+            return found
+        if op == "max" and self._is_opposite(*x):
+            return b.call(self._intrinsic("llvm.fabs", 1), x[:1])
         if op in COMPARISONS:
             return b.fcmp_ordered(COMPARISONS[op], *x)
         if op in ("exp", "log", "atan2") and isinstance(self.module, DeviceModule):
@@ -121,6 +126,10 @@ class Lanes:
         if op == "atan2":
             return self._each_lane("atan2", x)
         return b.call(self._intrinsic(INTRINSICS[op], len(x)), x)
+
+    def _is_opposite(self, x, y) -> bool:
+        """Whether one number is −1 times the other: the larger one is then |x|, one instruction instead of four."""
+        return any(self._opposites.get(id(one), (one, None))[1] is other for one, other in ((x, y), (y, x)))
 
     def fused(self, kind: str, x, y, z):
         """± x y ± z, rounded once where the processor has the instruction."""

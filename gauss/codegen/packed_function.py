@@ -19,7 +19,7 @@ from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import PAGE, POINTER, begin_function, counted_loop, input_reader, output_writer
 from gauss.codegen.lanes import DOUBLE, INTEGER, LANE, Lanes, kind
 from gauss.codegen.native_function import NativeFunction
-from gauss.codegen.packed_schedule import PackedSchedule, frame_places, runs
+from gauss.codegen.packed_schedule import PackedSchedule, frame_places, runs, vector_length
 from gauss.codegen.packs import Pack, Packs
 from gauss.codegen.schedule import schedule
 
@@ -37,18 +37,18 @@ class PackedFunction(NativeFunction):
     ----------
     function : Function
         The function.
-    seeds : sequence of tuple of int
-        Places of equal inputs, one of each chain.
+    seeds : sequence of sequences of tuple of int
+        Places of equal inputs, one of each chain, by the kind of the chains.
     numbers : dict
         Values of its last inputs, by their places: they are constants of the code.
     """
 
-    def __init__(self, function: Function, seeds: Sequence[tuple[int, ...]], numbers: dict[int, float]):
+    def __init__(self, function: Function, seeds: Sequence[Sequence[tuple[int, ...]]], numbers: dict[int, float]):
         self.name, self.function, self.numbers = function.name, function, numbers
         scheduled = schedule(function)
         self.operation_count = sum(node.op not in ("constant", "symbol") for node in scheduled.nodes)
         self.packed = PackedSchedule(scheduled, Packs(scheduled, seeds), numbers)
-        self.width = 1 << (len(seeds[0]) - 1).bit_length()
+        self.width = max(vector_length(of_kind[0]) for of_kind in seeds)
 
     @property
     def arity(self) -> tuple[int, int]:
@@ -58,7 +58,7 @@ class PackedFunction(NativeFunction):
     @cached_property
     def saving(self) -> float:
         """Share of the instructions that the packs save, about."""
-        return 1.0 - self.packed.cost(-(-self.width // processor.width())) / self.operation_count
+        return 1.0 - self.packed.cost(processor.width()) / self.operation_count
 
     def operations(self) -> dict[str, int]:
         """Number of operations of each kind, those on constants included."""
@@ -107,12 +107,13 @@ class _PackedPieceWriter:
 
     def __init__(self, function: PackedFunction, places: dict[int, int], lanes: Lanes):
         self.packed, self.places, self.b = function.packed, places, lanes.b
-        self.single, self.together = lanes, Lanes(lanes.module, function.width, lanes.b)
+        self.single, widths = lanes, {vector_length(unit) for unit in function.packed.units}
+        self.together = {width: lanes if width == 1 else Lanes(lanes.module, width, lanes.b) for width in widths}
         source, target, self.frame = lanes.b.function.args
         self.read, self.store = input_reader(lanes, source, INTEGER(1)), output_writer(lanes, target, INTEGER(1))
         self.values: dict[int, ir.Value] = {}  # of nodes
         self.packs: dict[int, ir.Value] = {}  # by the first member
-        self.shared: dict[int, ir.Value] = {}  # broadcast, of nodes
+        self.shared: dict[tuple[int, int], ir.Value] = {}  # broadcast, of nodes by the length of the vector
         self.outputs: dict[int, list[int]] = defaultdict(list)
         for k, x in enumerate(self.packed.whole.outputs):
             self.outputs[x.index if isinstance(x, Expression) else -1].append(k)
@@ -139,15 +140,14 @@ class _PackedPieceWriter:
         turns = node.op in ("sin", "cos")  # whose code is found by the index of the angle
         operands = [_Operand(column[0].index if turns else k) for k, column in enumerate(columns)]
         values = {x.index: self.vector(column) for x, column in zip(operands, columns, strict=True)}
-        whole = Expression(node.graph, node.op, tuple(operands), node.value, node.index)
-        self.packs[node.index] = self.together.number(self.together.operation(whole, values))
+        whole, lanes = Expression(node.graph, node.op, tuple(operands), node.value, node.index), self._lanes(unit)
+        self.packs[node.index] = lanes.number(lanes.operation(whole, values))
 
     def _keep(self, k: int, unit: Pack):
         """Store a unit in the frame, and outputs."""
         if k in self.places:
-            is_pack = len(unit) > 1
-            value = self.packs[unit[0].index] if is_pack else self.values[unit[0].index]
-            (self.together if is_pack else self.single).store(value, self.frame, INTEGER(self.places[k]))
+            value = (self.packs if len(unit) > 1 else self.values)[unit[0].index]
+            self._lanes(unit).store(value, self.frame, INTEGER(self.places[k]))
         for node in unit:
             for place in self.outputs.get(node.index, ()):
                 self.store(place, self.value(node))
@@ -177,15 +177,20 @@ class _PackedPieceWriter:
             return self.b.extract_element(self.packs[first], LANE(lane))
         return self.single.load(self.frame, INTEGER(self.places[unit] + lane))
 
+    def _lanes(self, unit: Pack) -> Lanes:
+        """Emitter of a unit."""
+        return self.together[vector_length(unit)]
+
     def vector(self, members: tuple[Expression, ...]):
         """Values of operands, one of each chain."""
-        first = members[0]
+        first, lanes = members[0], self._lanes(members)
         if first.index in self.packed.constants:
-            return self.together.constants([self.packed.constants[x.index] for x in members])
+            return lanes.constants([self.packed.constants[x.index] for x in members])
         if first.index not in self.packed.packs.place:
-            if first.index not in self.shared:
-                self.shared[first.index] = self.together.broadcast(self.value(first))
-            return self.shared[first.index]
+            key = first.index, lanes.width
+            if key not in self.shared:
+                self.shared[key] = lanes.broadcast(self.value(first))
+            return self.shared[key]
         if first.index not in self.packs:
             self.packs[first.index] = self._gathered(members)
         return self.packs[first.index]
@@ -194,4 +199,4 @@ class _PackedPieceWriter:
         """Inputs of the chains, or a pack of another piece."""
         if members[0].index in self.packed.inputs:
             return self.single.joined([self.value(x) for x in members])
-        return self.together.load(self.frame, INTEGER(self.places[self.packed.unit_of[members[0].index]]))
+        return self._lanes(members).load(self.frame, INTEGER(self.places[self.packed.unit_of[members[0].index]]))

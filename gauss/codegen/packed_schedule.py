@@ -1,6 +1,7 @@
 """Schedule of a function with packs: units, each one operation or one pack, depth first by latency, and their pieces."""
 
 from collections import defaultdict
+from collections.abc import Sequence
 from fractions import Fraction
 from heapq import heappop, heappush
 
@@ -43,11 +44,10 @@ class PackedSchedule:
         self.units = [unit for unit in ordered if not self._folded(unit)]
         self.unit_of = {node.index: k for k, unit in enumerate(self.units) for node in unit}
 
-    def cost(self, registers: int) -> int:
-        """Instructions of all units, each pack in so many registers; a member of a pack that is used alone costs one."""
-        packs = [unit for unit in self.units if len(unit) > 1]
+    def cost(self, width: int) -> int:
+        """Instructions of all units in registers of so many numbers; a member of a pack that is used alone costs one."""
         extracted = {x.index for unit in self.units if len(unit) == 1 for x in unit[0].operands} & self.packs.place.keys()
-        return len(self.units) + (registers - 1) * len(packs) + len(extracted)
+        return sum(-(-vector_length(unit) // width) for unit in self.units) + len(extracted)
 
     def used(self, unit: Pack) -> list[int]:
         """Units that compute operands of a unit."""
@@ -90,6 +90,11 @@ class PackedSchedule:
         if node.op not in EXACT:
             raise ValueError(f"{node.op} is rounded by machine code")
         return (BINARY if len(x) > 1 else UNARY)[node.op](*x)
+
+
+def vector_length(unit: Sequence) -> int:
+    """Numbers in the vector of a pack, a power of two."""
+    return 1 << (len(unit) - 1).bit_length()
 
 
 def _operands(unit: Pack, unit_of: dict[int, Pack]) -> list[int]:

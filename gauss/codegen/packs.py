@@ -25,8 +25,8 @@ class Packs:
     ----------
     scheduled : Schedule
         The operations of a function.
-    seeds : sequence of tuple of int
-        Places of equal inputs, one of each chain.
+    seeds : sequence of sequences of tuple of int
+        Places of equal inputs, one of each chain, by the kind of the chains.
 
     Attributes
     ----------
@@ -36,32 +36,35 @@ class Packs:
         Operands of a member, in an order that is the same in its pack, by its index.
     """
 
-    def __init__(self, scheduled: Schedule, seeds: Sequence[tuple[int, ...]]):
+    def __init__(self, scheduled: Schedule, seeds: Sequence[Sequence[tuple[int, ...]]]):
         self.packs: list[Pack] = []
         self.place: dict[int, tuple[int, int]] = {}
         self.operands: dict[int, tuple[Expression, ...]] = {}
-        for seed in seeds:
-            self._add(tuple(scheduled.inputs[k] for k in seed))
+        self._chain: dict[int, tuple[int, int]] = {}  # kind of chains and lane of each member
+        for kind, of_kind in enumerate(seeds):
+            for seed in of_kind:
+                self._add(tuple(scheduled.inputs[k] for k in seed), kind)
         for level in _levels(scheduled.nodes):
-            self._pack(level, len(seeds[0]))
+            self._pack(level, [len(of_kind[0]) for of_kind in seeds])
 
-    def _add(self, members: Pack):
-        self.place |= {member.index: (len(self.packs), lane) for lane, member in enumerate(members)}
+    def _add(self, members: Pack, kind: int):
+        for lane, member in enumerate(members):
+            self.place[member.index], self._chain[member.index] = (len(self.packs), lane), (kind, lane)
         self.packs.append(members)
 
-    def _pack(self, level: list[Expression], chains: int):
-        """Pack the operations of a level that are equal in all chains."""
-        alike: dict[tuple, list[Pack]] = defaultdict(lambda: [()] * chains)
+    def _pack(self, level: list[Expression], chains: list[int]):
+        """Pack the operations of a level that are equal in all chains of a kind."""
+        alike: dict[tuple, dict[int, Pack]] = defaultdict(dict)
         for node in level:
-            lanes = {self.place[x.index][1] for x in node.operands if x.index in self.place}
-            if len(lanes) == 1 and node.op not in ("call", "item"):
-                (lane,) = lanes
-                of_key = alike[self._key(node)]
-                of_key[lane] = (*of_key[lane], node)
-        for of_chains in alike.values():
-            if len({len(nodes) for nodes in of_chains}) == 1:
-                for members in zip(*of_chains, strict=True):
-                    self._add(members)
+            of_chains = {self._chain[x.index] for x in node.operands if x.index in self._chain}
+            if len(of_chains) == 1 and node.op not in ("call", "item"):
+                ((kind, lane),) = of_chains
+                own = alike[kind, self._key(node)]
+                own[lane] = (*own.get(lane, ()), node)
+        for (kind, _), own in alike.items():
+            if len(own) == chains[kind] and len({len(nodes) for nodes in own.values()}) == 1:
+                for members in zip(*(own[lane] for lane in range(chains[kind])), strict=True):
+                    self._add(members, kind)
 
     def _key(self, node: Expression) -> tuple:
         """The operation and its operands; their order is recorded."""

@@ -5,13 +5,15 @@ Body Dynamics Algorithms, 2008, sec. 7.3). A tree is eliminated once for any num
 are kept as three 3 × 3 blocks [A, B; Bᵀ, C], so that symmetry and zeros are used.
 """
 
+from contextlib import suppress
 from copy import copy
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.backends.structure import Edge
-from gauss.codegen import as_number
+from gauss.codegen import LDLT, as_number
 from gauss.dynamics.link_frames import Link
 from gauss.dynamics.rnea import JointKinematics, KinematicTree, apply, force_to_inner, gyroscopic, to_outer
 from gauss.rotations import congruent, skew
@@ -29,6 +31,63 @@ class Elimination(NamedTuple):
     U: np.ndarray
     D_inverse: np.ndarray
     projected: tuple | None = None
+
+    def force_inward(self, kin: JointKinematics, force, bias, driven):
+        """Joint force u = τ − Sᵀ p, and the bias force p + (Î − U D⁻¹ Uᵀ) c + U D⁻¹ u passed on to the inner link."""
+        u = driven - kin.S.T @ force
+        return u, force + apply(self.projected, bias) + self.U @ (self.D_inverse @ u)
+
+    def acceleration_outward(self, kin: JointKinematics, u, carried):
+        """q̈ = D⁻¹ (u − Uᵀ a) of the joint, and the acceleration a + S q̈ of the link."""
+        rates = self.D_inverse @ (u - self.U.T @ carried)
+        return rates, carried + kin.S @ rates
+
+
+class FreeElimination:
+    """Elimination of a joint of six freedoms with orthogonal S: D⁻¹ = Sᵀ Î⁻¹ S, and no inertia is passed on.
+
+    Parameters
+    ----------
+    S : ndarray, shape (6, 6)
+        Motion subspace.
+    inertia : tuple of ndarray
+        Articulated inertia Î.
+
+    Raises
+    ------
+    ZeroDivisionError
+        If a pivot of Î is a constant zero.
+    """
+
+    projected = (np.zeros((3, 3)),) * 3
+
+    def __init__(self, S: np.ndarray, inertia):
+        self.S, self.inertia = S, whole_inertia(inertia)
+        self.factor = LDLT(self.inertia)
+
+    @property
+    def U(self) -> np.ndarray:
+        """Matrix Î S (6, 6)."""
+        return self.inertia @ self.S
+
+    @cached_property
+    def D_inverse(self) -> np.ndarray:
+        """Matrix D⁻¹ (6, 6)."""
+        return np.column_stack([self.S.T @ self.spatial(unit) for unit in np.eye(6)])
+
+    def spatial(self, u) -> np.ndarray:
+        """Acceleration Î⁻¹ S u (6,) of the link under a force along the joint."""
+        force = self.S @ u
+        return self.factor.solve(force).astype(np.result_type(force, self.inertia))
+
+    def force_inward(self, kin: JointKinematics, force, bias, driven):
+        """Joint force u = τ − Sᵀ p, and the bias force S τ passed on to the inner link."""
+        return driven - kin.S.T @ force, kin.S @ driven
+
+    def acceleration_outward(self, kin: JointKinematics, u, carried):
+        """q̈ = Sᵀ (Î⁻¹ S u − a) of the joint, and the acceleration of the link."""
+        reached = self.spatial(u)
+        return kin.S.T @ (reached - carried), reached
 
 
 class ArticulatedBody:
@@ -49,19 +108,19 @@ class ArticulatedBody:
             self.outward[edge.inner].append(place)
         self.eliminations = self._eliminate()
 
-    def _eliminate(self) -> dict[int, Elimination]:
+    def _eliminate(self) -> dict[int, Elimination | FreeElimination]:
         inertias = {body: link.inertia for body, link in self.tree.links.items()}
-        found: dict[int, Elimination] = {}
+        found: dict[int, Elimination | FreeElimination] = {}
         for cluster in reversed(self.clusters):
             found |= self._eliminate_cluster(cluster, inertias)
         return found
 
-    def _eliminate_cluster(self, cluster, inertias) -> dict[int, Elimination]:
+    def _eliminate_cluster(self, cluster, inertias) -> dict[int, Elimination | FreeElimination]:
         """Elimination of the joints of a cluster; its inertia is added to that of the inner link in place."""
-        tree, inner = self.tree, cluster[0][0].inner
+        tree, inner, body = self.tree, cluster[0][0].inner, cluster[0][0].outer
+        found: dict[int, Elimination | FreeElimination]
         if len(cluster) == 1:
-            body = cluster[0][0].outer
-            found = {body: eliminate(tree.joint_kinematics[body], inertias[body])}
+            found = {body: _eliminated(tree.joint_kinematics[body], inertias[body])}
         else:
             found = self._eliminate_train(cluster, inertias)
         if inner < 0:
@@ -76,7 +135,7 @@ class ArticulatedBody:
             inertias[inner] = add(inertias[inner], blocks(-np.outer(U, D_inverse @ U[None])))
         return found
 
-    def _eliminate_train(self, cluster, inertias) -> dict[int, Elimination]:
+    def _eliminate_train(self, cluster, inertias) -> dict[int, Elimination | FreeElimination]:
         """Elimination of the common coordinate of a gear train."""
         subspaces = {edge.outer: ratio * self.tree.joint_kinematics[edge.outer].S for edge, ratio in cluster}
         U = {body: apply(inertias[body], S) for body, S in subspaces.items()}
@@ -133,7 +192,7 @@ class ArticulatedBody:
         for edge, ratio in cluster:
             body, kin, elimination = edge.outer, self.tree.joint_kinematics[edge.outer], self.eliminations[edge.outer]
             if len(cluster) == 1:
-                rates[edge.constraint], accelerations[body] = acceleration_outward(kin, elimination, own_u, carried[body])
+                rates[edge.constraint], accelerations[body] = elimination.acceleration_outward(kin, own_u, carried[body])
             else:
                 rates[edge.constraint] = ratio * (elimination.D_inverse @ own_u)
                 accelerations[body] = carried[body] + kin.S @ rates[edge.constraint]
@@ -164,7 +223,7 @@ class ArticulatedBody:
             return self._train_force_inward(cluster, forces, biases, driven)
         body = cluster[0][0].outer
         given = forces.get(body, ZERO), biases.get(body, ZERO), driven[body]
-        u, onward = force_inward(self.tree.joint_kinematics[body], self.eliminations[body], *given)
+        u, onward = self.eliminations[body].force_inward(self.tree.joint_kinematics[body], *given)
         return u, {body: onward}
 
     def _gather(self, cluster, passed, forces: dict):
@@ -206,9 +265,9 @@ class ArticulatedBody:
             of_biases = of_biases + self.eliminations[body].U.T @ biases.get(body, ZERO)
         passed = {}
         for edge, _ in cluster:
-            body, (U, D_inverse, inertia) = edge.outer, self.eliminations[edge.outer]
-            own = forces.get(body, ZERO) + apply(inertia, biases.get(body, ZERO))
-            passed[body] = own + U @ (D_inverse @ (u - of_biases))
+            body, elimination = edge.outer, self.eliminations[edge.outer]
+            own = forces.get(body, ZERO) + apply(elimination.projected, biases.get(body, ZERO))
+            passed[body] = own + elimination.U @ (elimination.D_inverse @ (u - of_biases))
         return u, passed
 
     def _to_inner(self, edge: Edge, force):
@@ -222,16 +281,12 @@ def eliminate(kin: JointKinematics, inertia) -> Elimination:
     return Elimination(U, D_inverse, _project(inertia, U, D_inverse, kin.S))
 
 
-def force_inward(kin: JointKinematics, elimination: Elimination, force, bias, driven):
-    """Joint force u = τ − Sᵀ p, and the bias force p + (Î − U D⁻¹ Uᵀ) c + U D⁻¹ u passed on to the inner link."""
-    u = driven - kin.S.T @ force
-    return u, force + apply(elimination.projected, bias) + elimination.U @ (elimination.D_inverse @ u)
-
-
-def acceleration_outward(kin: JointKinematics, elimination: Elimination, u, carried):
-    """q̈ = D⁻¹ (u − Uᵀ a) of the joint, and the acceleration a + S q̈ of the link."""
-    rates = elimination.D_inverse @ (u - elimination.U.T @ carried)
-    return rates, carried + kin.S @ rates
+def _eliminated(kin: JointKinematics, inertia) -> Elimination | FreeElimination:
+    """Eliminate the joint of a link, with six freedoms on their own."""
+    if kin.S.shape[1] == 6 and is_zero(kin.S[3:, 3:].ravel()):  # a free joint whose child is the link
+        with suppress(ZeroDivisionError):
+            return FreeElimination(kin.S, inertia)
+    return eliminate(kin, inertia)
 
 
 def is_zero(part: np.ndarray) -> bool:

@@ -7,7 +7,6 @@ its operations; in the code the parameters are constants again.
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,8 @@ from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.traced_system import Program
 from gauss.system import System
 
-LEAST_SAVING = 0.3  # share of the instructions: less is lost by gathering inputs, and by chains that differ in more
+LEAST_SHARE = 0.3  # of the joints that are in equal chains: fewer save less than what follows
+LEAST_SAVING = 0.1  # share of the instructions, counted too small: inputs are gathered, and chains may differ in more
 
 
 def in_chain_lanes(system: System, laws: Laws, once: Callable, sizes: tuple[int, ...], name: str) -> PackedFunction | None:
@@ -43,20 +43,29 @@ def in_chain_lanes(system: System, laws: Laws, once: Callable, sizes: tuple[int,
     name : str
         Name of the function.
     """
-    equal = None if system.relations.placed else equal_chains(system)
-    if equal is None:
+    kinds = _kinds(system)
+    if not kinds:
         return None
-    family, twins, values = _parametrised(system, laws, equal)
+    family, twins, values = _parametrised(system, laws, kinds)
     function = write(partial(once, Program(family.system, laws, family=family)), *sizes, name=name)
     if any(node.op == "call" for node in function.nodes):
         return None
     first = len(function.inputs) - len(function.parameters)
     place = {parameter: first + k for k, parameter in enumerate(function.parameters)}
-    seeds = [tuple(place[one] for one in names) for names in twins if all(one in place for one in names)]
-    packed = PackedFunction(
-        function, [*_states(system, equal), *seeds], {place[parameter]: values[parameter] for parameter in place}
-    )
+    seeds = [[*_states(system, equal), *_used(own, place)] for equal, own in zip(kinds, twins, strict=True)]
+    packed = PackedFunction(function, seeds, {place[parameter]: values[parameter] for parameter in place})
     return packed if packed.saving >= LEAST_SAVING else None
+
+
+def _kinds(system: System) -> list[EqualChains]:
+    """Equal chains of each kind; none where they are few of the joints, or relations are beside them."""
+    kinds = [] if system.relations.placed else equal_chains(system)
+    return kinds if sum(len(equal.of_joint) for equal in kinds) >= LEAST_SHARE * len(system.joints) else []
+
+
+def _used(twins: list[list[str]], place: dict[str, int]) -> Iterator[tuple[int, ...]]:
+    """Places of equal parameters that the function uses."""
+    return (tuple(place[one] for one in names) for names in twins if all(one in place for one in names))
 
 
 def _states(system: System, equal: EqualChains) -> Iterator[tuple[int, ...]]:
@@ -69,14 +78,16 @@ def _states(system: System, equal: EqualChains) -> Iterator[tuple[int, ...]]:
             yield from zip(*(first + subsystem.v[joint.v] for joint in placed), strict=True)
 
 
-def _parametrised(system: System, laws: Laws, equal: EqualChains) -> tuple[ParametrisedSystem, list, dict[str, float]]:
-    """System with parameters for the numbers in which chains differ, names of equal parameters, and their values."""
+def _parametrised(system: System, laws: Laws, kinds: list[EqualChains]) -> tuple[ParametrisedSystem, list, dict[str, float]]:
+    """System with parameters for the numbers in which chains differ, names of equal ones by kind, and their values."""
     found, _ = numbers(system)
-    graph, entries, twins = Graph(shared=True), found.astype(object), []
-    for places in _equal_numbers(system, equal):
-        if len(set(found[places])) > 1:
-            twins.append([f"p[{place}]" for place in places])
-            entries[places] = [graph.symbol(parameter) for parameter in twins[-1]]
+    graph, entries = Graph(shared=True), found.astype(object)
+    twins: list[list[list[str]]] = [[] for _ in kinds]
+    for equal, own in zip(kinds, twins, strict=True):
+        for places in _equal_numbers(system, equal):
+            if len(set(found[places])) > 1:
+                own.append([f"p[{place}]" for place in places])
+                entries[places] = [graph.symbol(parameter) for parameter in own[-1]]
     varied = np.array([place for place, entry in enumerate(entries) if not isinstance(entry, float)], dtype=int)
     parametrised = changed(with_numbers(system, entries, system.mechanics), {"loads": tuple(laws.traced)})
     values = {f"p[{place}]": float(found[place]) for place in varied}
@@ -87,20 +98,21 @@ def _equal_numbers(system: System, equal: EqualChains) -> Iterator[list[int]]:
     """Places of equal numbers, one of each chain, among those of :func:`gauss.dynamics.parameters.numbers`."""
     slots: dict[tuple, dict[int, int]] = defaultdict(dict)
     ranks, place = Counter[tuple](), 0
-    for field, chain, size in _elements(system, equal):
-        rank = ranks[field, chain]
-        ranks[field, chain] += 1
-        for k in range(size if chain is not None else 0):
-            slots[field, rank, k][chain] = place + k
+    for field, of_chain, size in _elements(system, equal):
+        if of_chain is not None:
+            rank = ranks[field, of_chain]  # of several things on a body
+            ranks[field, of_chain] += 1
+            for k in range(size):
+                slots[field, of_chain[1], rank, k][of_chain[0]] = place + k
         place += size
     chains = range(len(equal.chains))
     return ([by_chain[k] for k in chains] for by_chain in slots.values() if len(by_chain) == len(chains))
 
 
-def _elements(system: System, equal: EqualChains) -> Iterator[tuple[str, Any, int]]:
-    """Field, chain and size of each element of a system with numbers, in their order; no chain has what is common."""
+def _elements(system: System, equal: EqualChains) -> Iterator[tuple[str, tuple[int, int] | None, int]]:
+    """Field, chain and place there, and size of each element of a system with numbers; None of what is common."""
     subsystem, of_body, of_joint = equal.subsystem, equal.of_body, equal.of_joint
-    of_name = {subsystem.joints[joint].name: k for joint, k in of_joint.items()}
+    of_name = {subsystem.joints[joint].name: own for joint, own in of_joint.items()}
     of_carried = {body: of_body.get(frame.body) for body, frame in subsystem.carried.items()}
     yield "gravity", None, 3
     for body in range(system.Phi.size // 6):

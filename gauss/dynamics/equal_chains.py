@@ -1,8 +1,8 @@
-"""Equal chains of a mechanism: legs of a platform or of a walking machine, fingers, branches on a common body.
+"""Equal chains of a mechanism: legs of a platform or of a walking machine, arms, fingers, branches on a common body.
 
-Chains are what is left of the tree and the loops without the ground and the body on which most joints are. They are equal
-if their joints are, one after the other in the order of the scene: their kinds, the bodies that they connect, their part in
-the tree. Their dimensions and masses may differ.
+Chains are what is left of the tree and the loops without the ground and one body. They are equal if their joints can be
+numbered so that they are, one after the other: their kinds, the bodies that they connect, their part in the tree. Their
+dimensions and masses may differ.
 """
 
 from collections import Counter, defaultdict
@@ -11,12 +11,12 @@ from typing import NamedTuple
 from gauss.backends.structure import GROUND
 from gauss.system import Subsystem, System
 
-FEWEST_CHAINS = 3  # two fill too little of a vector register
-MOST_CHAINS = 8  # that are computed together
+FEWEST_CHAINS, MOST_CHAINS = 2, 8  # chains that are computed together
+MOST_TRIALS = 1000  # partial numberings of a chain: equal trees need one for each joint
 
 
 class BodyChain(NamedTuple):
-    """Bodies and joints of a chain in a subsystem."""
+    """Bodies and joints of a chain in a subsystem, in the order of the first chain that it equals."""
 
     bodies: tuple[int, ...]
     joints: tuple[int, ...]
@@ -29,60 +29,108 @@ class EqualChains(NamedTuple):
     chains: list[BodyChain]
 
     @property
-    def of_body(self) -> dict[int, int]:
-        """Chain of each of their bodies."""
-        return {body: k for k, chain in enumerate(self.chains) for body in chain.bodies}
+    def of_body(self) -> dict[int, tuple[int, int]]:
+        """Chain of each of their bodies, and its place there."""
+        return {body: (k, place) for k, chain in enumerate(self.chains) for place, body in enumerate(chain.bodies)}
 
     @property
-    def of_joint(self) -> dict[int, int]:
-        """Chain of each of their joints."""
-        return {joint: k for k, chain in enumerate(self.chains) for joint in chain.joints}
+    def of_joint(self) -> dict[int, tuple[int, int]]:
+        """Chain of each of their joints, and its place there."""
+        return {joint: (k, place) for k, chain in enumerate(self.chains) for place, joint in enumerate(chain.joints)}
 
 
-def equal_chains(system: System) -> EqualChains | None:
-    """Equal chains with most joints together; None without any."""
-    found = [EqualChains(subsystem, chains) for subsystem in system.subsystems for chains in _classes(subsystem)]
-    return max(found, key=lambda one: sum(len(chain.joints) for chain in one.chains), default=None)
+class _Edge(NamedTuple):
+    """Joint of a subsystem as chains are compared by it."""
+
+    label: tuple  # its kind, and the axes along which it repeats other joints
+    ends: tuple[int, int, int | None]  # parent, child, and the inner one of them if it is in the tree
 
 
-def _classes(subsystem: Subsystem) -> list[list[BodyChain]]:
-    """Classes of equal chains."""
-    classes: dict[tuple, list[BodyChain]] = defaultdict(list)
-    for chain in _chains(subsystem):
-        classes[_form(subsystem, chain)].append(chain)
-    return [chains[:MOST_CHAINS] for chains in classes.values() if len(chains) >= FEWEST_CHAINS]
+def equal_chains(system: System) -> list[EqualChains]:
+    """Equal chains of each kind, those with most joints together first; those of a subsystem meet on one body."""
+    found = [EqualChains(subsystem, chains) for subsystem in system.subsystems for chains in _kinds(subsystem)]
+    return sorted(found, key=lambda one: -_size([one.chains]))
 
 
-def _chains(subsystem: Subsystem) -> list[BodyChain]:
-    """Chains between the ground and the body on which most joints are."""
-    ends = [(joint.parent, joint.child) for joint in subsystem.joints]
-    common = {GROUND, _hub(ends)}
-    chain_of = {body: {body} for body in range(subsystem.n_bodies)}
-    for pair in ends:
-        if common.isdisjoint(pair):
-            joined = chain_of[pair[0]] | chain_of[pair[1]]
+def _kinds(subsystem: Subsystem) -> list[list[BodyChain]]:
+    """Kinds of equal chains on the body with which they have most joints, the first of several."""
+    inner = {edge.constraint: edge.inner for edge in subsystem.tree}
+    axes: dict[int, list] = defaultdict(list)
+    for index, axis in sorted(subsystem.redundant):
+        axes[index].append(axis)
+    edges = [
+        _Edge((joint.pair.kind, *axes[index]), (joint.parent, joint.child, inner.get(index)))
+        for index, joint in enumerate(subsystem.joints)
+    ]
+    joints_on = Counter(body for edge in edges for body in edge.ends[:2])
+    hubs = [GROUND, *sorted(body for body, count in joints_on.items() if body != GROUND and count > FEWEST_CHAINS)]
+    return max((_on_hub(edges, subsystem.n_bodies, hub) for hub in hubs), key=_size)
+
+
+def _size(kinds: list[list[BodyChain]]) -> int:
+    return sum(len(chain.joints) for chains in kinds for chain in chains)
+
+
+def _on_hub(edges: list[_Edge], n_bodies: int, hub: int) -> list[list[BodyChain]]:
+    """Kinds of equal chains between the ground and a body."""
+    kinds: list[list[BodyChain]] = []
+    for chain in _chains(edges, n_bodies, {GROUND, hub}):
+        for own in kinds:
+            if found := _in_order(edges, own[0], chain):
+                own.append(found)
+                break
+        else:
+            kinds.append([chain])
+    return [chains[:MOST_CHAINS] for chains in kinds if len(chains) >= FEWEST_CHAINS]
+
+
+def _chains(edges: list[_Edge], n_bodies: int, common: set[int]) -> list[BodyChain]:
+    """Chains between common bodies."""
+    chain_of = {body: {body} for body in range(n_bodies)}
+    for edge in edges:
+        if common.isdisjoint(edge.ends[:2]):
+            joined = chain_of[edge.ends[0]] | chain_of[edge.ends[1]]
             chain_of |= dict.fromkeys(joined, joined)
     found: dict[tuple[int, ...], list[int]] = defaultdict(list)
-    for index, pair in enumerate(ends):
-        for body in sorted(set(pair) - common)[:1]:
+    for index, edge in enumerate(edges):
+        for body in sorted(set(edge.ends[:2]) - common)[:1]:
             found[tuple(sorted(chain_of[body]))].append(index)
     return [BodyChain(bodies, tuple(joints)) for bodies, joints in found.items()]
 
 
-def _hub(ends: list[tuple[int, int]]) -> int:
-    """Body on which most joints are, the first of several."""
-    joints_on = Counter(body for pair in ends for body in pair if body != GROUND)
-    return max(joints_on, key=lambda body: (joints_on[body], -body), default=GROUND)
+def _in_order(edges: list[_Edge], first: BodyChain, chain: BodyChain) -> BodyChain | None:
+    """A chain in the order of the first one; None where it does not equal it."""
+    if _parts(edges, first) != _parts(edges, chain):
+        return None
+    waiting: list[tuple[dict, tuple[int, ...]]] = [({}, ())]  # counterparts of bodies, and of the first joints
+    for _ in range(MOST_TRIALS):
+        if not waiting:
+            break
+        bodies, joints = waiting.pop()
+        if len(joints) == len(first.joints):
+            return BodyChain(tuple(bodies[body] for body in first.bodies), joints)
+        edge = edges[first.joints[len(joints)]]
+        for joint in reversed([joint for joint in chain.joints if joint not in joints]):
+            more = _counterparts(edge, edges[joint], bodies, first, chain)
+            waiting += [] if more is None else [(more, (*joints, joint))]
+    return None
 
 
-def _form(subsystem: Subsystem, chain: BodyChain) -> tuple:
-    """What equal chains have in common."""
-    local = {body: f"own {k}" for k, body in enumerate(chain.bodies)}
-    inner = {edge.constraint: edge.inner for edge in subsystem.tree}
-    form = []
-    for index in chain.joints:
-        joint = subsystem.joints[index]
-        ends = (joint.parent, joint.child, inner.get(index))  # of loop joints, no body is the inner one
-        redundant = sorted(axis for own, axis in subsystem.redundant if own == index)
-        form.append((joint.pair.kind, *(body if body is None else local.get(body, body) for body in ends), *redundant))
-    return len(chain.bodies), *form
+def _parts(edges: list[_Edge], chain: BodyChain) -> tuple[int, Counter]:
+    """Number of bodies, and of joints of each label."""
+    return len(chain.bodies), Counter(edges[joint].label for joint in chain.joints)
+
+
+def _counterparts(edge: _Edge, other: _Edge, bodies: dict, first: BodyChain, chain: BodyChain) -> dict | None:
+    """Counterparts of bodies with those of the ends of two joints; None where they contradict each other."""
+    if edge.label != other.label:
+        return None
+    found = dict(bodies)
+    for body, counterpart in zip(edge.ends, other.ends, strict=True):
+        if body in first.bodies and body not in found:
+            if counterpart not in chain.bodies or counterpart in found.values():
+                return None
+            found[body] = counterpart
+        if found.get(body, body) != counterpart:
+            return None
+    return found

@@ -6,7 +6,7 @@ and its neighbours.
 
 import numpy as np
 
-from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
+from gauss.dynamics.aba import Elimination, add, eliminate, inertia_to_inner
 from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.dynamics.tree_recursion import UPPER, symmetric
 
@@ -52,7 +52,7 @@ def row_inward(link, pair, forward, R, p, S, U, D_inverse, wrenches, forces):
     kin, eliminated = _kinematics(R, p, S), Elimination(U, D_inverse, (np.zeros((3, 3)),) * 3)
     joint_forces, onward = [], []
     for wrench, tau in zip(wrenches.T, forces.T, strict=True):
-        u, passed = force_inward(kin, eliminated, -wrench, np.zeros(6), tau)
+        u, passed = eliminated.force_inward(kin, -wrench, np.zeros(6), tau)
         joint_forces.append(u)
         onward.append(-force_to_inner(link, kin, passed))
     return np.array(joint_forces, dtype=object).T, np.array(onward, dtype=object).T
@@ -61,14 +61,14 @@ def row_inward(link, pair, forward, R, p, S, U, D_inverse, wrenches, forces):
 def force(link, pair, forward, R, p, S, U, D_inverse, projected, own, bias, tau, inner):
     """Joint force u = τ − Sᵀ p, and the bias force of the inner link with the share of this one."""
     kin, eliminated = _kinematics(R, p, S, bias), Elimination(U, D_inverse, _inertia(projected))
-    u, passed = force_inward(kin, eliminated, own, bias, tau)
+    u, passed = eliminated.force_inward(kin, own, bias, tau)
     return u, inner + force_to_inner(link, kin, passed)
 
 
 def acceleration(link, pair, forward, R, p, S, U, D_inverse, u, bias, inner):
     """Accelerations of the joint and the link."""
     kin, eliminated = _kinematics(R, p, S, bias), Elimination(U, D_inverse)
-    return acceleration_outward(kin, eliminated, u, to_outer(link, kin, inner) + bias)
+    return eliminated.acceleration_outward(kin, u, to_outer(link, kin, inner) + bias)
 
 
 def link_acceleration(link, pair, forward, R, p, S, bias, rates, inner):

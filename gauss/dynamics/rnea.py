@@ -184,11 +184,10 @@ def _from_parent(pair: Pair, turn: np.ndarray, q, v):
     """Pose, subspace and drift across a joint whose child is the outer body."""
     R, p = pair.pose(q)
     R = R @ turn
-    E_omega, E_v = pair.subspace(q)
     return (
         R,
         p,
-        np.concatenate([R.T @ E_omega, R.T @ E_v]),
+        np.concatenate([turn.T @ part for part in pair.subspace_on_child(q)]),
         np.concatenate([R.T @ part for part in pair.subspace_bias(q, v)]),
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen import as_number, write
 from gauss.codegen.kernels import LinkStep, TreeRecursion
-from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
+from gauss.dynamics.aba import Elimination, add, eliminate, inertia_to_inner
 from gauss.dynamics.link_frames import Link, link_frames
 from gauss.dynamics.rnea import JointKinematics, apply, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.rotations import skew
@@ -232,7 +232,7 @@ def _forward_steps(link: _LinkCode):
             A, B, C, more = np.split(collected, [6, 15, 21])
             inertia, force = add(inertia, (symmetric(A), B.reshape(3, 3), symmetric(C))), force + more
         found = eliminate(kin, inertia)
-        u, passed = force_inward(kin, found, force, kin.bias, driven)
+        u, passed = found.force_inward(kin, force, kin.bias, driven)
         A, B, C = inertia_to_inner(constants, kin, found.projected)
         onward = A[UPPER], B.ravel(), C[UPPER], force_to_inner(constants, kin, passed)
         return found.U.ravel(), found.D_inverse.ravel(), u, *onward
@@ -241,7 +241,7 @@ def _forward_steps(link: _LinkCode):
         kin = read(kin)
         eliminated = Elimination(U.reshape(6, k), D_inverse.reshape(k, k))
         carried = to_outer(constants, kin, inner) + kin.bias
-        return acceleration_outward(kin, eliminated, u, carried)
+        return eliminated.acceleration_outward(kin, u, carried)
 
     reads = {"kinematics": stored, "omega": omega, "driven": link.vector("effort"), "collected": collected}
     second = link.step(inward, reads, kept | {"onward": onward}, () if kind.is_first else onward)

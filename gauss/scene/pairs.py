@@ -71,9 +71,19 @@ class Pair:
         k = self.quaternion
         return np.concatenate([v[:k], rotations.multiply(q[k:], np.array([0.0, *v[k:]])) / 2])
 
+    def subspace_on_child(self, q: Shaped[np.ndarray, " nq"]) -> tuple[np.ndarray, np.ndarray]:
+        """E_omega and E_v (3, k) in the axes of the child, in which the angular velocity of a quaternion is given."""
+        R, (E_omega, E_v) = self.pose(q)[0], self.subspace(q)
+        k = self.quaternion
+        turning = R.T @ E_omega if k is None else np.concatenate([np.zeros((3, k)), IDENTITY], axis=1)
+        return turning, R.T @ E_v
+
     def subspace_bias(self, q: Shaped[np.ndarray, " nq"], v: Shaped[np.ndarray, " k"]):
-        """E° q̇, angular and linear (3,): rate of the subspace at fixed parent times the rates, by differentiation."""
-        if self.constant:
+        """E° q̇, angular and linear (3,): rate of the subspace at fixed parent times the rates, by differentiation.
+
+        Quaternions have none: E_omega ω is R ω, its rate R (ω × ω).
+        """
+        if self.constant or self.quaternion is not None:
             return ZERO, ZERO
         if q.dtype == object:
             bias = write(self._bias, self.n_q, self.n_v, name=f"bias {self.kind}").inlined(q, v)  # q may hold constants

@@ -58,7 +58,7 @@ def test_packs_round_like_single_operations(count, length, monkeypatch):
     monkeypatch.setattr(packed_function_module, "PIECE_LENGTH", length)
     for seed in range(6):
         function, seeds = chains(count, seed)
-        packed = PackedFunction(function, seeds, {})
+        packed = PackedFunction(function, [seeds], {})
         assert all(len(unit) in (1, count) for unit in packed.packed.units)
         assert any(len(unit) == count for unit in packed.packed.units)
         one, other = Kernel(function, batch=False), Kernel(packed, batch=False)
@@ -79,7 +79,7 @@ def test_inputs_that_are_numbers_are_constants_of_the_code(count):
         moved = write(lambda x, f=function, o=order: f.inlined(x[np.argsort(o)]), len(order))
         x = np.random.default_rng(seed).normal(size=len(order))
         numbers = {place[k]: x[place[k]] for k in fixed}
-        packed = PackedFunction(moved, [tuple(place[k] for k in one) for one in seeds], numbers)
+        packed = PackedFunction(moved, [[tuple(place[k] for k in one) for one in seeds]], numbers)
         assert packed.arity == (len(order) - len(fixed), len(moved.outputs))
         found = Kernel(packed, batch=False)(x[: -len(fixed)])
         np.testing.assert_array_equal(found, Kernel(moved, batch=False)(x))
@@ -91,10 +91,30 @@ def test_operations_that_some_chains_lack_are_left_alone(odd):
     for seed in range(4):
         function, seeds = chains(count, seed, odd)
         scheduled = schedule(function)
-        packs = Packs(scheduled, seeds)
+        packs = Packs(scheduled, [seeds])
         members = {member.index for pack in packs.packs for member in pack}
         assert len(members) == count * len(packs.packs)  # each in one pack
         assert all(len({(node.op, len(node.operands)) for node in pack}) == 1 for pack in packs.packs)
         x = np.random.default_rng(seed).normal(size=len(function.inputs))
-        found = Kernel(PackedFunction(function, seeds, {}), batch=False)(x)
+        found = Kernel(PackedFunction(function, [seeds], {}), batch=False)(x)
         np.testing.assert_array_equal(found, Kernel(function, batch=False)(x))
+
+
+@pytest.mark.parametrize("length", [400, 15], ids=["in one piece", "in pieces"])
+@pytest.mark.parametrize(("count", "other"), [(2, 2), (2, 3), (5, 2)])
+def test_kinds_of_chains_are_packed_apart(count, other, length, monkeypatch):
+    monkeypatch.setattr(packed_function_module, "PIECE_LENGTH", length)
+    for seed in range(4):
+        (one, own), (two, others) = chains(count, seed), chains(other, seed + 10)
+        n = len(one.inputs)
+
+        def both(x, one=one, two=two, n=n):
+            found = one.inlined(x[:n])
+            return np.concatenate([found, two.inlined(np.concatenate([found[:1], x[n + 1 :]]))])
+
+        function = write(both, n + len(two.inputs))
+        kinds = [own, [tuple(n + k for k in places) for places in others]]
+        packed = PackedFunction(function, kinds, {})
+        assert {len(unit) for unit in packed.packed.units} == {1, count, other}
+        x = np.random.default_rng(seed).normal(size=len(function.inputs))
+        np.testing.assert_array_equal(Kernel(packed, batch=False)(x), Kernel(function, batch=False)(x))

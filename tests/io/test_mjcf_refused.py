@@ -173,6 +173,8 @@ MULTIPLYING = {
     "replicate": ("", f'<replicate count="1000000000" offset="1 0 0">{COPIED}</replicate>'),
     "nested": ("", f'<replicate count="1000"><replicate count="1000">{COPIED}</replicate></replicate>'),
     "composite": ("", '<composite type="cable" count="1000000 1 1"/>'),
+    "size": ('<size nuserdata="2000000000"/>', COPIED),
+    "cube": ('<asset><texture name="h" builtin="flat" width="20000"/></asset>', COPIED),
     "hfield": ('<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>', COPIED),
 }
 

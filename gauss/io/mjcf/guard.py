@@ -1,6 +1,7 @@
 """Checks of an MJCF file, and of those that it includes, before MuJoCo's parser: no plugins, no files elsewhere."""
 
 from math import prod
+from operator import itemgetter
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -33,6 +34,7 @@ FORBIDDEN = ("plugin", "extension")
 COPIES = "replicate", "composite", "flexcomp"  # elements that stand for many
 MOST_COPIES = 10_000  # elements that these make: MuJoCo's compiler takes 5 s for 8 000, four times as long for twice as many
 GRIDS = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}
+SIDES_OF_CUBE = 6
 LARGEST_GRID = 1e8  # numbers: 10 000 × 10 000, of which each takes memory before anything is read
 
 
@@ -79,17 +81,30 @@ def _require_numbers(source: Source, element: Element):
 
 
 def _require_few(source: Source):
-    """Refuse elements that stand for so many that parsing them would not end, and grids that fill the memory."""
+    """Refuse elements that stand for so many that parsing them would not end, grids and sizes that fill the memory."""
     for element in source.root.iter():
         if element.tag in COPIES and (copies := _copies(element)) > MOST_COPIES:
             raise FileError(
                 f"{source.place(element)}: <{element.tag}> makes {copies:.3g} elements, more than {MOST_COPIES}; give a "
                 "smaller count."
             )
-        size = prod(_count(element.get(key, "0")) for key in GRIDS.get(element.tag, ()))
-        if element.tag in GRIDS and size > LARGEST_GRID:
-            keys = " and ".join(GRIDS[element.tag])
-            raise FileError(f"{source.place(element)}: <{element.tag}> has {size:.3g} numbers; give a smaller {keys}.")
+        keys, numbers = _stored(element)
+        if numbers > LARGEST_GRID:
+            raise FileError(
+                f"{source.place(element)}: <{element.tag}> has {numbers:.3g} numbers; give a smaller {' and '.join(keys)}."
+            )
+
+
+def _stored(element: Element) -> tuple[tuple[str, ...], float]:
+    """Attributes that say how much memory an element takes, and how many numbers that is."""
+    if element.tag == "size":
+        return max(
+            (((key,), _count(word)) for key, word in element.items() if key != "memory"), key=itemgetter(1), default=((), 0)
+        )
+    if element.tag == "texture" and element.get("type", "cube") != "2d":
+        return ("width",), SIDES_OF_CUBE * _count(element.get("width", "0")) ** 2
+    keys = GRIDS.get(element.tag, ())
+    return keys, prod(_count(element.get(key, "0")) for key in keys)
 
 
 def _copies(element: Element) -> float:
