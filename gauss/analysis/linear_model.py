@@ -17,6 +17,7 @@ from gauss.analysis.derivatives import AccelerationChanges
 from gauss.analysis.frozen_time import state_at
 from gauss.analysis.linear_modes import LinearModes
 from gauss.analysis.regulator import gain, unreached, weights
+from gauss.analysis.tangent_changes import changes_along
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, write
@@ -253,7 +254,7 @@ def linearise(
     places = tangents.independent_coordinates
     moving = D + tangents.turning @ N
     forces, input_names = _input_columns(system, state, inputs)
-    by_q, by_v, response = _acceleration_changes(changes, tangents, forces)
+    by_q, by_v, response = changes_along(changes, tangents, forces)
     A = np.block([[moving[places], rate[places]], [by_q[free], by_v[free]]])
     B = np.concatenate([np.zeros((k, forces.shape[1])), response[free]])
     rows, direct, output_names = _output_rows(system, state, outputs, places, load)
@@ -266,14 +267,6 @@ def linearise(
         (np.abs(own) <= STEADY * unit).all() and (np.abs(state.v[places]) <= STEADY * system.scale.rates[places]).all()
     )
     return LinearModel(A, B, C, direct @ response, states, input_names, output_names, system, state, N, is_equilibrium)
-
-
-def _acceleration_changes(changes: AccelerationChanges, tangents: Tangents, forces: np.ndarray) -> list[np.ndarray]:
-    """Changes of the accelerations by independent displacements (n_v, k), by rates (n_v, l), and by forces (n_v, m)."""
-    N, D, rate, zeros = tangents.position, tangents.change, tangents.rate, np.zeros
-    (n, k), many, m = N.shape, rate.shape[1], forces.shape[1]
-    directions = np.block([[N, zeros((n, many + m))], [D, rate, zeros((n, m))], [zeros((n, k + many)), forces]])
-    return np.split(changes.along(directions), [k, k + many], axis=1)
 
 
 def _without_integrals(system: System, C, places, A, B, N, states):

@@ -55,19 +55,25 @@ def size_of(system: System, parameter: str) -> int:
         if system.relations.placed:
             raise ArgumentError(f"parameter {parameter!r}: beside relations, there are no derivatives by places of joints.")
         return OF_JOINTS[kind]
-    loads = {bound.load.name: bound.load for bound in system.loads}
-    if name not in loads:
-        words = ", ".join(f'"{one}:NAME"' for one in (*OF_BODIES, *OF_JOINTS))
-        raise StateError(
-            f'parameter {parameter!r}: expected "{GRAVITY}", {words}, or "NUMBER:NAME" of a load, as in "stiffness:spring". '
-            f"{did_you_mean(name or kind, loads)}"
-        )
-    given = loads[name]
+    given = _load_of(system, parameter)
     numbers = vars(given.element if isinstance(given, Slipping) else given)
     fields = [field for field, value in numbers.items() if isinstance(value, float)]
     if kind not in fields:
         raise ArgumentError(f"parameter {parameter!r}: {name!r} has no number {kind!r}. {did_you_mean(kind, fields)}")
     return 1
+
+
+def _load_of(system: System, parameter: str):
+    """The load of a parameter such as "stiffness:spring"."""
+    name = parameter.partition(":")[2]
+    loads = {bound.load.name: bound.load for bound in system.loads}
+    if name not in loads:
+        words = ", ".join(f'"{one}:NAME"' for one in (*OF_BODIES, *OF_JOINTS))
+        raise StateError(
+            f'parameter {parameter!r}: expected "{GRAVITY}", {words}, or "NUMBER:NAME" of a load, as in "stiffness:spring". '
+            f"{did_you_mean(name or parameter, loads)}"
+        )
+    return loads[name]
 
 
 def _known(parameter: str, name: str, names):

@@ -121,6 +121,31 @@ def test_states_far_from_their_constraints_are_refused(change):
         gauss.linearise(system, change(system.initial_state()))
 
 
+@pytest.mark.parametrize("mass", [1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13])
+def test_light_rods_of_loops_are_modelled_or_refused(mass):
+    """Masses that differ by many orders take digits of the multipliers; the model without the rod's mass is the limit."""
+
+    def linkage(mass):
+        scene, corner = gauss.Scene("light rod", gravity=(0.0, -9.81, 0.0)), (0.0, 0.4, 0.0)
+        crank = scene.body("crank", 1.0, (0.0, 0.0, 0.02), com=(0.0, 0.2, 0.0))
+        rod = scene.body("rod", mass, (0.0, 0.0, 0.1 * mass), position=corner)
+        rocker = scene.body("rocker", 1.0, (0.0, 0.0, 0.02), position=(1.0, 0.0, 0.0), com=(0.0, 0.3, 0.0))
+        for name, pair, at in (
+            ("A", ("ground", crank), (0.0, 0.0, 0.0)), ("B", (crank, rod), corner), ("C", (rod, rocker), (1.0, 0.6, 0.0)),
+            ("D", ("ground", rocker), (1.0, 0.0, 0.0)),
+        ):  # fmt: skip
+            scene.revolute(name, *pair, at=at)
+        system = gauss.compile_scene(scene)
+        state = system.initial_state([0.3, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], keep=["A"])
+        return gauss.linearise(system, state, independent=["A"]).A
+
+    limit = linkage(0.0)
+    try:
+        assert linkage(mass) == pytest.approx(limit, abs=(10.0 * mass + CHANGED) * np.abs(limit).max())
+    except SimulationError as error:
+        assert mass < 1e-6 and "too few digits" in str(error)
+
+
 @pytest.mark.parametrize("name", ["cardan", "turntable"])
 def test_neutral_rest_is_marginal(name):
     """A balanced joint stays wherever it is put: both its eigenvalues are zero."""
