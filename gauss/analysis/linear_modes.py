@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SHOWN = 12  # digits of a damping ratio after the point: what is less is round-off, and minus zero
+DAMPING_DIGITS = 12  # digits of a damping ratio after the point: what is less is round-off, and minus zero
 
 
 @dataclass(frozen=True)
@@ -40,5 +40,5 @@ class LinearModes:
         lines = [f"{'Hz':>12}{'damping':>12}  moves most"]
         for frequency, damping, shape in zip(self.frequencies, self.damping, self.shapes, strict=True):
             largest = [self.coordinates[k] for k in np.argsort(-np.abs(shape))[:3] if abs(shape[k]) > 0.1]
-            lines.append(f"{frequency:12.6g}{round(damping, SHOWN) + 0.0:12.4g}  {', '.join(largest)}")
+            lines.append(f"{frequency:12.6g}{round(damping, DAMPING_DIGITS) + 0.0:12.4g}  {', '.join(largest)}")
         return "\n".join(lines)
