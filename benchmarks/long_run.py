@@ -78,9 +78,9 @@ def draw(curves: dict, steps: int):
 NOTES = (
     "A trend of no more than twice its standard error is none: the energy swings about a constant. What `gauss6` errs by is",
     "rounding, and coordinates and momenta are compensated sums, those of rotations, too: what is left of that walks at",
-    "random, which makes slopes of its own. On the double pendulums, which are chaotic, the energy wanders within its",
-    "swing. On the four-bar the crank has turned more than a thousand times at the end, and the coordinate has lost four",
-    "digits behind the point, which the energy shows.",
+    "random, which makes slopes of its own: starts that differ by two percent have slopes of other signs. On the double",
+    "pendulums, which are chaotic, the energy wanders within its swing. On the four-bar the crank has turned more than a",
+    "thousand times at the end, and the coordinate has lost four digits behind the point, which the energy shows.",
     "",
     "The momentum is the largest change of that about the vertical, of the free body that about all axes of space,",
     "relative to its size: symplectic methods keep it to rounding. `energy_momentum` conserves the energy, but not the",

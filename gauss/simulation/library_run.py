@@ -100,10 +100,7 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
     certified = CertifiedEngine("recursion")
     worst = _error_at(system, derivative, certified, State(found.t[-1], *np.split(found.y[-1, : n_q + n_v], [n_q])))
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
-    if switching.watch is not None:
-        stats = stats._replace(unseen=found.steps or 1)  # libraries do not locate switching events
-    if switching.called and np.diff(np.sort([start.t, *asked, end])).max() > SPARSE_STEP * (end - start.t):
-        stats = stats._replace(opaque=", ".join(switching.called))
+    stats = _with_doubts(stats, problem, np.sort([start.t, *asked, end]))
     q, v = (np.reshape([getattr(state, part) for state in states], (len(states), n)) for part, n in (("q", n_q), ("v", n_v)))
     whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
     if found.interruption is not None:
@@ -115,6 +112,25 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
         off = f"compiled accelerations that {method.name!r} used are off by {worst:.1e}; use 'dop853'."
         raise SimulationError(f"t = {end:.6g} s: {off}", whole)
     return whole
+
+
+def _with_doubts(stats: Stats, problem: Problem, asked: np.ndarray) -> Stats:
+    """Stats that say where laws of the state may switch undetected: libraries locate no such event.
+
+    Parameters
+    ----------
+    stats : Stats
+        Those of the motion.
+    problem : Problem
+        Its problem.
+    asked : ndarray
+        Times at which opaque laws of the state were called, ascending, from the start to the end [s].
+    """
+    switching = problem.switching
+    if switching.watch is not None:
+        stats = stats._replace(unseen=stats.steps or 1)
+    sparse = np.diff(asked).max() > SPARSE_STEP * (problem.end - problem.start.t)
+    return stats._replace(opaque=", ".join(switching.called)) if sparse else stats
 
 
 def _noted(derivative: Callable, times: list[float]) -> Callable:
