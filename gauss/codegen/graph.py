@@ -133,10 +133,9 @@ class Graph:
         if x.is_constant and y.is_constant:
             value = BINARY[op](x.value, y.value)  # most often zero with zero
             return x if value == x.value else y if value == y.value else self.constant(value)
-        if x.is_constant or y.is_constant or x is y or x.op == "neg" or y.op == "neg":  # else no rule applies
-            simplified = SIMPLER.get(op)
-            if simplified is not None and (simpler := simplified(self, x, y)) is not None:
-                return simpler
+        simplified = SIMPLER.get(op)
+        if simplified is not None and (simpler := simplified(self, x, y)) is not None:
+            return simpler
         if x.index > y.index and op in COMMUTATIVE:
             x, y = y, x
         return self._make(op, (x, y))
