@@ -91,21 +91,27 @@ class _NearPairsWriter:
             self.extents[k * 3 + i] = size
 
     def _is_near(self, first: Value, second: Value) -> Value:
-        """Whether the boxes and balls of two parts overlap, or the plane of the second reaches into the box of the first."""
+        """Whether the boxes of two parts overlap, or the plane of the second reaches into that of the first."""
         r, one, other = self.r, self.moved.after(first * MOVED), self.moved.after(second * MOVED)
-        height, width, apart, square = r.number(0.0), r.number(0.0), r.number(-1.0), r.number(0.0)
+        height, width, apart = r.number(0.0), r.number(0.0), r.number(-1.0)
         for i in range(3):
             between, extent = one[9 + i] - other[9 + i], self.extents[first * 3 + i]
             normal = other[3 * i + 2]
             height, width = height + normal * between, width + r.absolute(normal) * extent
             apart = r.maximum(apart, r.absolute(between) - extent - self.extents[second * 3 + i])
-            square = square + between * between
-        near = self.own[first * PART + BALL] + self.own[second * PART + BALL] + self.settings[0]
-        apart = r.maximum(apart, square - near * near)
         is_plane = self.body[second * BODY + 1] > 0
         return r.choose(is_plane, height - width, apart) <= 0.0
 
     def _examine(self, first: Value, second: Value):
+        """Contacts of a pair whose boxes are near, if the balls around them are, too."""
+        one, other = (self.moved.after(part * MOVED) for part in (first, second))
+        between = [one[9 + i] - other[9 + i] for i in range(3)]
+        reach = self.own[first * PART + BALL] + self.own[second * PART + BALL] + self.settings[0]
+        square = between[0] * between[0] + between[1] * between[1] + between[2] * between[2]
+        with self.r.when(square <= reach * reach):
+            self._examine_near(first, second)
+
+    def _examine_near(self, first: Value, second: Value):
         """Contacts of a pair, if its kernels are made."""
         number = self.body[first * BODY + 2] * KINDS + self.body[second * BODY + 2]
         kind = self.kind.after(number * KIND)
