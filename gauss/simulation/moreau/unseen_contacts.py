@@ -1,13 +1,18 @@
 """Steps within which no shape passes through another one unseen: gaps are looked at once a step."""
 
+import warnings
+
 import numpy as np
 
 from gauss.dynamics.kinematics import kinematics
+from gauss.errors import ContactLawWarning, user_level
 from gauss.scene import Contact, HalfSpace, Scene
 from gauss.scene.collision import Collider
+from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
 
 SHARE = 0.25  # of the thickness of two shapes together that they may move in a step
+EXAMINED = 4  # samples of a motion with the largest rates that are examined, and as many others
 
 
 class StepLimit:
@@ -21,10 +26,11 @@ class StepLimit:
 
     def __init__(self, system: System):
         self.system, pairs = system, _pairs(system.scene)
-        self.way = np.array([SHARE * (thickness(one) + thickness(other)) for one, other in pairs])
         shapes = list({shape.name: shape for pair in pairs for shape in pair}.values())
         places = {shape.name: k for k, shape in enumerate(shapes)}
         self.pairs = np.array([[places[shape.name] for shape in pair] for pair in pairs], dtype=int).reshape(-1, 2)
+        self.names = [shape.name for shape in shapes]
+        self.thickness = np.array([thickness(shape) for shape in shapes])[self.pairs].sum(axis=1)  # of both shapes together
         frames, middles = [system.frames[shape.body] for shape in shapes], [shape.corners.mean(axis=0) for shape in shapes]
         self.bodies = np.array([frame.body for frame in frames], dtype=int)
         self.middles = [frame.p + frame.R @ middle for frame, middle in zip(frames, middles, strict=True)]
@@ -32,16 +38,55 @@ class StepLimit:
 
     def step(self, state: State) -> float:
         """Largest step at the rates of a state [s]."""
-        if not self.way.size:
+        if not self.thickness.size:
             return np.inf
+        centre, velocity, turning = self._motions(state)
+        (one, other), speed = self.pairs.T, np.linalg.norm(velocity, axis=1) + turning
+        apart = np.linalg.norm(centre[one] - centre[other], axis=1) - self.reach[one] - self.reach[other]
+        with np.errstate(divide="ignore"):
+            return float((np.maximum(SHARE * self.thickness, 0.5 * apart) / (speed[one] + speed[other])).min())
+
+    def passing(self, state: State, h: float) -> tuple[str, str] | None:
+        """Names of two shapes that move by more than they are thick within a step of length h; None if no shapes do."""
+        _, velocity, turning = self._motions(state)
+        one, other = self.pairs.T
+        speed = np.linalg.norm(velocity[one] - velocity[other], axis=1) + turning[one] + turning[other]
+        worst = int(np.argmax(speed / self.thickness))
+        return (self.names[one[worst]], self.names[other[worst]]) if h * speed[worst] > self.thickness[worst] else None
+
+    def _motions(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Middles of the shapes (k, 3) [m], their velocities (k, 3) and the largest speeds about them (k,) [m/s]."""
         motion = kinematics(self.system, state)
         x, u, W = (np.array([part[b] for b in self.bodies]) for part in (motion.x, motion.u, motion.W))
         out = np.array([motion.R[b] @ middle for b, middle in zip(self.bodies, self.middles, strict=True)])
-        speed = np.linalg.norm(u + np.cross(W, out), axis=1) + np.linalg.norm(W, axis=1) * self.reach
-        one, other = self.pairs.T
-        apart = np.linalg.norm((x + out)[one] - (x + out)[other], axis=1) - self.reach[one] - self.reach[other]
-        with np.errstate(divide="ignore"):
-            return float((np.maximum(self.way, 0.5 * apart) / (speed[one] + speed[other])).min())
+        return x + out, u + np.cross(W, out), np.linalg.norm(W, axis=1) * self.reach
+
+
+def warn_of_passages(trajectory: Trajectory):
+    """Warn of shapes that fixed steps may carry through one another unseen: no error estimate shows it.
+
+    The samples with the largest rates are examined, and some more.
+
+    Warns
+    -----
+    ContactLawWarning
+        With the names of two shapes, and a time.
+    """
+    limit, step = StepLimit(trajectory.system), trajectory.step
+    if not limit.thickness.size or step is None or not trajectory.v.size:
+        return
+    fastest = np.argsort(-np.abs(trajectory.v / trajectory.system.scale.rates).max(axis=1))[:EXAMINED]
+    spread = np.linspace(0, len(trajectory.t) - 1, EXAMINED).astype(int)
+    for k in sorted({*fastest.tolist(), *spread.tolist()}):
+        if names := limit.passing(trajectory.state(k), step):
+            text = f"in a step of {step:g} s {names[0]!r} and {names[1]!r} move by more than they are thick"
+            warnings.warn(
+                f"{trajectory.system.scene.name!r}: t = {trajectory.t[k]:.6g} s: {text}, and may pass through each other "
+                "unseen; shorten the step, or leave it out for error control by rtol=.",
+                ContactLawWarning,
+                stacklevel=user_level(),
+            )
+            return
 
 
 def _pairs(scene: Scene) -> list[tuple[Collider, Collider]]:
