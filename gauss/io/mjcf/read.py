@@ -67,8 +67,8 @@ def read_mjcf(
     Warns
     -----
     NotImportedWarning
-        Of contacts and stops that are not read, of geoms that have no counterpart, of key frames that are not the start, of
-        equalities and actuators that are switched off.
+        Of contacts and stops that are not read, of geoms that have no counterpart, of sensors, of key frames that are not
+        the start, of equalities and actuators that are switched off.
     """
     path = Path(path)
     check_option(path, "limits", limits, LIMITS)
