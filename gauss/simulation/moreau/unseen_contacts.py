@@ -31,10 +31,7 @@ class StepLimit:
         self.pairs = np.array([[places[shape.name] for shape in pair] for pair in pairs], dtype=int).reshape(-1, 2)
         self.names = [shape.name for shape in shapes]
         self.thickness = np.array([thickness(shape) for shape in shapes])[self.pairs].sum(axis=1)  # of both shapes together
-        frames, middles = [system.frames[shape.body] for shape in shapes], [shape.corners.mean(axis=0) for shape in shapes]
-        self.bodies = np.array([frame.body for frame in frames], dtype=int)
-        self.middles = [frame.p + frame.R @ middle for frame, middle in zip(frames, middles, strict=True)]
-        self.reach = np.array([shape.radius + _farthest(shape.corners - shape.corners.mean(axis=0)) for shape in shapes])
+        self.bodies, self.middles, self.reach = _places(system, shapes)
 
     def step(self, state: State) -> float:
         """Largest step at the rates of a state [s]."""
@@ -60,6 +57,14 @@ class StepLimit:
         x, u, W = (np.array([part[b] for b in self.bodies]) for part in (motion.x, motion.u, motion.W))
         out = np.array([motion.R[b] @ middle for b, middle in zip(self.bodies, self.middles, strict=True)])
         return x + out, u + np.cross(W, out), np.linalg.norm(W, axis=1) * self.reach
+
+
+def _places(system: System, shapes: list[Collider]) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Body of each shape, its middle in the axes of the body (3,) [m], and the radius of a ball around it (k,) [m]."""
+    frames, middles = [system.frames[shape.body] for shape in shapes], [shape.corners.mean(axis=0) for shape in shapes]
+    reach = [s.radius + _farthest(s.corners - middle) for s, middle in zip(shapes, middles, strict=True)]
+    places = [frame.p + frame.R @ middle for frame, middle in zip(frames, middles, strict=True)]
+    return np.array([frame.body for frame in frames], dtype=int), places, np.array(reach)
 
 
 def warn_of_passages(trajectory: Trajectory):
