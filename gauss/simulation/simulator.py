@@ -147,7 +147,7 @@ class Simulator:
             self._loop: Any = run.prepared_steps()  # machine code, or steps that are called as it is
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
-        self._u, self._before = self._point[run.layout.size - n_u :], self._point.copy()
+        self._u, self._before = self._point[run.layout.size - n_u :], self._point.tobytes()
         self._reached = self._point[1 : 1 + run.layout.n_q + run.layout.n_v]
         self._still = np.zeros(self._reached.size)
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
@@ -239,7 +239,7 @@ class Simulator:
         """
         if u is not None:
             self._set(u)
-        self._before[:] = self._point
+        self._before = self._point.tobytes()
         if n == 1:
             self._steps += 1
             self._times[0] = self._begun + self._steps * self.step_size
@@ -310,7 +310,7 @@ class Simulator:
 
     def _refuse(self, steps: int, why: str) -> NoReturn:
         """Return to the state before the call, after so many steps, and raise a SimulationError."""
-        t, self._point[:], self._steps = self.t, self._before, steps
+        t, self._point[:], self._steps = self.t, np.frombuffer(self._before), steps
         raise SimulationError(f"t = {t:.6g} s: {why}; shorten the step.")
 
     @property
