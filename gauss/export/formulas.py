@@ -126,9 +126,15 @@ def _formulas(sympy, system: System, exported: ExportedFunction, values: dict[st
 
 def _simplified(sympy, x):
     """Expanded expression; with theorems of sums of angles where it is short."""
-    found = sympy.expand(x)
-    found = found.xreplace({number: _number(sympy, float(number)) for number in found.atoms(sympy.Float)})
-    return sympy.trigsimp(found) if sympy.count_ops(found) <= MOST_SIMPLIFIED else found
+    found = _with_fractions(sympy, sympy.expand(x))
+    if sympy.count_ops(found) > MOST_SIMPLIFIED:
+        return found
+    return _with_fractions(sympy, sympy.trigsimp(found))  # which turns fractions beside floats into floats
+
+
+def _with_fractions(sympy, x):
+    """Expression with fractions in the place of the floats that are these."""
+    return x.xreplace({number: _number(sympy, float(number)) for number in x.atoms(sympy.Float)})
 
 
 def _arguments(sympy, system: System, exported: ExportedFunction) -> tuple[dict, dict]:

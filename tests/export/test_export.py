@@ -206,6 +206,12 @@ def test_formulas_have_the_values_of_the_functions(name):
         close([plain(*np.concatenate(vectors))], [wanted])
 
 
+def test_whole_numbers_are_shown_as_such():
+    sympy = pytest.importorskip("sympy")
+    (result,) = export.to_sympy(gauss.load("four_bar"), "mass_matrix").results.values()
+    assert not [number for number in result.atoms(sympy.Float) if float(number).is_integer()]
+
+
 def test_the_document_of_a_pendulum():
     pytest.importorskip("sympy")
     text = export.latex_document(gauss.load("pendulum"))
