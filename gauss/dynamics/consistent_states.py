@@ -182,8 +182,7 @@ def _distance(system: System, state: State) -> float:
 
 def _named(found: dict[str, str]) -> str:
     """Violated constraints with their residuals, the largest first."""
-    more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-    return "; ".join(f"{name!r} {amount}" for name, amount in list(found.items())[:SHOWN]) + more
+    return listed((f"{name!r} {amount}" for name, amount in found.items()), SHOWN)
 
 
 def _keeps(system: System, start: State, kept: State, held) -> bool:

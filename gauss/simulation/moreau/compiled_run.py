@@ -25,7 +25,7 @@ from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_s
 from gauss.simulation.moreau.contact_events import ContactEvents
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
-from gauss.simulation.moreau.unseen_contacts import warn_of_passages
+from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
@@ -73,7 +73,7 @@ class CompiledMoreauRun(CompiledFixedRun):
         found = replace(finished(self, fallback), system=self.whole.system, step=self.step)
         relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
         warn_of_laws(self._law_error(), relaxed, found.stats.steps)
-        warn_of_passages(found)
+        warn_of_unseen_contacts(found)
         return found
 
     def _law_error(self) -> float:

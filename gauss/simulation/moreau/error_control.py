@@ -25,7 +25,7 @@ from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.single_steps import CompiledSingleSteps, PairKernelSingleSteps, ReachedPoint, SingleSteps
 from gauss.simulation.moreau.step_errors import FAILED, LocalError, RateJumps, StepErrors
 from gauss.simulation.moreau.step_record import StepRecord
-from gauss.simulation.moreau.unseen_contacts import StepLimit
+from gauss.simulation.moreau.unseen_contacts import step_limit
 from gauss.simulation.problem import Problem
 from gauss.simulation.progress import Progress
 from gauss.simulation.trajectory import Trajectory
@@ -53,7 +53,7 @@ class ControlledMotion:
         system = problem.system
         self.problem, self.steps, self.errors = problem, steps, StepErrors(system, problem.tolerance, steps)
         self.closes = bool(smooth_system(system).closes)
-        self.least, self.limit = LEAST * system.scale.time, StepLimit(system)
+        self.least, self.limit = LEAST * system.scale.time, step_limit(system)
         self.record = StepRecord(problem, steps)
 
     def collect(self) -> Trajectory:

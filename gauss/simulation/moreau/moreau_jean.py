@@ -27,7 +27,7 @@ from gauss.errors import SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
 from gauss.simulation.moreau.contact_events import ContactEvents
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings, warn_of_laws
-from gauss.simulation.moreau.unseen_contacts import warn_of_passages
+from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, retract
@@ -74,7 +74,7 @@ class MoreauRun(PythonRun):
         self.stepper.refuse_penetration(start)
         found = super().collect(start, samples, progress)
         warn_of_laws(self.error, self.relaxed, self.steps)
-        warn_of_passages(found)
+        warn_of_unseen_contacts(found)
         return found
 
     def _first(self, start: State) -> Point:

@@ -17,7 +17,7 @@ from gauss.simulation.grid import grid_of, with_samples
 from gauss.simulation.moreau.contact_motion import ContactMotion
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, in_words
-from gauss.simulation.moreau.unseen_contacts import warn_of_passages
+from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
@@ -81,7 +81,7 @@ class PairKernelRun(PythonRun):
         self.stepper.refuse_penetration(start)
         found = super().collect(start, samples, progress)
         warn_of_laws(self.motion.largest, self.motion.relaxed, self.steps)
-        warn_of_passages(found)
+        warn_of_unseen_contacts(found)
         return found
 
     def evaluate(self, state: State) -> Rates:

@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.store import cached
 from gauss.errors import ContactLawWarning, user_level
 from gauss.scene import Contact, HalfSpace, Scene
 from gauss.scene.collision import Collider
@@ -59,6 +60,11 @@ class StepLimit:
         return x + out, u + np.cross(W, out), np.linalg.norm(W, axis=1) * self.reach
 
 
+def step_limit(system: System) -> StepLimit:
+    """Limit of a system, made once."""
+    return cached(system, (StepLimit,), lambda: StepLimit(system))
+
+
 def _places(system: System, shapes: list[Collider]) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     """Body of each shape, its middle in the axes of the body (3,) [m], and the radius of a ball around it (k,) [m]."""
     frames, middles = [system.frames[shape.body] for shape in shapes], [shape.corners.mean(axis=0) for shape in shapes]
@@ -67,7 +73,7 @@ def _places(system: System, shapes: list[Collider]) -> tuple[np.ndarray, list[np
     return np.array([frame.body for frame in frames], dtype=int), places, np.array(reach)
 
 
-def warn_of_passages(trajectory: Trajectory):
+def warn_of_unseen_contacts(trajectory: Trajectory):
     """Warn of shapes that fixed steps may carry through one another unseen: no error estimate shows it.
 
     The samples with the largest rates are examined, and some more.
@@ -77,7 +83,7 @@ def warn_of_passages(trajectory: Trajectory):
     ContactLawWarning
         With the names of two shapes, and a time.
     """
-    limit, step = StepLimit(trajectory.system), trajectory.step
+    limit, step = step_limit(trajectory.system), trajectory.step
     if not limit.thickness.size or step is None or not trajectory.v.size:
         return
     fastest = np.argsort(-np.abs(trajectory.v / trajectory.system.scale.rates).max(axis=1))[:EXAMINED]
