@@ -28,6 +28,7 @@ from gauss.simulation.batch.repeated_motions import repeat, tell_of_divergence
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
 from gauss.simulation.held_inputs import real_numbers
+from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts_of_many
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
 from gauss.system import State, System, refuse_changed
@@ -103,6 +104,8 @@ def rollout(
     BalanceWarning
         If the residual of the energy balance of some exceeds a thousandth of their largest energy; it names the worst of
         them.
+    ContactLawWarning
+        If shapes move by more than they are thick within a step: they may pass through each other unseen.
     DivergenceWarning
         If some motions without ``control`` do not reach the end.
 
@@ -178,6 +181,8 @@ def _fixed(
     share = np.where(finite & solved, share, 0.0)
     failed, again = repeat(system, starts, samples, share, doubtful, steps * step, run, control)
     reasons = failed | _left_all_bounds(samples, t, np.flatnonzero(solved & ~finite))
+    if method.nonsmooth:
+        warn_of_unseen_contacts_of_many(system, t, samples, step)
     if control is None:
         tell_of_divergence(system, batch.size, reasons, again)
     counts = {"steps": np.full(batch.size, steps), "rejected": np.zeros(batch.size, int)}
