@@ -254,8 +254,8 @@ class Simulator:
             if self._steps > self._seen:
                 self._look_ahead()
             self._loop.call(*self._given, n)
-        except BaseException:  # of an opaque law: the point is that before
-            self._steps -= n
+        except BaseException:  # Ctrl-C, or of an opaque law
+            self._steps, self._point[:] = self._steps - n, np.frombuffer(self._before)
             raise
         if self._run.control.status:
             self._recover(n)

@@ -250,17 +250,14 @@ class SimulatorBatch:
             self._set(u)
         if self._steps + n > self._ahead.seen_from(0.0):
             self._ahead.look(self._start, (self._steps + n) * self.step_size)
-        batch, before = self._batch, self._batch.points.copy() if self.system.nonsmooth else None
-        batch.worst[:] = 0.0
         self._look_for_passing()
-        batch.advance(self._steps, n, self.step_size, self.threads, self._u if self.inputs else None)
-        self._steps += n
+        batch, before = self._batch, self._advance(n)
         if not self._warned and (batch.unseen > 0.0).any():
             warn_of_passages(self.system, batch.unseen, self.integrator)
             self._warned = True
         finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
         confirmed = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
-        if before is None:
+        if not self.system.nonsmooth:
             self.unconfirmed |= finite & ~confirmed
         else:
             for k in map(int, np.flatnonzero((finite & ~confirmed) | ~solved)):
@@ -269,6 +266,21 @@ class SimulatorBatch:
         self.reasons |= batch.found_reasons()
         if n > 1:
             self._look_for_passing()
+
+    def _advance(self, n: int) -> np.ndarray:
+        """Make steps of all motions, or of none; return the points before, empty for single steps of smooth systems."""
+        batch, single = self._batch, n == 1 and not self.system.nonsmooth and not isinstance(self._batch, SimulatorsInTurn)
+        kept, batch.worst[:] = () if single else tuple(map(copy, batch.kept())), 0.0
+        try:
+            batch.advance(self._steps, n, self.step_size, self.threads, self._u if self.inputs else None)
+        except BaseException:  # Ctrl-C, or an opaque law: single steps are completed, others undone
+            if single:
+                self._steps += n
+            else:
+                batch.keep(*kept)
+            raise
+        self._steps += n
+        return kept[0] if kept else np.zeros((0, 0))
 
     def _look_for_passing(self):
         """Look for shapes that may pass through each other within a step, where that is due."""
