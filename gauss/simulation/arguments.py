@@ -18,12 +18,14 @@ from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
 from gauss.simulation.held_inputs import HeldInputs
 from gauss.simulation.integrators import INTEGRATORS
+from gauss.simulation.memory_limit import SHORTER, refuse_beyond_memory
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
 from gauss.simulation.tolerances import check_tolerances, shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System, refuse_changed
 
+SAMPLE_NUMBERS = 6  # in memory for each sample of a motion, beside coordinates and rates: times, steps and work
 LEAST_CONTROLLED_RTOL = 1e-7  # of time stepping by error control: gaps are rounded, and its order is low
 
 
@@ -60,6 +62,7 @@ def checked_problem(
     start = _start(system) if state is None else system.projected(state)
     samples = sample_times(times, start.t, duration)
     known_breaks = check_breaks(breaks, start.t, duration)
+    _refuse_beyond_memory(system, method, duration, step, samples)
     constraint_drift, laws, end = drift(system, stabilisation, start), Laws(system), start.t + duration
     problem = Problem(
         system,
@@ -82,6 +85,18 @@ def checked_problem(
         problem = problem._replace(method=integrators.RadauGGL())
     warn_of_times(system, problem.switching.times)
     return problem
+
+
+def _refuse_beyond_memory(system: System, method: Integrator, duration: float, step: float | None, samples):
+    """Refuse samples that do not fit into memory: of each step, where no times are given."""
+    count = 0.0 if samples is None else float(len(samples))
+    asked = "times"
+    if samples is None and step is not None and isinstance(method, FixedStep):
+        count, asked = duration / step, f"step: each step of {step:.3g} s"
+    numbers = count * (SAMPLE_NUMBERS + system.n_q + system.n_v)
+    refuse_beyond_memory(
+        numbers, f"{asked}: {count:.3g} samples of {system.scene.name!r}", f"give fewer times=, or {SHORTER}"
+    )
 
 
 def is_controlled(method: Integrator, step: float | None) -> bool:

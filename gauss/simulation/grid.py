@@ -5,11 +5,11 @@ import numpy as np
 from gauss.codegen.kernels import Due
 from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.laws.switching_times import APART, NO_TIMES, Timetable
-from gauss.errors import SimulationError
 from gauss.integrators import FixedStep
+from gauss.simulation.memory_limit import SHORTER, refuse_beyond_memory
 
 EQUAL_TIMES = 1e-9  # relative to the step: closer times are one
-MOST_STEPS = 1e9  # of one motion: their times fill the memory
+STEP_NUMBERS = 4  # in memory for each step of a motion
 SHORTEST_CONTACT_STEP = 1e-3  # relative to the step: the rounding of a gap over the step is a velocity error
 
 
@@ -113,13 +113,10 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
     Raises
     ------
     SimulationError
-        If they are more than :data:`MOST_STEPS`.
+        If they do not fit into memory.
     """
-    if not (end - begin) / step <= MOST_STEPS:
-        raise SimulationError(
-            f"step: {step:.3g} s over {end - begin:.3g} s are {(end - begin) / step:.2g} steps, at most {MOST_STEPS:.0e}; "
-            "continue a longer motion with state=motion.state(-1)."
-        )
+    steps = (end - begin) / step
+    refuse_beyond_memory(STEP_NUMBERS * steps, f"step: {steps:.3g} steps of {step:.3g} s over {end - begin:.3g} s", SHORTER)
     count = max(1, int(np.ceil((end - begin) / step * (1 - EQUAL_TIMES))))
     pairs = np.empty((count, 2))  # in place: a long motion waits for it
     times = pairs[:, 0]

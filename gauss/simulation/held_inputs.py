@@ -10,10 +10,11 @@ from gauss.codegen import Scalar
 from gauss.dynamics.inputs import driven_scene
 from gauss.dynamics.scene_compilation import compile_scene
 from gauss.errors import GaussError, SimulationError
+from gauss.simulation.memory_limit import SHORTER, refuse_beyond_memory
 from gauss.system import System
 
 FLOAT = np.dtype(float)
-MOST_SAMPLES = 1e9  # of one motion: their times fill the memory
+SAMPLE_NUMBERS = 4  # in memory for each sample of the inputs
 EQUAL_SAMPLES = 1e-9  # relative to the time from one sample to the next: closer times are one
 
 
@@ -51,10 +52,8 @@ class HeldInputs:
             raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
         if not isinstance(rate, int | float) or not np.isfinite(rate) or rate <= 0:
             raise SimulationError(f"rate: expected a positive number of samples in a second [Hz], got {rate!r}.")
-        if (asked := (end - start) * rate) > MOST_SAMPLES:
-            raise SimulationError(
-                f"rate: {rate:.3g} Hz are {asked:.2g} samples of this motion, of at most {MOST_SAMPLES:.0e}."
-            )
+        asked = (end - start) * rate
+        refuse_beyond_memory(SAMPLE_NUMBERS * asked, f"rate: {rate:.3g} Hz are {asked:.2g} samples that", SHORTER)
         count = max(1, int(np.ceil((end - start) * rate - EQUAL_SAMPLES)))
         self.rate, self.times, self.end = float(rate), start + np.arange(count) / rate, end
         self.values: list[np.ndarray] = []

@@ -28,6 +28,7 @@ from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_runs import fixed_run
 from gauss.simulation.held_inputs import HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
+from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
 from gauss.simulation.moreau.unseen_contacts import PassingWatch
@@ -42,7 +43,7 @@ FAILURES = {
     LoopStatus.OFF_CONSTRAINTS: "the projection onto the constraints failed",
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
 }
-MOST_STEPS = 10**8  # of one call: their times fill the memory
+STEP_NUMBERS = 6  # in memory for each step of a call
 STEPS = {("compiled loop", code) for code in ("embedded loops", "compiled", "callbacks")}
 STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
 
@@ -294,8 +295,7 @@ class Simulator:
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
         n = checked_count("n", n)
-        if n > MOST_STEPS:
-            raise SimulationError(f"n: expected no more than {MOST_STEPS} steps in a call, got {n}.")
+        refuse_beyond_memory(STEP_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
         if n > len(self._grid):
             self._grid = _unchecked(n)
             self._bind()

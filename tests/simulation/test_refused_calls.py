@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.errors import GaussError
+from gauss.errors import GaussError, SimulationError
+from gauss.simulation.sweeps import ranges
 
 STEP = 1e-3
 PAIR = np.zeros(2)
@@ -28,6 +29,7 @@ NOT_PAIRS = {
     "nothing in a list": [None, None],
 }
 NOT_COUNTS = (0, -1, 1.5, "2", None)
+MANY = 10**14  # numbers that no machine has room for
 NOT_POSITIVE = (0, -1.0, np.nan, np.inf, "a")
 
 
@@ -140,6 +142,23 @@ def test_counts(bad):
     refused(lambda: gauss.SimulatorBatch(SYSTEM, STEP, bad))
     refused(lambda: gauss.SimulatorBatch(SYSTEM, STEP, 2, threads=bad))
     refused(lambda: gauss.rollout(SYSTEM, [PAIR], [PAIR], steps=bad, step=STEP))
+
+
+def test_what_does_not_fit_into_memory():
+    simulator = gauss.Simulator(SYSTEM, STEP)
+    for call in (
+        lambda: simulator.step([1.0], n=MANY),
+        lambda: gauss.SimulatorBatch(SYSTEM, STEP, MANY),
+        lambda: gauss.rollout(SYSTEM, [PAIR], [PAIR], steps=MANY, step=STEP),
+        lambda: gauss.rollout(SYSTEM, [PAIR], [PAIR], steps=10**3 * MANY, step=STEP, every=10**3),
+        lambda: gauss.simulate(SYSTEM, MANY * STEP, integrator="rk4", step=STEP, progress=False),
+        lambda: gauss.simulate(SYSTEM, MANY * STEP, integrator="rk4", step=STEP, times=[1.0], progress=False),
+        lambda: gauss.sweep(SYSTEM.scene, {"pole.mass": [1.0, 2.0]}, 1.0, samples=MANY),
+        lambda: gauss.sweep(SYSTEM.scene, dict.fromkeys(("pole.mass", "cart.mass"), np.ones(10**7)), 1.0),
+        lambda: ranges([f"pole.mass=1:2:{MANY}"]),
+    ):
+        with pytest.raises(SimulationError, match="GiB"):
+            call()
 
 
 @pytest.mark.parametrize("bad", NOT_POSITIVE)

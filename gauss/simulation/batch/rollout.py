@@ -29,6 +29,7 @@ from gauss.simulation.batch.repeated_motions import repeat, tell_of_divergence
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
 from gauss.simulation.held_inputs import real_numbers
+from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts_of_many
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
@@ -162,6 +163,7 @@ def _fixed(
     """Batch with fixed steps."""
     steps, step = _checked_steps(steps, step, every)
     starts = columns(system, q0, v0)
+    _refuse_beyond_memory(system, starts, steps // every + 1, "give fewer motions or steps, or a larger every=")
     control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
     if not system.n_v:
         return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
@@ -204,6 +206,12 @@ def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[i
         raise SimulationError("steps: expected a positive whole number, got None.")
     _check_counts({"steps": steps, "every": every})
     return steps, step
+
+
+def _refuse_beyond_memory(system: System, starts: np.ndarray, samples: int, remedy: str):
+    """Refuse a batch whose samples, with times and work, do not fit into memory."""
+    numbers = (starts.shape[1] * (len(starts) + 3) + 2) * samples
+    refuse_beyond_memory(numbers, f"{samples:.3g} samples of {starts.shape[1]} motions of {system.scene.name!r}", remedy)
 
 
 def _begun(system: System, starts: np.ndarray, method: FixedStep, held: bool, device: str | None):
@@ -276,6 +284,7 @@ def _adaptive(
     if t[-1] <= 0.0:
         raise SimulationError("times: expected the last one to be after the start, 0 s.")
     starts = columns(system, q0, v0)
+    _refuse_beyond_memory(system, starts, t.size, "give fewer motions or times")
     if not system.n_v:
         return _constant(system, starts, t, 0)
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}

@@ -28,12 +28,15 @@ from gauss.simulation.batch.machine_code import STEPPED, batch_program, contact_
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import numbers_in_words, real_numbers
 from gauss.simulation.integrators import usual_fixed_step
+from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.unseen_contacts import MOTIONS, PassingWatch
 from gauss.simulation.passed_switching import StepsAhead
 from gauss.simulation.simulator import Simulator, SimulatorState
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import warn_of_passages
 from gauss.system import State, System, retract
+
+POINT_COPIES = 4  # of times, coordinates and rates of a motion, that a batch holds at least: with accelerations and starts
 
 
 class SimulatorBatchState(NamedTuple):
@@ -122,6 +125,8 @@ class SimulatorBatch:
         with one_tier():
             self._begin, self._measure = self._compiled(method)
         self._start, self._size = system.initial_state(), checked_count("batch", batch)
+        many = f"batch: {self._size:.3g} motions of {whole.name!r}"
+        refuse_beyond_memory(POINT_COPIES * self._size * (1 + system.n_q + system.n_v), many, "give a smaller batch")
         self._passing = PassingWatch(system, self.step_size)
         self._ahead = StepsAhead(system, Laws(system), self.step_size)
         self._ahead.look(self._start, self._start.t + self.step_size)

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
 
 import numpy as np
 
 from gauss.errors import SceneError
+from gauss.simulation.memory_limit import refuse_beyond_memory
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class Members:
     @property
     def size(self) -> int:
         """Number of members."""
-        return int(np.prod(self.shape))
+        return prod(self.shape)
 
     def of(self, begin: int, end: int) -> list[dict[str, float]]:
         """Values of some members by name."""
@@ -93,6 +95,8 @@ def ranges(texts: Sequence[str]) -> dict[str, np.ndarray]:
     ------
     SceneError
         If a text is neither.
+    SimulationError
+        If the values do not fit into memory.
     """
     found = {}
     for text in texts:
@@ -102,6 +106,7 @@ def ranges(texts: Sequence[str]) -> dict[str, np.ndarray]:
                 raise ValueError
             if ":" in values:
                 first, last, count = values.split(":")
+                refuse_beyond_memory(int(count), f"vary: {text!r}: {int(count):.3g} values", "give fewer")
                 found[name] = np.linspace(float(first), float(last), int(count))
             else:
                 found[name] = np.array([float(value) for value in values.split(",")])

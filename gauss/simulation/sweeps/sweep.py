@@ -20,6 +20,7 @@ from gauss.simulation import INTEGRATORS, Trajectory
 from gauss.simulation.arguments import check_arguments, refuse_without_step
 from gauss.simulation.batch.fixed_step_batch import cores
 from gauss.simulation.energy_balance import warn_of_many
+from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.progress import Progress
 from gauss.simulation.provenance import made_by, plain, scene_text
 from gauss.simulation.sweeps.batch import FAILED, MISSING, SweepTask, run
@@ -118,6 +119,7 @@ def sweep(
     library("xarray")
     chosen = members(vary, together)
     system = _first(scene, chosen)
+    _refuse_beyond_memory(system, samples, chosen, path)
     allowed = shares_of_scale(system, DEFAULT_ATOL) if atol is None else atol
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed}
     task = SweepTask(
@@ -223,6 +225,14 @@ def _name(chosen: Members, k: int) -> str:
     """Name of a member: its parameter values."""
     values = ", ".join(f"{name} = {value:.6g}" for name, value in chosen.of(k, k + 1)[0].items())
     return f"member {k} ({values})"
+
+
+def _refuse_beyond_memory(system: System, samples: int, chosen: Members, path):
+    """Refuse members whose samples, with their times, do not fit into memory together; on disk, each of them."""
+    count = chosen.size if path is None else 1
+    remedy = "give fewer samples or members, or write them to path= as they are made"
+    numbers = samples * count * (2 + system.n_q + system.n_v)
+    refuse_beyond_memory(numbers, f"{samples:.3g} samples of {count:.3g} members", remedy)
 
 
 def _about(task: SweepTask, system: System) -> dict:
