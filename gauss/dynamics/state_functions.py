@@ -45,6 +45,7 @@ StateError
 """
 LARGEST_RATIO = 1e8  # of a rate to an independent one, in units of the scene: beyond, that one does not determine it
 NULL_SPACE_RESIDUAL = 1e-6  # K N, relative to the scales of the rows: where rates are not determined it is of order one
+LINEAR = ("coriolis_matrix", "jacobian_rate", "momentum")  # in the rates: finite where these are
 ARGUMENTS = "q", "v", "acceleration", "load"  # in this order
 
 
@@ -203,10 +204,12 @@ def _function(system: System, requests, columns) -> TracedFunction:
         arguments = dict(zip(names, given[:-1], strict=True))
         q, v, (t,) = arguments["q"], arguments.get("v", np.zeros(system.n_v)), given[-1]
         terms = StateTerms(system, q, v, t) if columns is None else ConstrainedTerms(system, q, v, t, columns)
-        found = (_traced(TERMS[one.name], terms, one, arguments) for one in requests)
-        results = [part for result in found for part in (result if isinstance(result, tuple) else (result,))]
+        found = [_traced(TERMS[one.name], terms, one, arguments) for one in requests]
+        parts = [result if isinstance(result, tuple) else (result,) for result in found]
         of_loops = columns is not None or any(TERMS[one.name].of_loops for one in requests)
-        return *results, error_measures(terms, given, of_loops)
+        residual, total, *others = error_measures(terms, given, of_loops)
+        overflow = sum(_overflow(one.name, own, v) for one, own in zip(requests, parts, strict=True))
+        return *(part for own in parts for part in own), [residual, total + overflow, *others]
 
     name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
     return TracedFunction(lambda: write(values, *interface.sizes, 1, name="state"), interface, name)
@@ -274,6 +277,14 @@ def _shapes(system: System, requests, columns) -> tuple[tuple[int, ...], ...]:
         return size_of(system, one.frame) if letter == "p" else sizes[letter] if letter in sizes else int(letter)
 
     return tuple(tuple(length(one, letter) for letter in shape) for one, shape in shapes)
+
+
+def _overflow(name: str, results: tuple, v: np.ndarray):
+    """Sum that is finite only if results of rates are: of vectors, and of squares of the rates, with which matrices grow."""
+    if "v" not in TERMS[name].arguments or name in LINEAR:
+        return 0.0
+    vectors = [np.ravel(part).sum() for part in results if np.ndim(part) < 2]
+    return sum(vectors) + ((v * v).sum() if len(vectors) < len(results) else 0.0)
 
 
 def error_limits(columns) -> tuple[float, ...]:

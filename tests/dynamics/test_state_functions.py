@@ -416,6 +416,33 @@ def test_mistakes_are_named(arm, case):
         call(arm, q, v)
 
 
+OF_SQUARED_RATES = (
+    "bias_forces",
+    "kinetic_energy",
+    "inverse_dynamics",
+    "inverse_dynamics_derivatives",
+    "acceleration_derivatives",
+)
+
+
+@pytest.mark.parametrize("name", OF_SQUARED_RATES)
+def test_results_that_overflow_are_refused(arm, name):
+    function, ((q,), (v,)) = arm.function(name), states(arm, 1)
+    given = [v] * (name.startswith("inverse") or name.startswith("acceleration"))
+    assert np.isfinite(np.concatenate([np.ravel(part) for part in np.atleast_1d(function(q, 1e100 * v, *given))])).all()
+    for rates in (1e200 * v, np.array([v, 1e200 * v])):
+        with pytest.raises(StateError, match="no finite result"):
+            function(
+                np.broadcast_to(q, rates.shape[:-1] + q.shape), rates, *(np.broadcast_to(u, rates.shape) for u in given)
+            )
+
+
+@pytest.mark.parametrize("name", ["coriolis_matrix", "momentum"])
+def test_results_that_are_linear_in_the_rates_do_not_overflow(arm, name):
+    (q,), (v,) = states(arm, 1)
+    np.testing.assert_allclose(arm.function(name)(q, 1e200 * v) / 1e200, arm.function(name)(q, v), rtol=1e-12, atol=1e-12)
+
+
 def test_coordinates_that_determine_nothing_are_refused():
     system = gauss.compile_scene(gauss.load("slider_crank"))
     start = system.initial_state()
