@@ -41,6 +41,7 @@ FAILURES = {
     LoopStatus.OFF_CONSTRAINTS: "the projection onto the constraints failed",
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
 }
+FEW_STEPS = 16  # so many times are written one by one in less time than as arrays
 MOST_STEPS = 10**8  # of one call: their times fill the memory
 STEPS = {("compiled loop", code) for code in ("embedded loops", "compiled", "callbacks")}
 STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
@@ -284,14 +285,23 @@ class Simulator:
 
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
-        n = checked_count("n", n)
+        if type(n) is not int or not 0 < n <= len(self._grid):
+            n = self._room_for(checked_count("n", n))
+        begin, h, first = self._begun, self.step_size, self._steps + 1
+        few = n <= FEW_STEPS
+        self._times[:n] = (
+            [begin + h * k for k in range(first, first + n)] if few else begin + h * np.arange(first, first + n)
+        )
+        self._steps += n
+
+    def _room_for(self, n: int) -> int:
+        """Let the grid hold the steps of a call, of which it returns the number."""
         if n > MOST_STEPS:
             raise SimulationError(f"n: expected no more than {MOST_STEPS} steps in a call, got {n}.")
         if n > len(self._grid):
             self._grid = _unchecked(n)
             self._bind()
-        self._times[:n] = self._begun + self.step_size * np.arange(self._steps + 1, self._steps + n + 1)
-        self._steps += n
+        return n
 
     def _recover(self, n: int):
         """Repeat steps of contacts in Python; raise a SimulationError where a step has failed."""
