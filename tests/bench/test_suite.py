@@ -10,7 +10,7 @@ import pytest
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference
 from gauss.bench.suite import CLASSES, instances, recipes
-from gauss.bench.suite.check import EXACT, ROUNDED, checked
+from gauss.bench.suite.catalogue import EXACT, ROUNDED, checked
 from gauss.bench.suite.classes.mechanisms import of_compulsion
 from gauss.bench.suite.doubled import product
 from gauss.bench.suite.instance import SOLVED, with_reference

@@ -3,7 +3,7 @@
 from importlib import import_module
 
 import gauss
-from gauss.docs import plans, reference
+from gauss.docs import generated, reference
 from gauss.docs.groups import GROUPS
 from gauss.docs.uses import names_in, uses
 from gauss.dynamics.plan import MOTIONS
@@ -60,6 +60,6 @@ def test_pages_of_the_reference_name_what_they_document():
 
 
 def test_the_table_of_plans_has_a_row_for_every_rule():
-    tables = plans.plan_tables()
+    tables = generated.plan_tables()
     for number, rule in enumerate(MOTIONS.rules, 1):
         assert f"| {number} | {rule.driver} | {rule.dynamics} | " in tables

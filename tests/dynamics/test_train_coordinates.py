@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.train_coordinates import followers, on_trains
+from gauss.dynamics.gear_trains import followers, on_trains
 
 ROUNDOFF = 8 * np.finfo(float).eps  # residual of a coupling relative to its terms: round-off of one state, none of a sum
 STEPS, STEP = 5_000, 1e-3  # after which coordinates that are summed by themselves are some 1e-14 apart

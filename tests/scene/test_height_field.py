@@ -8,7 +8,7 @@ import gauss
 from gauss.errors import SceneError
 from gauss.rotations import from_quaternion
 from gauss.scene.contact_patch import SLOTS, SolidPose, solid_of
-from gauss.scene.solid_pairs import solid_pair
+from gauss.scene.patch_distances import solid_pair
 from gauss.scene.terrain import Terrain
 from tests.scene.test_contact_shapes import EXACT, MAKE, SMOOTH
 from tests.support.terrain import in_coal
