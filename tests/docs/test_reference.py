@@ -2,6 +2,8 @@
 
 from importlib import import_module
 
+import pytest
+
 import gauss
 from gauss.docs import generated, reference
 from gauss.docs.groups import GROUPS
@@ -42,6 +44,7 @@ def test_every_name_of_gauss_is_used_by_a_page_or_an_example():
     assert [name for name in typed if f"gauss.{name}" not in used] == []
 
 
+@pytest.mark.slow
 def test_every_public_name_has_an_example():
     used = uses()
     assert [name for name in GROUPED if name not in used and name not in EXAMPLES] == []

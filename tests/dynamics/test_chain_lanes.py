@@ -198,6 +198,7 @@ def _related() -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*WALKERS, *LOOPS])
 def test_equal_numbers_belong_to_each_chain_once(name):
     system = gauss.compile_scene((WALKERS | LOOPS)[name]())
@@ -234,6 +235,7 @@ LEFT_ALONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEFT_ALONE)
 def test_other_mechanisms_keep_their_code(name):
     system = gauss.compile_scene(LEFT_ALONE[name]())

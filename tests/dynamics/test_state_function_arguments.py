@@ -39,6 +39,7 @@ def states(system, count):
     return np.array([state.q for state in found]), np.array([state.v for state in found])
 
 
+@pytest.mark.slow
 def test_a_batch_is_made_of_single_states_bit_for_bit(arm):
     Q, V = states(arm, 13)
     functions = [arm.bias_forces, arm.mass_matrix, arm.function(*names(arm)), arm.function("kinetic_energy")]
@@ -152,6 +153,7 @@ MISTAKES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", MISTAKES)
 def test_mistakes_are_named(arm, case):
     call, kind, words = MISTAKES[case]

@@ -82,16 +82,19 @@ def check_against_pinocchio(scene, references):
                 assert max(relative(*pair) for pair in pairs) <= tolerance, (name, reference)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_trees_agree_with_pinocchio(name):
     check_against_pinocchio(TREES[name](), REFERENCES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*QUICK_ROBOTS, *(pytest.param(name, marks=pytest.mark.slow) for name in ROBOTS)])
 def test_robots_agree_with_pinocchio(name):
     check_against_pinocchio(gauss.load(f"robot:{name}", mimic=False), ["local"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*QUICK_ROBOTS, *(pytest.param(name, marks=pytest.mark.slow) for name in ROBOTS)])
 def test_robots_agree_with_mujoco(name):
     mujoco = pytest.importorskip("mujoco")
@@ -123,6 +126,7 @@ def test_robots_agree_with_mujoco(name):
     assert relative(position, data.body(body).xpos) <= AGREEMENT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_the_terms_agree_with_each_other(name):
     system = gauss.compile_scene(TREES[name]())
@@ -144,6 +148,7 @@ def test_the_terms_agree_with_each_other(name):
     assert rate(system.potential_energy) == pytest.approx(g @ v, rel=OF_STEPS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_the_coriolis_matrix_has_the_symmetry_of_christoffel_symbols(name):
     """C(v) w − C(w) v = M [v, w], the bracket of rates: v × w of angular velocities about moving axes, else zero."""
@@ -160,6 +165,7 @@ def test_the_coriolis_matrix_has_the_symmetry_of_christoffel_symbols(name):
     assert np.abs(torsion - system.mass_matrix(q) @ bracket).max() <= AGREEMENT * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(name):
     scene, joint = LOOPS[name]
@@ -194,6 +200,7 @@ def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(n
     assert relative(J_rate, rate(lambda q: system.jacobian(q, frame, **which))) <= 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_derivatives_for_independent_coordinates_are_those_of_the_motion_on_the_constraints(name):
     """Against the linear model of the same state, and against each other: inverse dynamics undoes the accelerations."""
@@ -213,6 +220,7 @@ def test_derivatives_for_independent_coordinates_are_those_of_the_motion_on_the_
         assert np.abs(by_effort @ found + undone).max() <= 1e-9 * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_independent_rates_meet_the_loop_constraints(name):
     scene, joint = LOOPS[name]
@@ -234,6 +242,7 @@ DIFFERENTIATED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DIFFERENTIATED)
 def test_derivatives_agree_with_those_of_one_state(name):
     system = gauss.compile_scene(DIFFERENTIATED[name]())
@@ -244,6 +253,7 @@ def test_derivatives_agree_with_those_of_one_state(name):
         assert relative(part, other) <= 1e-11 or not other.any()
 
 
+@pytest.mark.slow
 def test_derivatives_of_inverse_dynamics_undo_those_of_the_accelerations():
     system = gauss.compile_scene(TREES["tree of all kinds"]())
     state = random_state(system, np.random.default_rng(4))

@@ -67,6 +67,7 @@ def separation(one, other, poses, normal) -> float:
     return -sum(ends)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_the_nearest_point_of_a_patch_is_that_of_coal(one, other):
     first, second, rng, seen = shape(one, "A"), shape(other, "B"), np.random.default_rng(2), 0

@@ -107,6 +107,7 @@ def test_what_is_deep_in_the_field_is_pushed_up(kind, depth):
     assert all(point.normal @ (0, 0, 1) > 0.99 for point in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sphere", "box"])
 def test_only_cells_under_a_body_are_looked_at(monkeypatch, kind):
     seen, under = [], Terrain.under
