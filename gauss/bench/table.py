@@ -120,7 +120,7 @@ def _parted(lines: Iterable[str]) -> tuple[list[str], list[str]]:
 
 
 def _lasting(comments: list[str]) -> list[str]:
-    """Lines of a header but those of the date and of the commit, and without the version of gauss, which the commit tells."""
+    """Lines of a header without date, commit, and the version of gauss, which the commit tells."""
     return [re.sub(OWN_VERSION, "", line) for line in comments[1:] if not line.startswith(COMMIT)]
 
 
