@@ -167,7 +167,7 @@ class SolidPair:
         return height
 
     def patch(self, one: SolidPose, other: SolidPose, normal: np.ndarray, reach: float) -> tuple[list[ContactPoint], float]:
-        """Corners of one face over the other, and the distance of the solids along its normal [m]."""
+        """Corners of one face over the other, and the distance of the solids along its normal, as of :meth:`_across` [m]."""
         assert self.second is not None
         toward = -normal.dot(one.R), normal.dot(other.R)
         faces = self.first.face(toward[0]), self.second.face(toward[1])
@@ -182,13 +182,21 @@ class SolidPair:
         incident = distant.face(-out.dot(far.R))
         seen = incident.points.dot(far.R.T.dot(own.R)) + (far.x - own.x).dot(own.R)
         heights = (seen - face.points[0]).dot(upward).tolist()
-        across, low = min(heights) - incident.radius, _low(seen, heights, face, reach + incident.radius)
+        across = self._across(
+            min(heights) - incident.radius, out, far, distant, float(out.dot(own.x) + upward.dot(face.points[0]))
+        )
+        low = _low(seen, heights, face, reach + incident.radius)
         if not low:
             return [], across
         table, up = np.array(low), out if k else -out
         depths = table[:, 3:] if k else incident.radius
         places = own.x + (table[:, :3] - depths * upward).dot(own.R.T)
         return [ContactPoint(p[3] - incident.radius, place, up) for p, place in zip(low, places, strict=True)], across
+
+    def _across(self, height: float, out: np.ndarray, far: SolidPose, distant: Solid, base: float) -> float:
+        """Height of a face over another one at ``base``, if it is that of its solid; −∞ if other faces of this are lower."""
+        lowest = out.dot(far.x) - base - float(distant.extent(-out.dot(far.R)[None])[0])
+        return -inf if height > lowest + SAME_DEPTH * self.size else height
 
 
 def _below(vertices: np.ndarray, one: SolidPose, plane: SolidPose, reach: float) -> list[ContactPoint]:
