@@ -7,13 +7,14 @@ GJK and EPA: Gilbert, Johnson, Keerthi, IEEE J. Robot. Autom. 4, 1988; van den B
 IEEE Trans. Robot. 40, 2024). Clipping: Sutherland, Hodgman, Comm. ACM 17, 1974.
 """
 
+from functools import lru_cache
 from math import dist, inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
-from gauss.scene.convex_mesh import ConvexMesh
+from gauss.scene.convex_mesh import MESHES, ConvexMesh, hull_of
 from gauss.scene.curved_shapes import Cone, Cylinder, Ellipsoid
 from gauss.scene.support_faces import Face, Oval, Polytope, Revolved, Segment
 
@@ -51,7 +52,7 @@ def solid_of(shape: Collider) -> Solid | None:
     if isinstance(shape, HalfSpace):
         return None
     if isinstance(shape, ConvexMesh):
-        return Polytope(*shape.hull)
+        return _polytope(shape.vertices)
     if isinstance(shape, Box):
         return _box(0.5 * np.array(shape.size))
     if isinstance(shape, Ellipsoid):
@@ -60,6 +61,11 @@ def solid_of(shape: Collider) -> Solid | None:
         return Segment(0.5 * getattr(shape, "length", 0.0), shape.radius)
     assert isinstance(shape, Cylinder | Cone)
     return Revolved(shape.radius, float(shape.half_edges[2]), isinstance(shape, Cone))
+
+
+@lru_cache(maxsize=MESHES)
+def _polytope(vertices: tuple) -> Polytope:
+    return Polytope(*hull_of(vertices))
 
 
 def _box(half: np.ndarray) -> Polytope:

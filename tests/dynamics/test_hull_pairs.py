@@ -15,6 +15,7 @@ from gauss.scene.support_faces import Segment
 from tests.scene.test_contact_shapes import random_pose, shape
 
 COAL = 2e-10  # [m] of coal's distances of shapes of the size of 1 m
+ROUGH = 1e-6  # [m] distances below which coal's normals have few digits
 EXACT = 1e-12  # [m] of places and heights over planes that support both shapes
 REACH = 0.3  # [m]
 PAIRS = ("mesh", "mesh"), ("box", "mesh"), ("sphere", "mesh"), ("capsule", "mesh")
@@ -43,7 +44,7 @@ def outside(solid, pose: SolidPose, place: np.ndarray) -> float:
     own = pose.R.T @ (place - pose.x)
     if isinstance(solid, Segment):
         return float(np.linalg.norm(own - [0.0, 0.0, np.clip(own[2], -solid.half, solid.half)])) - solid.radius
-    return max(float((own - face.points[0]) @ face.normal) for face in solid.faces)
+    return max(float((own - face.points[0]) @ face.normal) for face in map(solid.faces, range(len(solid.normals))))
 
 
 @pytest.mark.parametrize("kinds", PAIRS)
@@ -59,7 +60,8 @@ def test_the_nearest_points_are_those_of_coal_and_lie_on_both_hulls(kinds):
             one = SolidPose(one.R, one.x - nearest.normal * way)
         nearest, found = pair.nearest(one, other), points(solids, (one, other))
         assert found is not None
-        assert len(found) == len(pair.points(one, other, REACH))
+        if abs(nearest.gap) > ROUGH:
+            assert len(found) == len(pair.points(one, other, REACH))
         if nearest.gap > REACH:
             continue
         least = found[np.argmin(found[:, 0])]

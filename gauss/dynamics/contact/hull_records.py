@@ -1,13 +1,16 @@
 """Records of the convex hulls of shapes in memory, for :mod:`gauss.codegen.kernels.hull_points`."""
 
+from functools import lru_cache
+
 import numpy as np
 
-from gauss.codegen.kernels.hull_points import MOST_CORNERS, RECORD
+from gauss.codegen.kernels.hull_points import CORNER, MOST_CORNERS, RECORD
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.scene import Box, Capsule, ConvexMesh, Sphere
 from gauss.scene.contact_patch import solid_of
 from gauss.scene.support_faces import Polytope, Segment
 
+KEPT = 1024  # records: copies of a mesh share theirs
 HULLS = Sphere, Capsule, Box, ConvexMesh  # of points, thickened by a radius
 
 
@@ -21,17 +24,19 @@ class HullRecord:
     """
 
     def __init__(self, solid: Polytope | Segment):
-        faces = solid.faces if isinstance(solid, Polytope) else []
-        vertices = solid.vertices if isinstance(solid, Polytope) else solid.points
-        is_small = max((len(face.points) for face in faces), default=0) <= MOST_CORNERS
-        corners = [np.column_stack([face.points, face.sides]) for face in faces if face.sides is not None]
-        self.numbers = np.array([0.0 if faces else solid.radius, solid.size])  # type: ignore[union-attr]
-        self.vertices = np.ascontiguousarray(vertices, dtype=float)
-        self.normals = np.array([face.normal for face in faces], dtype=float).reshape(-1, 3)
-        self.first_corner = np.cumsum([0, *(len(face.points) for face in faces)], dtype=np.int64)
-        self.corners = np.concatenate([np.zeros((0, 7)), *corners])
+        if isinstance(solid, Polytope):
+            radius, vertices, normals, first, corners = 0.0, solid.vertices, solid.normals, solid.first_corner, solid.corners
+        else:
+            radius, vertices, normals = solid.radius, solid.points, np.zeros((0, 3))
+            first, corners = np.zeros(1), np.zeros((0, CORNER))
+        self.numbers = np.array([radius, solid.size])
+        self.vertices, self.normals, self.corners = (
+            np.ascontiguousarray(x, dtype=float) for x in (vertices, normals, corners)
+        )
+        self.first_corner = np.ascontiguousarray(first, dtype=np.int64)
+        is_small = np.diff(self.first_corner).max(initial=0) <= MOST_CORNERS
         arrays = self.numbers, self.vertices, self.normals, self.first_corner, self.corners
-        counts = len(self.vertices) if is_small else 0, len(faces)
+        counts = len(self.vertices) if is_small else 0, len(self.normals)
         self.record = np.array([*counts, *(array.ctypes.data for array in arrays)], dtype=np.int64)
         assert self.record.size == RECORD
 
@@ -46,4 +51,7 @@ def hull_records(table: ShapeTable) -> list[HullRecord | None]:
     if not any(part.kind is ConvexMesh for part in table.parts):
         return [None] * len(table.parts)
     solids = (solid_of(table.scene.shapes[part.shape]) if part.kind in HULLS else None for part in table.parts)
-    return [HullRecord(solid) if isinstance(solid, Polytope | Segment) else None for solid in solids]
+    return [_record(solid) if isinstance(solid, Polytope | Segment) else None for solid in solids]
+
+
+_record = lru_cache(maxsize=KEPT)(HullRecord)
