@@ -153,6 +153,7 @@ def _file(folder, bodies, rest="", head=""):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", ELEMENTS)
 def test_elements_accelerate_as_in_mujoco(tmp_path, name):
@@ -167,6 +168,7 @@ def test_paths_through_geoms_accelerate_as_in_mujoco(tmp_path, name):
     assert deviation(path, quietly(path)) < WITHIN
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", HELD)
 def test_held_tendons_accelerate_as_in_mujoco(tmp_path, name):

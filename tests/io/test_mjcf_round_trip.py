@@ -29,6 +29,7 @@ def _again(folder, scene, **options) -> gauss.Scene:
     return quietly(path, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped().keys() - WITHOUT))
 def test_shipped_models_are_read_as_they_were_written(tmp_path, name):
     scene = gauss.load(name)

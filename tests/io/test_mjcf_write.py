@@ -56,6 +56,7 @@ def test_robots(name):
     assert accelerations < SAME
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("order", ["ABCD", "BCDA"])
 def test_loops_of_hinges(order):
@@ -75,6 +76,7 @@ def loaded(kind: str):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("kind", KINDS)
 def test_drives(kind):
@@ -102,6 +104,7 @@ LOADS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", LOADS)
 def test_loads(name):
