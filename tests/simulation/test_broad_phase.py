@@ -47,6 +47,7 @@ CLOUDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOUDS)
 def test_a_grid_finds_the_contacts_of_all_pairs(name, monkeypatch):
     system, found = gauss.compile_scene(CLOUDS[name]()), []

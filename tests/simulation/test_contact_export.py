@@ -33,6 +33,7 @@ def instant(request):
     return system, motion.state(len(motion) - 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["clarabel", "scs"])
 def test_solvers_of_cone_programmes_find_the_rates_of_ours(instant, solver):
     """Impulses need not be unique, rates after the step are those of one W r."""

@@ -153,6 +153,7 @@ def test_profiles_from_the_command_line(tmp_path, name):
         assert np.load(motion)["v"][-1, 0] == pytest.approx(expected, rel=1e-6, abs=1e-9)  # rk4 is of order 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", [1e-9, 1e-3, 1.0, 1e5, 1e9])
 @pytest.mark.parametrize("method", [{}, {"integrator": "radau5", "rtol": 1e-9}, {"integrator": "rk4", "step": 0.01}])
 def test_times_may_have_any_unit(method, unit):
