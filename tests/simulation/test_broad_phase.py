@@ -8,6 +8,8 @@ from benchmarks.free_bodies import free_body
 from gauss.dynamics.contact import near_detection
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 
+pytestmark = pytest.mark.slow
+
 SPREAD = 0.5  # half edge of the cloud [m]
 
 
@@ -47,7 +49,6 @@ CLOUDS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOUDS)
 def test_a_grid_finds_the_contacts_of_all_pairs(name, monkeypatch):
     system, found = gauss.compile_scene(CLOUDS[name]()), []

@@ -144,6 +144,7 @@ def _ending(last: float) -> gauss.System:
     return gauss.compile_scene(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("failed", [lambda: 1 / 0, lambda: np.nan])
 def test_a_law_that_fails_beside_contacts_of_many_operations_leaves_the_state_before(failed):
     scene = with_boxes(gauss.load("double_pendulum"))

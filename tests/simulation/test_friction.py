@@ -194,6 +194,7 @@ def _rod(friction, speed, spin=0.0):
 
 
 # K m = 1 + 3 cos θ (cos θ ± μ sin θ), 1.1 rad: negative beyond μ = 1.334, sliding ahead
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "speed", "spin", "kind"),
     [

@@ -206,6 +206,7 @@ def test_a_leg_that_falls_comes_to_rest_on_its_stops_and_the_floor():
     assert total[-1] < total[0] - 0.1 * energy.scale
 
 
+@pytest.mark.slow
 def test_time_stepping_tells_painleves_paradox():
     scene, radius = gauss.load("painleve_rod"), 1e-3
     scene.shapes["end"] = replace(scene.shapes["end"], radius=radius)

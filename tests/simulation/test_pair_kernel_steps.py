@@ -90,6 +90,7 @@ def ball(restitution: float, friction: float, height: float, speed: float) -> ga
     return scene
 
 
+@pytest.mark.slow
 def test_impacts_are_events_with_the_energy_that_they_lose():
     motion = gauss.simulate(
         ball(0.5, 0.0, 0.2, 0.0), 0.7, integrator="time_stepping", step=STEP, progress=False, plan=KERNELS

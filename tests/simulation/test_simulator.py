@@ -84,6 +84,7 @@ def test_motions_that_diverge_end_with_an_error_in_the_state_before_the_call(n, 
     assert np.isfinite(sim.state.q).all() and sim.t == pytest.approx(n * 10 * STEP)
 
 
+@pytest.mark.slow
 def test_many_steps_in_one_call_are_single_steps():
     one, many = (simulator("cart_pole", "rail", None) for _ in range(2))
     one.step([0.5])
