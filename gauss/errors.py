@@ -178,6 +178,7 @@ DISTRIBUTIONS = {  # of imports
     "imageio_ffmpeg": "imageio-ffmpeg",
     "pinocchio": "pin",
     "pxr": "usd-core",
+    "robot_descriptions": "robot-descriptions",
     "sksundae": "scikit-sundae",
     "yaml": "pyyaml",
 }

@@ -39,6 +39,13 @@ class SystemDynamics(Store):
         """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""
         return evaluation_cost(system, plan), slowdown(system, plan)
 
+    def equal_chains(self, system: System, plan: Plan) -> list[tuple[int, int]]:
+        """Numbers of equal chains that code of single states may compute together, and of their joints, for each kind."""
+        from gauss.dynamics.chain_lanes import chains_for_lanes
+
+        kinds = chains_for_lanes(system) if plan.dynamics in ("compiled", "embedded loops") else []
+        return [(len(equal.chains), len(equal.chains[0].joints)) for equal in kinds]
+
     def called(self, system: System) -> dict[str, str]:
         """Loads with opaque laws: what a call costs, and why they are opaque."""
         from gauss.dynamics.laws.sampled_laws import SAMPLES

@@ -26,6 +26,9 @@ def _method(system) -> list[str]:
             lines.append(
                 f"    about {1e6 * cost:.0f} µs an evaluation (estimated), {ratio:.0f} times the fastest that is barred"
             )
+    if equal := system.dynamics.equal_chains(system, plans["accelerations"]):
+        words = ", ".join(f"{chains} of {joints} joint{'s' * (joints > 1)}" for chains, joints in equal)
+        lines.append(f"    equal chains in the lanes of vector registers, where that code is shorter: {words}")
     lines.append(f"  machine code: {OPTIMISER.status()}")
     costs = system.dynamics.called(system)
     return lines + [

@@ -34,6 +34,7 @@ def test_rates_are_those_of_the_oscillator(stiffness, damping):
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(expected), rel=DIFFERENCES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping, method", [(0.4, "dop853"), (2e4, "radau5")])
 def test_the_recommended_method_takes_fewer_steps(damping, method):
     scene = _oscillator(50.0, damping)

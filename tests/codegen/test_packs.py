@@ -85,6 +85,7 @@ def test_inputs_that_are_numbers_are_constants_of_the_code(count):
         np.testing.assert_array_equal(found, Kernel(moved, batch=False)(x))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("odd", [0, 1, 2])
 def test_operations_that_some_chains_lack_are_left_alone(odd):
     count = 4
@@ -100,6 +101,7 @@ def test_operations_that_some_chains_lack_are_left_alone(odd):
         np.testing.assert_array_equal(found, Kernel(function, batch=False)(x))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [400, 15], ids=["in one piece", "in pieces"])
 @pytest.mark.parametrize(("count", "other"), [(2, 2), (2, 3), (5, 2)])
 def test_kinds_of_chains_are_packed_apart(count, other, length, monkeypatch):

@@ -45,6 +45,7 @@ def system(request):
     return gauss.compile_scene(SCENES[request.param]())
 
 
+@pytest.mark.slow
 def test_machine_code_and_python_take_the_same_steps(system):
     stepper = new_contact_stepper(system)
     assert isinstance(stepper, FreeBodyStepper)
@@ -69,6 +70,7 @@ def test_machine_code_and_python_take_the_same_steps(system):
     assert finished > 120
 
 
+@pytest.mark.slow
 def test_motions_and_events_are_those_of_python(system, monkeypatch):
     def moved():
         return gauss.simulate(system, 0.15, integrator="time_stepping", step=STEP, progress=False)

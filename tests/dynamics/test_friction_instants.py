@@ -68,6 +68,7 @@ def test_the_instant_is_that_of_the_motion():
     assert abs(system.accelerations(motion.state(2))[0] - difference[0]) <= 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("v", [1.0, -1.0])
 def test_derivatives_where_friction_slides(v):
     system, h = arm(), 1e-5

@@ -55,6 +55,7 @@ def test_pairs_of_one_name_are_not_taken_for_each_other(first, second):
     assert np.abs(other - alone).max() > 1e-12
 
 
+@pytest.mark.slow
 def test_near_parameters_of_generalised_alpha_are_told_apart():
     near, system = (0.5, 0.5000001), _system()
     kept = [_end(system, gauss.generalised_alpha(rho), step=0.02) for rho in near]

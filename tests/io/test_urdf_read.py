@@ -161,6 +161,7 @@ def test_what_is_refused_is_told_with_its_line(case, tmp_path):
         gauss.load(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rest", [-(2.0**-64), 2.0**-64, 0.0, -1e-17])
 def test_what_rounding_leaves_of_a_point_mass_is_no_inertia(rest, tmp_path):
     path = tmp_path / "robot.urdf"

@@ -83,6 +83,7 @@ CURVES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CURVES)
 @given(x=st.floats(-2.0, 2.0))
 def test_curves_are_odd_and_of_the_sign_of_the_slip(name, x):
@@ -237,6 +238,7 @@ def test_wrong_questions_are_refused():
         motion.speed("moter")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", [float, lambda t: t], ids=["opaque", "traced"])
 def test_a_law_that_breaks_is_reported(when):
     network = _speeds(10.0, 5.0)

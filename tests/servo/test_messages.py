@@ -49,6 +49,7 @@ def test_an_arm_stretched_along_a_relation():
     assert caught.value.verdict.outcome == "rank lost" and caught.value.verdict.rank == 1
 
 
+@pytest.mark.slow
 def test_an_effort_that_turns_round():
     """A thruster on a disk that turns loses its hold at π/2, where its singular value is one on either side."""
     scene = gauss.Scene("turning", gravity=(0, 0, 0))

@@ -60,6 +60,20 @@ def coupled():
     return scene
 
 
+def summed():
+    """Three links whose angles have a constant sum, by a tendon that is given twice, and a belt on one of them."""
+    scene = arm("summed arm")
+    scene.body("tip", mass=0.5, inertia=(0.001, 0.01, 0.01), position=(1.2, 0.0, 0.55))
+    scene.revolute("hinge 2", "link 1", "tip", at=(1.0, 0.0, 0.55), axis=(0, 1, 0))
+    scene.body("wheel", mass=0.2, inertia=(0.001,) * 3)
+    scene.revolute("shaft", "ground", "wheel", axis=(0, 1, 0))
+    angles = {"hinge 0": 0.4, "hinge 1": 0.3, "hinge 2": -0.7}
+    scene.linear_coupling("tendon", angles, constant=0.1)
+    scene.linear_coupling("the same", {joint: -0.3 * factor for joint, factor in angles.items()}, constant=-0.03)
+    scene.couple("belt", "shaft", "hinge 2", 3.0)
+    return scene
+
+
 def four_bar():
     """A four-bar linkage whose coupler carries a ball that meets a wall."""
     scene = mechanisms.four_bar()
@@ -86,7 +100,7 @@ def on_a_spring():
     return scene
 
 
-SCENES = {make.__name__: make for make in (driven, bouncing, coupled, four_bar, on_a_spring)} | {
+SCENES = {make.__name__: make for make in (driven, bouncing, coupled, summed, four_bar, on_a_spring)} | {
     "arm": lambda: arm("arm"),
 }
 

@@ -23,6 +23,7 @@ def motion():
     return gauss.simulate(gauss.load("four_bar"), 0.3, times=np.linspace(0, 0.3, 16))
 
 
+@pytest.mark.slow
 def test_a_film_shows_the_motion(motion, tmp_path):
     with Image.open(export_film(motion, tmp_path / "film.gif", frames=10, size=SIZE)) as film:
         assert film.n_frames == 4 and film.size == SIZE and film.info["duration"] == 100 and film.info["loop"] == 0
@@ -85,6 +86,7 @@ def test_a_trace_of_nothing_is_refused(motion, tmp_path):
         export_film(motion, tmp_path / "film.gif", traces=["cranc"])
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_a_page_that_needs_no_server(motion):
     found = page(motion, frames=5)
     shown_there = found._repr_html_()
@@ -116,6 +118,7 @@ OF_A_SCENE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", OF_A_SCENE)
 def test_the_command_line_writes_films(tmp_path, scene):
     from typer.testing import CliRunner

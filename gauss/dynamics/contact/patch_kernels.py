@@ -20,7 +20,7 @@ from gauss.rotations import cross
 from gauss.scene import Collider
 from gauss.scene.contact import tangents
 from gauss.scene.contact_patch import SLOTS, SolidPose
-from gauss.scene.solid_pairs import PairOfSolids, solid_pair
+from gauss.scene.patch_distances import PairOfSolids, solid_pair
 
 FAR = 1e300  # distance of a point that a patch has not [m]
 

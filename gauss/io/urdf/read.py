@@ -98,12 +98,8 @@ def base_of(root: str) -> tuple:
 
 def body_names(model) -> dict[int, str]:
     """Name of the body that each joint of Pinocchio's model moves; joint 0 carries the ground."""
-    links = _links(model)
-    names = {0: GROUND}
-    for index in range(1, model.njoints):
-        carried = [frame for frame in links if frame.parentJoint == index]
-        names[index] = _link_name(carried[0].name if carried else model.names[index])
-    return names
+    first = {frame.parentJoint: frame.name for frame in reversed(_links(model))}  # of the links that a joint carries
+    return {0: GROUND} | {i: _link_name(first.get(i, model.names[i])) for i in range(1, model.njoints)}
 
 
 def _links(model) -> list:

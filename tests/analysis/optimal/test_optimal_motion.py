@@ -281,6 +281,7 @@ def test_too_few_refinements_are_named():
         gauss.optimal_motion(swing_up(), 2.0, start={"rail": 0.0, "pin": 0.0}, end={"pin": 1.0}, refinements=0, intervals=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "length, time, mass", [(1e9, 1, 1), (1e-9, 1, 1), (1, 1e9, 1), (1, 1e-9, 1), (1, 1, 1e9), (1, 1, 1e-9)]
 )
