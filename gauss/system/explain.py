@@ -31,8 +31,8 @@ def _method(system) -> list[str]:
     lines.append(f"  machine code: {OPTIMISER.status()}")
     costs = system.dynamics.called(system)
     return lines + [
-        f"  the law of {name!r} is an opaque Python callback, called in every evaluation ({why})"
-        for name, why in costs.items()
+        f"  the law of {name!r} is an opaque Python callback, called in every evaluation: {cost}"
+        for name, cost in costs.items()
     ]
 
 
