@@ -44,6 +44,7 @@ FAILURES = {
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
 }
 STEP_NUMBERS = 6  # in memory for each step of a call
+FEW_STEPS = 16  # so many times are written one by one in less time than as arrays
 STEPS = {("compiled loop", code) for code in ("embedded loops", "compiled", "callbacks")}
 STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
 
@@ -156,7 +157,8 @@ class Simulator:
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps, self._options = 0.0, 0, (self.step_size, integrator, stabilisation)
-        self._switches, self._warned = bool(run.program.watch), False
+        watch = run.program.watch
+        self._switches, self._warned = bool(watch or watch.phases), False
         self._measure: Callable[[np.ndarray], np.ndarray] | None = None
         self._bind()
         self.reset()
@@ -294,13 +296,22 @@ class Simulator:
 
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
-        n = checked_count("n", n)
+        if type(n) is not int or not 0 < n <= len(self._grid):
+            n = self._room_for(checked_count("n", n))
+        begin, h, first = self._begun, self.step_size, self._steps + 1
+        few = n <= FEW_STEPS
+        self._times[:n] = (
+            [begin + h * k for k in range(first, first + n)] if few else begin + h * np.arange(first, first + n)
+        )
+        self._steps += n
+
+    def _room_for(self, n: int) -> int:
+        """Let the grid hold the steps of a call, of which it returns the number."""
         refuse_beyond_memory(STEP_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
         if n > len(self._grid):
             self._grid = _unchecked(n)
             self._bind()
-        self._times[:n] = self._begun + self.step_size * np.arange(self._steps + 1, self._steps + n + 1)
-        self._steps += n
+        return n
 
     def _recover(self, n: int):
         """Repeat steps of contacts in Python; raise a SimulationError where a step has failed."""
