@@ -11,7 +11,7 @@ from gauss.errors import SceneError
 from gauss.rotations import from_quaternion
 from gauss.scene.contact_pairs import places
 from gauss.scene.contact_patch import SLOTS, SolidPose, solid_of
-from gauss.scene.solid_pairs import solid_pair
+from gauss.scene.patch_distances import solid_pair
 from gauss.simulation.moreau.unseen_contacts import thickness
 
 SMOOTH = 1e-4  # [m] coal's distance of curved shapes, and depths, with its tolerance of 1e-6
@@ -68,6 +68,7 @@ def separation(one, other, poses, normal) -> float:
     return -sum(ends)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_the_nearest_point_of_a_patch_is_that_of_coal(one, other):
     first, second, rng, seen = shape(one, "A"), shape(other, "B"), np.random.default_rng(2), 0

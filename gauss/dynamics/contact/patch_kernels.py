@@ -23,7 +23,7 @@ from gauss.rotations import cross
 from gauss.scene import Collider, HalfSpace
 from gauss.scene.contact import tangents
 from gauss.scene.contact_patch import ACROSS, SAME_DEPTH, SLOTS, SolidPose
-from gauss.scene.solid_pairs import PairOfSolids, solid_pair
+from gauss.scene.patch_distances import PairOfSolids, solid_pair
 
 
 class PatchKernels:
