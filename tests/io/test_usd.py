@@ -1,6 +1,5 @@
 """USD files that the tests write: accelerations of the same scene written by hand, loops, drives, units."""
 
-
 import numpy as np
 import pytest
 
