@@ -15,8 +15,8 @@ def _method(system) -> list[str]:
     """Plans of motions and of single states."""
     if system.dynamics is None:
         return ["  solved by: the certified recursion; it was built without machine code"]
-    lines = list[str]()
-    for what, plan in system.dynamics.plans(system).items():
+    plans, lines = system.dynamics.plans(system), list[str]()
+    for what, plan in plans.items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
         if isinstance(plan, SimulationError):
             continue
