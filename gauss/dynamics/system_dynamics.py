@@ -11,7 +11,7 @@ from gauss.backends.compulsion import Compulsion
 from gauss.codegen import count, made_from, write
 from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.consistent_states import consistent
-from gauss.dynamics.evaluation_cost import evaluation_cost, slowdown
+from gauss.dynamics.evaluation_cost import CALL, evaluation_cost, slowdown
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import ACCELERATIONS, motion_plan
@@ -52,8 +52,11 @@ class SystemDynamics(Store):
         return [(len(equal.chains), len(equal.chains[0].joints)) for equal in kinds]
 
     def called(self, system: System) -> dict[str, str]:
-        """Loads with opaque laws, and the reasons."""
-        return Laws(system).reasons
+        """Loads with opaque laws: what a call costs, and why they are opaque."""
+        from gauss.dynamics.laws.sampled_laws import SAMPLES
+
+        text = f"about {1e6 * CALL:.0f} µs (estimated), and up to {SAMPLES} times before a motion if it is a law of time"
+        return {name: f"{text}; {why}" for name, why in Laws(system).reasons.items()}
 
     def operations(self, system: System, subsystems: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of subsystems; None for large trees, which are not traced."""
