@@ -18,12 +18,19 @@ from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.constraint_functions import residual_functions, watched_functions
-from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
+from gauss.dynamics.laws.enclosed_parts import (
+    PARTS,
+    enclosed_parts,
+    hidden_peaks,
+    largest_size,
+    may_turn,
+    sign_changes,
+    upper_bounds,
+)
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.kink_error import kink_error, kink_factor
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
 from gauss.dynamics.laws.products import Products
-from gauss.dynamics.laws.subinterval_bounds import hidden_peaks, largest_size, may_turn, sign_changes, upper_bounds
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
