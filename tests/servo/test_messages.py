@@ -79,6 +79,7 @@ def _hung(fall):
     return Servo(scene, [height], [Cable("rope", "load", "ground", other_at=(0, 0, 3))])
 
 
+@pytest.mark.slow
 def test_a_tension_of_rounding_is_none():
     """A load let down as it falls needs no tension: what rounding leaves of m (g − g) is no push, whatever its sign."""
     state = servo.initial_state(_hung(servos.G), None)
