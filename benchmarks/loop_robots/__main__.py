@@ -14,9 +14,9 @@ First answers are those of a fresh process: from the file to the accelerations o
 an empty cache of machine code and with a full one. A motion of ten robots without loads begins at the first reference state;
 floating robots do not fall. Its drift is the largest residual of the constraints, relative to the size of the robot.
 
-Loops are eliminated where they close (:mod:`gauss.dynamics.embedded_loops`). Operations are those of one state with its error
-check, in brackets by the general elimination instead (:mod:`benchmarks.loop_robots.operations`); equal chains of a robot are
-computed in lanes, so that several of them are one instruction.
+Loops are eliminated where they close (:mod:`gauss.dynamics.embedded_loops`). Operations are those of one state with its
+error check, in brackets by the general elimination instead (:mod:`benchmarks.loop_robots.operations`); equal chains of a
+robot are computed in lanes, so that several of them are one instruction.
 
 CPU time of the process; medians of interleaved rounds. Writes benchmarks/results/loop_robots.csv and .md.
 """

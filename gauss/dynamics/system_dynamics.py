@@ -17,7 +17,7 @@ from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import ACCELERATIONS, motion_plan
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import Store
-from gauss.errors import judged_later
+from gauss.errors import SimulationError, judged_later
 from gauss.system import State, Subsystem, System
 
 
@@ -31,9 +31,14 @@ class SystemDynamics(Store):
         """Dynamics of another system, with an empty cache."""
         return SystemDynamics()
 
-    def plans(self, system: System) -> dict[str, Plan]:
-        """Plans of its motions and of its single states, {name: plan}."""
-        return {"motions": motion_plan(system), "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
+    def plans(self, system: System) -> dict[str, Plan | SimulationError]:
+        """Plans of its motions and of its single states, {name: plan}; what motions need where they have none by default."""
+        motions: Plan | SimulationError
+        try:
+            motions = motion_plan(system)
+        except SimulationError as refusal:  # of the default integrator: it says what to use
+            motions = refusal
+        return {"motions": motions, "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
 
     def cost(self, system: System, plan: Plan) -> tuple[float, float]:
         """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""

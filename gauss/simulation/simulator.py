@@ -156,7 +156,8 @@ class Simulator:
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps, self._options = 0.0, 0, (self.step_size, integrator, stabilisation)
-        self._switches, self._warned = bool(run.program.watch), False
+        watch = run.program.watch
+        self._switches, self._warned = bool(watch or watch.phases), False
         self._measure: Callable[[np.ndarray], np.ndarray] | None = None
         self._bind()
         self.reset()

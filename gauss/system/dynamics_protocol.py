@@ -47,7 +47,7 @@ class Dynamics(Protocol):
         """Operations of one evaluation of the forward dynamics of subsystems; None if these are not traced."""
 
     def plans(self, system: "System") -> dict:
-        """Plans of its motions and of single states, {what: plan}."""
+        """Plans of its motions and of single states, {what: plan}, or the error that says what they need."""
 
     def cost(self, system: "System", plan) -> tuple[float, float]:
         """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""

@@ -15,12 +15,11 @@ def _method(system) -> list[str]:
     """Plans of motions and of single states."""
     if system.dynamics is None:
         return ["  solved by: the certified recursion; it was built without machine code"]
-    try:
-        plans, lines = system.dynamics.plans(system), []
-    except SimulationError as refusal:  # of the default integrator: it says what to use
-        return [f"  motions: {refusal}"]
+    lines, plans = list[str](), system.dynamics.plans(system)
     for what, plan in plans.items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
+        if isinstance(plan, SimulationError):
+            continue
         cost, ratio = system.dynamics.cost(system, plan)
         if ratio > CLOSE_ROUTES:
             lines.append(

@@ -24,6 +24,7 @@ def test_the_series_keeps_its_limits_and_is_periodic(series):
     np.testing.assert_allclose(q[0], q[-1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_rates_are_derivatives(series):
     t = np.linspace(0.1, 4.0, 7)
     (less, v0, _), (more, v1, _) = series.at(t - DIFFERENCE), series.at(t + DIFFERENCE)

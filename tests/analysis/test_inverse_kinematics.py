@@ -86,6 +86,7 @@ def test_the_legs_of_a_stewart_platform_reach_a_pose():
         assert abs(found.state.q[system.joint(f"leg{k}").q][0] - longer) < MET
 
 
+@pytest.mark.slow
 def test_a_loop_follows_the_posture_of_another_joint():
     system = gauss.compile_scene(gauss.load("four_bar"))
     found = gauss.inverse_kinematics(system, gauss.PostureTarget({"D": 0.3}))

@@ -177,6 +177,7 @@ def test_modes_are_those_of_the_state_of_rest(name):
     assert gauss.modes(system, rest.state).shapes == pytest.approx(found.shapes)
 
 
+@pytest.mark.slow
 def test_what_sticks_binds_rates():
     """A double pendulum whose upper joint sticks: the lower one swings as a pendulum about it."""
     scene = gauss.load("double_pendulum")

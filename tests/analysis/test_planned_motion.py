@@ -121,6 +121,7 @@ def test_a_trajectory_of_a_four_bar_is_closed():
     assert np.abs(motion.q[:, 0] - found.position(motion.t)[:, 0]).max() < ROUNDED
 
 
+@pytest.mark.slow
 def test_points_may_be_states(delta):
     one, other = (
         delta.initial_state(),

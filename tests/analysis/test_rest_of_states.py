@@ -88,6 +88,7 @@ def test_a_linkage_rests_where_the_motor_holds_it():
         assert held.forces["A"] == pytest.approx(0.8 * 4.0, rel=REST)
 
 
+@pytest.mark.slow
 def test_models_at_rest_keep_the_start_of_states():
     """About the pressures of the start, not about none, at which an open valve has another slope."""
     model = gauss.linearise(cylinder())

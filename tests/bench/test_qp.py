@@ -241,6 +241,7 @@ def test_shifted_means():
     assert shifted_mean([0.0, 3e-3]) == pytest.approx(1e-3)  # √(1 · 4) − 1 milliseconds
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("form", FORMS)
 def test_problems_are_read_by_qpsolvers(tmp_path, form):

@@ -176,6 +176,7 @@ def test_steps_of_a_sequence_have_one_shape_and_change_what_is_active():
         assert len({tuple(step.reference.active) for step in own}) > 2
 
 
+@pytest.mark.slow
 def test_stages_of_control_are_banded(some):
     for instance in some["mpc"]:
         steps, n_x, n_u = instance.stages

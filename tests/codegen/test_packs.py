@@ -11,6 +11,8 @@ from gauss.codegen import packed_function as packed_function_module
 from gauss.codegen.packed_function import PackedFunction
 from gauss.codegen.packs import Packs
 
+pytestmark = pytest.mark.slow
+
 OWN, SHARED, DEPTH = 4, 3, 12  # inputs of a chain, inputs of all chains, operations of a chain
 OPERATIONS: tuple[Callable, ...] = (
     lambda x, y, c: x * y + c,
@@ -51,7 +53,6 @@ def chains(count: int, seed: int, odd: int = 0):
     return write(function, SHARED + OWN * count), seeds
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("length", [400, 15], ids=["in one piece", "in pieces"])
 @pytest.mark.parametrize("count", [2, 3, 5, 8])
 def test_packs_round_like_single_operations(count, length, monkeypatch):
@@ -85,7 +86,6 @@ def test_inputs_that_are_numbers_are_constants_of_the_code(count):
         np.testing.assert_array_equal(found, Kernel(moved, batch=False)(x))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("odd", [0, 1, 2])
 def test_operations_that_some_chains_lack_are_left_alone(odd):
     count = 4
@@ -101,7 +101,6 @@ def test_operations_that_some_chains_lack_are_left_alone(odd):
         np.testing.assert_array_equal(found, Kernel(function, batch=False)(x))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("length", [400, 15], ids=["in one piece", "in pieces"])
 @pytest.mark.parametrize(("count", "other"), [(2, 2), (2, 3), (5, 2)])
 def test_kinds_of_chains_are_packed_apart(count, other, length, monkeypatch):

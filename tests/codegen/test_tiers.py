@@ -129,6 +129,7 @@ def test_an_unknown_tier_is_refused(monkeypatch):
         machine.load(text(6.0))
 
 
+@pytest.mark.slow
 def test_the_cache_goes_from_quick_to_optimised_code(place):
     """A process that ended early leaves quick code with its module, from which the next one goes on."""
     OPTIMISER.stop()

@@ -242,6 +242,7 @@ def test_what_another_user_owns_is_not_run(tmp_path, monkeypatch):
     assert object_cache.read(name) is None
 
 
+@pytest.mark.slow
 def test_code_is_kept_by_graph_processor_and_version(tmp_path, monkeypatch):
     monkeypatch.setenv("GAUSS_CACHE", str(tmp_path))
 

@@ -9,6 +9,8 @@ from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 
+pytestmark = pytest.mark.slow
+
 STEP = 1e-3  # [s]
 SAME_STEP = 1e-9  # coordinates and rates after a step of two solvers, each with laws to 1e-10
 SAME_MOTION = 1e-6  # the same after 150 steps
@@ -45,7 +47,6 @@ def system(request):
     return gauss.compile_scene(SCENES[request.param]())
 
 
-@pytest.mark.slow
 def test_machine_code_and_python_take_the_same_steps(system):
     stepper = new_contact_stepper(system)
     assert isinstance(stepper, FreeBodyStepper)
@@ -70,7 +71,6 @@ def test_machine_code_and_python_take_the_same_steps(system):
     assert finished > 120
 
 
-@pytest.mark.slow
 def test_motions_and_events_are_those_of_python(system, monkeypatch):
     def moved():
         return gauss.simulate(system, 0.15, integrator="time_stepping", step=STEP, progress=False)

@@ -79,6 +79,7 @@ def test_derivatives_where_friction_slides(v):
         assert abs(getattr(found, name)[0, 0] - slope) <= DIFFERENCED * (1.0 + abs(slope))
 
 
+@pytest.mark.slow
 def test_derivatives_where_friction_sticks_and_between():
     system = arm()
     stuck = gauss.derivatives(system, system.state([0.3], [0.0]), [-2.0])

@@ -98,6 +98,7 @@ def decided(t, answers):
     return total
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-2, 2), st.integers(-3, 3)), min_size=1, max_size=4), st.lists(st.floats(-3, 3), max_size=8)

@@ -130,6 +130,7 @@ def test_mistakes_in_files_are_named_with_the_file(mistake, tmp_path):
     assert "scene.toml" in str(caught.value)
 
 
+@pytest.mark.slow
 @given(text=st.text())
 def test_any_text_is_a_scene_or_a_clear_error(text, tmp_path_factory):
     path = tmp_path_factory.mktemp("any") / "scene.toml"

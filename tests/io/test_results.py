@@ -58,6 +58,7 @@ def test_a_dataset_holds_the_motion_under_names(motion):
     assert (units["reaction_force"], units["reaction_moment"]) == ("N", "N m")
 
 
+@pytest.mark.slow
 def test_orientations_are_the_rotations_of_the_bodies(motion):
     orientation = gauss.to_dataset(motion).orientation.sel(body="coupler").values
     turned = np.array([rotations.from_quaternion(row) for row in orientation])
@@ -74,6 +75,7 @@ def test_poses_are_those_of_the_bodies(count):
         assert turned[:, i] == pytest.approx(motion.body(name).rotation, abs=ROUNDING)
 
 
+@pytest.mark.slow
 def test_every_coordinate_and_rate_has_its_unit():
     found = gauss.to_dataset(gauss.simulate(_all_pairs(), 1e-3, times=[0.0]))
     units = dict(zip(found.coordinate.values.tolist(), found.coordinate_unit.values.tolist(), strict=True))

@@ -1,5 +1,8 @@
 """USD files that are wrong, or hold what is not read: refused or named."""
 
+import warnings
+
+import numpy as np
 import pytest
 
 import gauss
@@ -214,3 +217,25 @@ def test_what_may_change_the_motion_is_named(tmp_path, name):
     add(writer)
     with pytest.warns(NotImportedWarning, match=words):
         writer.load()
+
+
+def test_units_of_a_layer_that_the_stage_does_not_have_are_named(tmp_path):
+    """USD composes numbers as they are: those of a layer in centimetres count as metres of the stage."""
+    writer = UsdWriter(tmp_path)
+    writer.body("a", 2.0, (0.1, 0.1, 0.1), (0, 0, 0), (0, 0, 0))
+    writer.stage.Save()
+    for unit, said in ((0.01, 1), (1.0, 0)):
+        other = Sdf.Layer.CreateNew(str(tmp_path / f"in_{unit}.usda"))
+        other.pseudoRoot.SetInfo("metersPerUnit", unit)
+        other.Save()
+        writer.stage.GetRootLayer().subLayerPaths = [f"./in_{unit}.usda"]
+        with warnings.catch_warnings(record=True) as heard:
+            warnings.simplefilter("always")
+            writer.load()
+        assert [f"in_{unit}.usda" in str(w.message) for w in heard] == [True] * said
+
+
+def test_a_centre_of_mass_that_the_schema_takes_for_none_is_none(tmp_path):
+    writer = UsdWriter(tmp_path)
+    writer.body("a", 2.0, (0.1, 0.1, 0.1), (-np.inf,) * 3, (0, 0, 0))
+    assert writer.load().bodies["a"].com == (0.0, 0.0, 0.0)

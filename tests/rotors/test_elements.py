@@ -54,6 +54,7 @@ def test_laws_by_hand(case):
     assert float(law(0.0, 0.0, speed)) == pytest.approx(torque, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", VALUES)
 def test_laws_are_the_same_when_compiled(case):
     law, speed, _ = VALUES[case]

@@ -97,6 +97,7 @@ def test_events_of_the_reference(motions):
     assert not [e for e in motions["parallel"][0].events if e.kind != "switch"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_energy_is_balanced_and_heat_never_falls(motions, name):
     energy = motions[name][0].energy()

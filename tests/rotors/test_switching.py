@@ -214,6 +214,7 @@ def test_a_law_with_other_values_in_a_second_call_is_no_constant(kind):
             simulate(network, 1.0)
 
 
+@pytest.mark.slow
 def test_a_function_of_nothing_is_a_constant():
     with warnings.catch_warnings():
         warnings.simplefilter("error", SwitchingWarning)

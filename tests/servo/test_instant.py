@@ -107,6 +107,7 @@ def test_routes_agree_on_a_closed_loop(by):
     assert found.efforts == pytest.approx(route.efforts, rel=ROUTES)
 
 
+@pytest.mark.slow
 def test_arm_with_one_motor_is_oblique():
     """Example 5: the tip on a line by the shoulder alone, against the ideal guide of the tip."""
     driven = Servo(servos.arm(), [servos.tip_on_line()], [Motor("shoulder motor", "shoulder")])

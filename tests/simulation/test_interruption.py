@@ -88,6 +88,7 @@ def test_a_motion_is_kept_as_far_as_it_came(name):
     np.testing.assert_allclose(again.q, found.q[: len(times)], atol=1e-6)  # it is the beginning of that motion
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [None, 11])
 @pytest.mark.parametrize("integrator", ["scipy_dop853", "cvode_adams", "dop853"])
 def test_an_interrupted_law_keeps_the_steps_before(integrator, samples):
@@ -109,6 +110,7 @@ def test_an_interrupted_law_keeps_the_steps_before(integrator, samples):
     np.testing.assert_allclose(again.q, found.q, atol=1e-2)  # a hundred times the tolerance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["scipy_dop853", "cvode_bdf", "dop853"])
 def test_an_interruption_before_the_first_sample_leaves_none(integrator):
     scene = gauss.load("pendulum")

@@ -112,6 +112,7 @@ def moved(scene, duration: float, **options):
     return gauss.simulate(scene, duration, integrator="time_stepping", step=STEP, progress=False, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_mechanisms_move_as_by_the_machine_code_of_the_scene(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -128,6 +129,7 @@ def test_mechanisms_move_as_by_the_machine_code_of_the_scene(name):
     np.testing.assert_allclose(*rubs, atol=1e-6 * pushes[0].max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_machine_code_and_python_take_the_same_steps(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -175,6 +177,7 @@ def on_a_slope(shape: str, friction: float, angle: float):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shape", "friction", "angle", "acceleration"),
     [
@@ -203,6 +206,7 @@ def test_a_leg_that_falls_comes_to_rest_on_its_stops_and_the_floor():
     assert total[-1] < total[0] - 0.1 * energy.scale
 
 
+@pytest.mark.slow
 def test_time_stepping_tells_painleves_paradox():
     scene, radius = gauss.load("painleve_rod"), 1e-3
     scene.shapes["end"] = replace(scene.shapes["end"], radius=radius)
@@ -227,6 +231,7 @@ def test_penetration_at_the_start_is_refused():
         moved(scene, STEP, plan=KERNELS)
 
 
+@pytest.mark.slow
 def test_samples_beside_the_steps_are_those_of_the_written_out_step():
     system, times = gauss.compile_scene(driven()), np.linspace(0.0, 0.1, 27)
     one, other = (moved(system, 0.1, plan=plan, times=times) for plan in (WRITTEN_OUT, KERNELS))

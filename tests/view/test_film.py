@@ -31,6 +31,7 @@ def test_a_film_shows_the_motion(motion, tmp_path):
     assert all(np.abs(one - two).max() > 50 for one, two in zip(pictures, pictures[1:], strict=False))
 
 
+@pytest.mark.slow
 def test_bodies_are_drawn_where_they_are(motion):
     painter = Painter(shown(motion, 10, traces=[]), 640, 480)
     for k in (0, 2):

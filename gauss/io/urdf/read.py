@@ -15,6 +15,7 @@ from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_yo
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.joint_file import joint_file
+from gauss.io.urdf.link_tree import require_tree
 from gauss.io.urdf.numbers import for_parser, value, values
 from gauss.io.urdf.plus import add_loops_and_couplings
 from gauss.io.urdf.unknown import refuse_couplings
@@ -70,6 +71,7 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "phy
     refuse_couplings(source)
     beside = joint_file(source.path)
     source = beside.replaced(source)
+    require_tree(source)
     text = for_parser(source)
     try:
         model = pin.buildModelFromXML(text, *base_of(root))

@@ -166,9 +166,9 @@ class AdaptiveBatch:
         for before, after in switching.stops(0.0, end):
             try:
                 self._until(motions, grid, out, settings | {"end": before}, threads)
-            except KeyboardInterrupt as error:
+            except KeyboardInterrupt as interruption:
                 out[np.arange(len(times)) >= record["sample"][:, None]] = np.nan
-                error.samples = out  # type: ignore[attr-defined]
+                interruption.samples = out  # type: ignore[attr-defined]
                 raise
             if after > before:
                 self._cross(motions, record["h"], before, after, LEAST_RESTART_STEP * end)

@@ -185,7 +185,7 @@ def _pairs(scene: Scene) -> list[tuple[Collider, Collider]]:
 def thickness(shape: Collider) -> float:
     """Least extent of a shape [m]."""
     corners = shape.corners - shape.corners.mean(axis=0)
-    extents = np.ptp(corners @ np.linalg.svd(corners, full_matrices=True)[2].T, axis=0)
+    extents = np.ptp(corners @ np.linalg.svd(corners, full_matrices=len(corners) < 3)[2].T, axis=0)
     return 2.0 * shape.radius + float(extents.min())
 
 

@@ -103,6 +103,7 @@ def test_least_time_of_a_double_integrator_is_bang_bang():
     np.testing.assert_allclose(motion.law(middle)[:, 0], np.where(middle < 1.0, 1.0, -1.0), atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [2, 4, 6])
 def test_least_effort_of_a_double_integrator(order):
     motion = gauss.optimal_motion(cart(100.0), 0.8, start=REST, end=REST | {"rail": 0.5}, intervals=8, order=order)
