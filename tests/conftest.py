@@ -1,5 +1,6 @@
 """Settings shared by all tests."""
 
+import gc
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # pytest-xdist already uses every core
@@ -8,10 +9,19 @@ os.environ.setdefault("GAUSS_TIER", "quick")  # the tiers give the same digits (
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
-from gauss.codegen import disk_cache  # noqa: E402
+from gauss.codegen import disk_cache, gc_pause  # noqa: E402
 
 settings.register_profile("gauss", deadline=None, derandomize=True)
 settings.load_profile("gauss")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Tests and modules are no garbage: neither while they are collected nor afterwards are they looked through for it."""
+    with gc_pause():
+        collected = yield
+    gc.freeze()
+    return collected
 
 
 @pytest.fixture(autouse=True)

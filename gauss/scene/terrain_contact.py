@@ -13,7 +13,7 @@ import numpy as np
 from gauss.rotations import cross
 from gauss.scene.contact_patch import SLOTS, ContactPoint, Solid, SolidPair, SolidPose, spread
 from gauss.scene.support_faces import Polytope, Segment
-from gauss.scene.terrain import ALIGNED, Terrain, Triangles
+from gauss.scene.terrain import Terrain, Triangles
 
 SAME = 1e-9  # relative to the size of a solid: places and planes that are the same
 LEAST_DEPTH = 4.0  # sizes of the solid that prisms reach below their triangles at least, where the field does
@@ -135,7 +135,13 @@ class SolidOnTerrain:
                 found += _beside(pair.around(nearest, one, pose, reach), nearest, min(reach, BESIDE * self.first.size))
             elif nearest.gap > 0.0:  # another triangle is nearer; the faces that meet here may touch next
                 patch = pair.patch(one, pose, nearest.normal, reach)[0]
-                found += [point for point in patch if point.normal @ other.R[:, 2] > ALIGNED]
+                found += [
+                    p
+                    for p in patch
+                    if self.terrain.has_normal(
+                        corners, points, normal, other.R.T @ (p.place - other.x), other.R.T @ p.normal
+                    )
+                ]
             elif self.terrain.margin(place) > NEAR_SIDE * self.first.size:
                 within += pair.patch(one, pose, other.R @ normal, reach)[0]
         if all(point.gap > 0.0 for point in found):

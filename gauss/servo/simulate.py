@@ -22,6 +22,7 @@ from gauss.servo.tracking import Tracking
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
 from gauss.simulation.arguments import check_arguments, check_breaks, chosen, refuse_without_step, sample_times
+from gauss.simulation.energy_balance import watch_balance
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.tolerances import shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_switching
@@ -69,7 +70,7 @@ def simulate(
 
     Warns
     -----
-    SwitchingWarning
+    SwitchingWarning, BalanceWarning
         As :func:`gauss.simulate`.
 
     Raises
@@ -100,6 +101,7 @@ def simulate(
     try:
         found = run.collect(start, samples, progress)
         warn_of_switching(found, method)
+        watch_balance(found, start)
         return _tracking(dynamics, found, verdict)
     except KeyboardInterrupt as error:
         reached = getattr(error, "trajectory", None)

@@ -338,6 +338,7 @@ def test_modes_that_no_input_reaches_are_named():
         model.lqr()
 
 
+@pytest.mark.slow
 def test_free_masses_that_no_input_reaches_are_named():
     """All eigenvalues are zero: none of them is stable."""
     scene = gauss.Scene("masses", gravity=(0, 0, 0))

@@ -137,6 +137,7 @@ def tip(x: float, y: float) -> gauss.PointTarget:
     return gauss.PointTarget("lower", (x, y, 0.0), at=(0.5, 0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_a_path_is_straight_and_as_fast_as_allowed(pendulum):
     found = gauss.plan_path(pendulum, [tip(0.6, -0.8), tip(0.2, -0.8), tip(0.2, -0.6)], speed=0.5, acceleration=2.0)
     assert abs(found.duration - (0.4 / 0.5 + 0.25) - (0.2 / 0.5 + 0.25)) < ROUNDED

@@ -163,6 +163,7 @@ def test_solvers_of_stages_find_the_reference(solver):
     assert row["claimed"] and row["error"] <= STAGES_ERROR and row["dual_error"] <= 10.0 * STAGES_ERROR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, name", [(ROWS, "contacts stops 4 F2"), (STAGES, "mpc cart and pole 10"), *FIRST])
 def test_calls_repeat_themselves(kind, name):
     """What a call does to its problem, as to factorise a matrix in its place, the next one would answer for."""

@@ -112,6 +112,7 @@ def test_no_content_stands_in_an_entry(place):
     assert b"System" not in object_cache.read(entries(place)[0].name)
 
 
+@pytest.mark.slow
 def test_machine_code_is_pickled_for_no_one_else():
     for thing in (trace(lambda x: [x[0]], 1), trace(lambda x: [x[0]], 1).code):
         with pytest.raises((TypeError, ValueError, pickle.PicklingError)):

@@ -66,6 +66,7 @@ def _arguments(name: str) -> np.ndarray:
     return np.concatenate([near, wide, SPECIAL])[None]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ELEMENTARY)
 def test_elementary_functions_need_no_library(name):
     traced, known, ulps = ELEMENTARY[name]

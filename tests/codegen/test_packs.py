@@ -70,6 +70,7 @@ def test_packs_round_like_single_operations(count, length, monkeypatch):
         np.testing.assert_array_equal(other(x[:, 0].copy()), expected[:, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 5])
 def test_inputs_that_are_numbers_are_constants_of_the_code(count):
     for seed in range(4):

@@ -97,6 +97,7 @@ def piles(count: int, apart: float) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "apart", "islands"), [(1, 1.0, 1), (4, 1.0, 4), (4, 0.1, 1)])
 def test_islands_are_problems_of_their_own(count, apart, islands):
     """The floor connects nothing; piles that are apart move as each would by itself."""

@@ -55,6 +55,7 @@ def test_a_batch_is_made_of_single_states_bit_for_bit(arm):
     assert np.array_equal(arm.mass_matrix(Q[:12].reshape(3, 4, -1)).reshape(12, arm.n_v, arm.n_v), arm.mass_matrix(Q[:12]))
 
 
+@pytest.mark.slow
 def test_arrays_of_any_strides_types_and_libraries_give_the_same(arm):
     Q, V = states(arm, 9)
     expected, wide = arm.bias_forces(Q, V), np.zeros((9, 2 * arm.n_q))

@@ -76,6 +76,7 @@ def test_a_batch_of_a_large_tree_is_refused():
         gauss.rollout(system, [system.reference.q], [system.reference.v], steps=1, step=1e-3)
 
 
+@pytest.mark.slow
 def test_forces_are_answered_one_by_one():
     system = gauss.compile_scene(gauss.load("n_pendulum", n=LARGE_TREE_BODIES + 1))
     responses, state = ForceResponses(system), system.initial_state()

@@ -216,6 +216,7 @@ def test_whole_numbers_are_shown_as_such():
     assert not [number for number in result.atoms(sympy.Float) if float(number).is_integer()]
 
 
+@pytest.mark.slow
 def test_the_document_of_a_pendulum():
     pytest.importorskip("sympy")
     text = export.latex_document(gauss.load("pendulum"))

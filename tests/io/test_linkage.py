@@ -93,6 +93,7 @@ def test_figures_show_the_numbers(tmp_path, name):
         assert line.get_xydata().ravel() == pytest.approx(found.link(link).point(complex(*point)).view(float).ravel())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", linkages())
 def test_links_are_drawn_where_they_are(name):
     """Every pin of every position lies on the artists of both of its links, inside the axes."""

@@ -193,6 +193,7 @@ def test_a_motion_of_rotors_is_labelled(tmp_path):
         assert np.array_equal(there.speed.values, run.speeds)
 
 
+@pytest.mark.slow
 def test_many_motions_are_labelled(tmp_path):
     arm = gauss.compile_scene(gauss.load("double_pendulum"))
     many = gauss.rollout(arm, [[0.1, 0.0], [0.2, 0.0]], np.zeros((2, 2)), steps=4, step=1e-3, every=2)

@@ -232,6 +232,7 @@ def test_reversing_load_is_followed_through_zero():
     assert before < after < 0  # friction of the gear braked before and holds back afterwards
 
 
+@pytest.mark.slow
 def test_driver_that_reverses_pulls_the_output_through_zero():
     network = two_shafts(curve=CURVE, speeds=(60.0, 92.0))
     network.torque("in", -30.0)

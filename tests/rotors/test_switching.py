@@ -169,6 +169,7 @@ def test_run_up_after_a_pause():
     assert reached == pytest.approx(12.0 + 3.0 * INERTIA / 4.0, abs=1e-5)  # by cubics between steps
 
 
+@pytest.mark.slow
 def test_breaks_tell_of_a_law_that_cannot_be_traced():
     """A pulse of a tenth of a millisecond lies between all samples; breaks= of the torque or of the run tell of it."""
     law = lambda t, a, w: 1e5 if 5.0 <= float(t) < 5.0001 else 0.0  # noqa: E731

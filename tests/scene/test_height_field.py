@@ -1,5 +1,7 @@
 """Height fields: distances beside coal, what is looked at, normals of the surface, what is refused."""
 
+from itertools import product
+
 import coal
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from gauss.errors import SceneError
 from gauss.rotations import from_quaternion
 from gauss.scene.contact_patch import SLOTS, SolidPose, solid_of
 from gauss.scene.patch_distances import solid_pair
-from gauss.scene.terrain import Terrain
+from gauss.scene.terrain import ALIGNED, Terrain
 from tests.scene.test_contact_shapes import EXACT, MAKE, SMOOTH
 from tests.support.terrain import in_coal
 
@@ -72,6 +74,24 @@ def test_on_a_tilted_plane_only_its_normal_counts(kind, gap):
         found = solid_pair(shape, field).points(SolidPose(R, x), SolidPose(field.axes, field.centre), 0.02)
         assert min(point.gap for point in found) == pytest.approx(gap, abs=SMOOTH if kind in CURVED else EXACT)
         assert np.abs([point.normal - up for point in found]).max() < ROUNDING
+
+
+@pytest.mark.parametrize("kind", ["box", "mesh"])
+def test_a_face_that_slides_on_a_tilted_plane_meets_no_edge_of_its_triangles(kind):
+    x = np.linspace(-4.0, 4.0, 21)
+    field, half, slope = land(np.tile(0.2 * x, (21, 1)), (8, 8)), 0.1, np.arctan(0.2)
+    scene = gauss.Scene("solid")
+    scene.body("A", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    cube = half * (2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0)
+    shape = scene.box("cube", "A", (2 * half,) * 3) if kind == "box" else scene.mesh("cube", "A", cube)
+    down, up = np.array([np.cos(slope), 0.0, np.sin(slope)]), np.array([-np.sin(slope), 0.0, np.cos(slope)])
+    R, ground = np.column_stack([down, (0.0, 1.0, 0.0), up]), SolidPose(field.axes, field.centre)
+    for before, gap in product((1e-3, 1e-6, 1e-9, 0.0, -1e-9, -1e-3), (0.0, 1e-13, -1e-13, 1e-9, -1e-9)):
+        pose = SolidPose(R, (half + before) * down + (half + gap) * up)
+        found = solid_pair(shape, field).points(pose, ground, 3e-3)
+        assert len(found) >= 4
+        assert np.abs([point.gap - gap for point in found]).max() < EXACT
+        assert np.abs([point.normal - up for point in found]).max() < ALIGNED
 
 
 def test_a_ball_over_a_ridge_or_peak_has_one_contact_and_in_a_valley_two():

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss import servo
-from gauss.errors import SimulationError
+from gauss.errors import BalanceWarning, SimulationError
 from gauss.servo import Cable, Motor, Servo, ServoRelation, Thruster, UnrealisableError
 from tests.support import servos
 
@@ -79,6 +79,7 @@ def _hung(fall):
     return Servo(scene, [height], [Cable("rope", "load", "ground", other_at=(0, 0, 3))])
 
 
+@pytest.mark.slow
 def test_a_tension_of_rounding_is_none():
     """A load let down as it falls needs no tension: what rounding leaves of m (g − g) is no push, whatever its sign."""
     state = servo.initial_state(_hung(servos.G), None)
@@ -87,3 +88,19 @@ def test_a_tension_of_rounding_is_none():
         assert abs(found.effort("rope")) <= 1e-9 * 5.0 * servos.G
     with pytest.raises(SimulationError, match="t = 0 s: .*'rope'"):
         servo.solve(_hung(servos.G * (1.0 + 1e-6)), state)
+
+
+@pytest.mark.slow
+def test_fixed_steps_that_lose_energy_are_warned_of_by_every_call():
+    """A cart is moved by 0.4 m within a millisecond, a tenth of a step: the swing that it leaves behind is wrong."""
+    move = gauss.scene.profiles.Move(0.0, 0.4, 1e-3, 0.10031)
+    scene = gauss.Scene("carried", gravity=(0, 0, 0))
+    scene.body("cart", 2.0)
+    scene.body("mass", 1.0)
+    scene.prismatic("rail", "ground", "cart", axis=(1, 0, 0))
+    scene.prismatic("guide", "cart", "mass", axis=(1, 0, 0))
+    scene.joint_spring("spring", "guide", stiffness=25.0)
+    path = ServoRelation("path", lambda t, motion: motion.coordinate("rail") - move(t))
+    for _ in range(2):
+        with pytest.warns(BalanceWarning):
+            servo.simulate(Servo(scene, [path], [Motor("motor", "rail")]), 0.3, integrator="rk4", step=0.01, progress=False)

@@ -65,6 +65,7 @@ def test_a_grid_finds_the_contacts_of_all_pairs(name, monkeypatch):
         assert one == other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [10**9, 0])
 def test_positions_without_a_number_have_no_contacts(most, monkeypatch):
     monkeypatch.setattr(near_detection, "MOST_LISTED", most)

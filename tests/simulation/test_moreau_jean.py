@@ -82,6 +82,7 @@ def test_machine_code_and_python_take_the_same_steps(case):
         assert one == pytest.approx(other, abs=SAME * (1.0 + np.abs(other).max()))
 
 
+@pytest.mark.slow
 def test_steps_that_have_to_be_looked_at_are_taken_by_python():
     """Painlevé's rod: the first step has no accelerations, and warns; all others are machine code again."""
     system = gauss.compile_scene(gauss.load("painleve_rod"))

@@ -110,6 +110,7 @@ def test_laws_of_time_are_right_in_every_call(systems, name):
         assert verdict(lambda: moved(systems[name], duration)[kept], expected) == "right"
 
 
+@pytest.mark.slow
 def test_breaks_are_heeded():
     pulse = lambda t: 1e4 if 8 < float(t) < 8.0001 else 0.0  # noqa: E731
     assert verdict(lambda: moved(slider(pulse), 20.0, breaks=[8.0, 8.0001]), [12 - 0.5e-4, 1.0]) == "right"

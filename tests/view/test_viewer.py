@@ -82,6 +82,7 @@ def test_the_viewer_is_seen_by_this_machine_only(viewer):
         show(gauss.load("pendulum"), port=int(viewer.url.rpartition(":")[2]))
 
 
+@pytest.mark.slow
 def test_play_and_pause(viewer):
     player = viewer.player
     player.play(False)

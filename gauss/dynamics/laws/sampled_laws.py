@@ -71,7 +71,7 @@ def _values(law, motion, of_motion: bool, times) -> np.ndarray:
 def _values_or_none(law, motion, of_motion: bool, times: np.ndarray) -> np.ndarray:
     """Values (k, n) at times (k,); not a number where the law has none."""
     try:
-        with preserved(law):
+        with preserved(law), np.errstate(all="ignore"):  # it may have no value where the motion never comes
             return _values(law, motion, of_motion, times)
     except _NoValueError:
         return np.full((len(times), 1), np.nan)
