@@ -94,7 +94,6 @@ def entry_code(function: Function | NativeFunction, interface: Interface) -> Ent
         Arguments and limits.
     """
     writer = Writer()
-    writer.export(function, "single")
     EntryWriter(writer, function, interface).write()
     return EntryCode(machine.load(str(writer.module)), len(function.outputs))
 

@@ -6,6 +6,7 @@ much as many functions.
 
 from collections.abc import Callable
 from functools import partial
+from itertools import accumulate
 from math import prod
 
 import numpy as np
@@ -41,13 +42,25 @@ class EntryWriter:
         self.interface, self.sizes, module = interface, interface.sizes, writer.module
         self.shapes = interface.result_shapes(len(function.outputs))
         self.n_out = len(function.outputs) - len(interface.limits)
-        self.body = writer.body(function)
+        self.results, self.limited = self._divided(writer, function)
         self.table = ir.GlobalVariable(module, ir.ArrayType(INTEGER, len(cpython_layout.TABLE_ENTRIES)), "table")
         self.table.linkage, self.table.initializer = "internal", ir.Constant(self.table.value_type, None)
         self._write_fill(module)
         self.entry = ir.Function(module, CALL, "entry")
         self.b = ir.IRBuilder(self.entry.append_basic_block("entry"))
         self.fallback, self.over_limit = (self.entry.append_basic_block(name) for name in ("fallback", "over_limit"))
+
+    def _divided(self, writer: Writer, function: Function | NativeFunction) -> tuple[ir.Function, ir.Function | None]:
+        """Code of the results, and of the limited quantities where a single array of results is written in its place.
+
+        For this, results may not be written before the limits are known to hold. Writes ``single(double* in, double* out)``.
+        """
+        is_array = len(self.shapes) == 1 and bool(self.shapes[0])
+        parts: tuple[Function | NativeFunction, ...] = (function,)
+        if self.interface.limits and is_array and isinstance(function, Function):
+            parts = writer.divided(function, self.n_out) or parts
+        writer.export(parts[0], "single", *parts[1:])
+        return writer.body(parts[0]), writer.body(parts[1]) if len(parts) > 1 else None
 
     def _write_fill(self, module: ir.Module):
         fill = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER.as_pointer()]), "fill")
@@ -70,15 +83,29 @@ class EntryWriter:
             self._copy(b.gep(numbers, [INTEGER(place)]), data, size)
             place += size
         self._number(given, total, b.gep(numbers, [INTEGER(place)]))
-        found = b.alloca(DOUBLE, self.n_out + len(self.interface.limits))
-        b.call(self.body, [numbers, INTEGER(1), found, INTEGER(1)])
-        for k, limit in enumerate(self.interface.limits, start=self.n_out):
-            within = b.fcmp_ordered("<=", b.load(b.gep(found, [INTEGER(k)])), ir.Constant(DOUBLE, limit))
-            self._require(within, self.over_limit)
-        b.ret(self._given_or_new(given, total, found))
+        b.ret(self._given_or_new(given, total, self._within_limits(numbers)))
         for name, block in (("fallback", self.fallback), ("over_limit", self.over_limit)):
             b.position_at_end(block)
             b.ret(b.call(self._pinned("vectorcall", CALL.as_pointer()), [self._pinned(name, OBJECT), given, count, names]))
+
+    def _within_limits(self, numbers) -> Callable[[int, ir.Value], None]:
+        """Require that limits hold; the function writes a result to the place of its numbers."""
+        b, limits, stride = self.b, self.interface.limits, INTEGER(1)
+        whole = self.limited is None
+        found = b.alloca(DOUBLE, len(limits) + (self.n_out if whole else 0))
+        b.call(self.limited or self.results, [numbers, stride, found, stride])
+        for k, limit in enumerate(limits, start=self.n_out if whole else 0):
+            within = b.fcmp_ordered("<=", b.load(b.gep(found, [INTEGER(k)])), ir.Constant(DOUBLE, limit))
+            self._require(within, self.over_limit)
+        starts = [0, *accumulate(map(prod, self.shapes))]
+
+        def put(k: int, target):
+            if whole:
+                self._copy(target, b.gep(found, [INTEGER(starts[k])]), prod(self.shapes[k]))
+            else:
+                b.call(self.results, [numbers, stride, target, stride])
+
+        return put
 
     def _pinned(self, name: str, kind: ir.Type):
         """Load an address from the table."""
@@ -169,7 +196,7 @@ class EntryWriter:
         has_number = b.icmp_signed(">", total, INTEGER(place))
         b.store(self._either(has_number, value, lambda: ir.Constant(DOUBLE, 0.0)), target)
 
-    def _given_or_new(self, given, total, found):
+    def _given_or_new(self, given, total, put):
         """Results with a reference for the caller: in the array that is given, or in new ones."""
         b, none, place = self.b, self._pinned("none", OBJECT), len(self.sizes)
         asked = b.icmp_signed(">", total, INTEGER(place))
@@ -177,22 +204,19 @@ class EntryWriter:
         is_given = b.icmp_unsigned("!=", out, none)
         if len(self.shapes) > 1:
             self._require(b.not_(is_given))
-            return self._new_tuple(found)
+            return self._new_tuple(put)
 
         def taken():
-            self._copy(self._data(out, self.shapes[0], cpython_layout.WRITEABLE_FLAGS), found, self.n_out)
+            put(0, self._data(out, self.shapes[0], cpython_layout.WRITEABLE_FLAGS))
             self._incref(out)
             return out
 
-        return self._either(is_given, taken, lambda: self._new(0, found))
+        return self._either(is_given, taken, lambda: self._new(0, put))
 
-    def _new_tuple(self, found):
+    def _new_tuple(self, put):
         """New tuple of new results."""
-        b, place = self.b, 0
-        parts = []
-        for k, shape in enumerate(self.shapes):
-            parts.append(self._new(k, b.gep(found, [INTEGER(place)])))
-            place += prod(shape)
+        b = self.b
+        parts = [self._new(k, put) for k in range(len(self.shapes))]
         made = b.call(self._pinned("new_tuple", ir.FunctionType(OBJECT, [INTEGER]).as_pointer()), [INTEGER(len(parts))])
         self._end_if_null(made)
         keep = self._pinned("set_item", ir.FunctionType(FLAG, [OBJECT, INTEGER, OBJECT]).as_pointer())
@@ -200,15 +224,18 @@ class EntryWriter:
             b.call(keep, [made, INTEGER(k), part])  # which takes the reference
         return made
 
-    def _new(self, k: int, found):
+    def _new(self, k: int, put):
         """Array with result k, or a new number; if there is no memory, the call ends with the error of its maker."""
-        b, shape = self.b, self.shapes[k]
-        if not shape:
-            made = b.call(self._pinned("new_float", ir.FunctionType(OBJECT, [DOUBLE]).as_pointer()), [b.load(found)])
+        b = self.b
+        if not self.shapes[k]:
+            with b.goto_entry_block():
+                number = b.alloca(DOUBLE)
+            put(k, number)
+            made = b.call(self._pinned("new_float", ir.FunctionType(OBJECT, [DOUBLE]).as_pointer()), [b.load(number)])
             self._end_if_null(made)
             return made
         array = self._array(k)
-        self._copy(self._field(array, cpython_layout.ARRAY_OFFSETS["data"], DOUBLE.as_pointer()), found, prod(shape))
+        put(k, self._field(array, cpython_layout.ARRAY_OFFSETS["data"], DOUBLE.as_pointer()))
         return array
 
     def _array(self, k: int):
