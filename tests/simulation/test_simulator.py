@@ -108,7 +108,9 @@ def test_the_seed_decides_the_start():
     assert np.abs(phi).max() <= ROUNDING
 
 
-@pytest.mark.parametrize("u", [[np.nan], [np.inf], [1.0, 2.0], [], "x", None, [[1.0], [2.0]]])
+@pytest.mark.parametrize(
+    "u", [[np.nan], [np.inf], [1.0, 2.0], [], "x", None, [[1.0], [2.0]], np.ma.masked_array([1.0], [True])]
+)
 def test_refused_inputs_change_nothing(u):
     sim, other = simulator("cart_pole", "rail", None), simulator("cart_pole", "rail", None)
     sim.step([1.0]), other.step([1.0])
