@@ -274,7 +274,10 @@ class Simulator:
         given = u if type(u) is np.ndarray and u.dtype is FLOAT else _floats(u)
         if given is None or given.shape != self._u.shape or not isfinite(sum(given.tolist())):
             given = checked_inputs(u, self.inputs, self.t)
-        self._values[:] = given
+        try:
+            self._values[:] = given
+        except ValueError:  # where doubles do not begin
+            self._u[:] = given
         if isinstance(self._run, CompiledFixedRun) and self._run.method.starts_from_accelerations:
             # its method state holds the accelerations under the inputs before
             point = self._layout.point(self._point)
