@@ -126,6 +126,7 @@ def test_what_cannot_be_rolled_out_says_why():
         ([[np.nan]], [[0.0]], {}, "q0: expected finite"),
         ([[0.0]], [[0.0]], {"steps": 0}, "steps: expected a positive whole number, got 0"),
         ([[0.0]], [[0.0]], {"steps": 1.5}, "steps: expected a positive whole number, got 1.5"),
+        ([[0.0]], [[0.0]], {"steps": 10**12}, "steps: the samples of 1000000000000 steps"),
         ([[0.0]], [[0.0]], {"step": np.inf}, "step: expected a positive number, got inf"),
         ([[0.0]], [[0.0]], {"threads": 0}, "threads: expected a positive whole number, got 0"),
         (np.zeros((0, 1)), np.zeros((0, 1)), {}, r"q0: expected finite numbers of shape \(batch, 1\)"),

@@ -27,6 +27,7 @@ from gauss.simulation.batch.machine_code import STEPPED, batch_program, fixed_st
 from gauss.simulation.batch.repeated_motions import repeat, tell_of_divergence
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
+from gauss.simulation.grid import MOST_STEPS
 from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
@@ -132,7 +133,10 @@ def rollout(
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", **given)
     with one_tier(_tier(q0, steps)):
         keep = 1 if every is None else every
-        return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)
+        try:
+            return _fixed(system, q0, v0, STEPPED[integrator], steps, step, keep, threads or cores(), control, device)
+        except MemoryError as error:
+            raise SimulationError(_too_many_samples(steps, f"the memory: {error}")) from error
 
 
 def _tier(q0, steps) -> str:
@@ -192,7 +196,16 @@ def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[i
     if steps is None:
         raise SimulationError("steps: expected a positive whole number, got None.")
     _check_counts({"steps": steps, "every": every})
+    if steps // every > MOST_STEPS or steps > MOST_STEPS * MOST_STEPS:
+        raise SimulationError(_too_many_samples(steps, f"{MOST_STEPS:.0e}"))
     return steps, step
+
+
+def _too_many_samples(steps: int | None, most: str) -> str:
+    return (
+        f"steps: the samples of {steps} steps are more than {most}; "
+        "give every= to keep fewer of them, or begin again from the last states of a shorter rollout."
+    )
 
 
 def _begun(system: System, starts: np.ndarray, method: FixedStep, held: bool, device: str | None):
