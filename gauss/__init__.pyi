@@ -70,8 +70,7 @@ from gauss.analysis.identification import Identification, identify
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.linear_modes import LinearModes
-from gauss.analysis.mode_motion import mode_motion
-from gauss.analysis.modes import modes
+from gauss.analysis.modes import mode_motion, modes
 from gauss.analysis.motion_fit import fit_motion
 from gauss.analysis.optimal import (
     FeedbackMotion,

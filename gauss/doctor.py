@@ -127,7 +127,8 @@ def _cache() -> Finding:
     if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")
     if place.is_dir() and not file_trust.is_own(place.stat()):
-        return Finding("cache", f"{text}; not used, for others may write to it", f"chmod go-w {place}, if it is yours")
+        why, remedy = file_trust.reason_and_remedy(place, place.stat())
+        return Finding("cache", f"{text}; not used: {why}", remedy)
     return Finding("cache", text)
 
 

@@ -178,6 +178,7 @@ DISTRIBUTIONS = {  # of imports
     "imageio_ffmpeg": "imageio-ffmpeg",
     "pinocchio": "pin",
     "pxr": "usd-core",
+    "robot_descriptions": "robot-descriptions",
     "sksundae": "scikit-sundae",
     "yaml": "pyyaml",
 }
@@ -197,7 +198,8 @@ def extra(name: str = ""):
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         distribution = DISTRIBUTIONS.get(package, package)
-        others = [other for other in (absent_packages(name) if name else []) if other != distribution]
+        alike = distribution.replace("_", "-")  # as metadata may spell it
+        others = [other for other in (absent_packages(name) if name else []) if other.replace("_", "-") != alike]
         remedy = f"pip install {' '.join([distribution, *others])}"
         source = f"extra {name!r}" if name else "part of the default installation, needed for this alone"
         raise MissingPackageError(f"{package} is not installed: {remedy} ({source}).", name=package) from error

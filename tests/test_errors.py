@@ -148,6 +148,7 @@ def test_any_body_is_physical_or_refused(mass, inertia, com):
     assert body.mass >= 0 and np.isfinite(J).all() and np.isfinite(body.com).all()
 
 
+@pytest.mark.slow
 @given(axis=st.lists(NUMBERS, max_size=4), at=st.lists(NUMBERS, max_size=4), pitch=NUMBERS)
 def test_any_joint_is_sound_or_refused(axis, at, pitch):
     scene = _scene()
@@ -185,6 +186,7 @@ def test_a_missing_part_of_a_package_is_the_package():
         import_module("nowhere.colours")
 
 
+@pytest.mark.slow
 def test_a_moment_that_digits_left_below_zero_drives_nothing_backwards():
     scene = gauss.Scene("thin rod")
     rod = scene.body("rod", 1.0, (-1e-7, 1.0, 1.0))

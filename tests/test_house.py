@@ -7,7 +7,7 @@ import ast
 import inspect
 import re
 import warnings
-from collections import Counter
+from collections import Counter, defaultdict
 from functools import cache
 from importlib import import_module
 from itertools import chain
@@ -77,9 +77,20 @@ def trees() -> dict[str, ast.Module]:
         return {str(path.relative_to(ROOT)): ast.parse(path.read_text(encoding="utf-8")) for path in files}
 
 
+@cache
+def by_kind() -> dict[str, dict[type, list]]:
+    """Nodes of each file by their kind: all are walked through once."""
+    found: dict[str, dict[type, list]] = {}
+    for path, tree in trees().items():
+        kinds = found[path] = defaultdict(list)
+        for node in ast.walk(tree):
+            kinds[type(node)].append(node)
+    return found
+
+
 def nodes(kind):
     """All nodes of a kind, with the paths of their files."""
-    return [(path, node) for path, tree in trees().items() for node in ast.walk(tree) if isinstance(node, kind)]
+    return [(path, node) for path, kinds in by_kind().items() for node in kinds[kind]]
 
 
 def own(node: ast.AST):
@@ -114,10 +125,11 @@ def assigned(tree: ast.Module) -> list[str]:
 
 def defined(tree: ast.Module) -> set[str]:
     """Names that a file defines: classes, functions, parameters, attributes, constants and fields."""
-    found = {node.name for node in ast.walk(tree) if isinstance(node, DEFINITIONS)}
-    found |= {node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)}
-    found |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
-    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    every = list(ast.walk(tree))
+    found = {node.name for node in every if isinstance(node, DEFINITIONS)}
+    found |= {node.arg for node in every if isinstance(node, ast.arg)}
+    found |= {node.attr for node in every if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
+    classes = [node for node in every if isinstance(node, ast.ClassDef)]
     bodies = [tree.body, *(node.body for node in classes)]
     lines = [
         line for body in bodies for line in body if not (isinstance(line, ast.Assign) and FORMER in ast.dump(line.value))

@@ -14,14 +14,9 @@ First answers are those of a fresh process: from the file to the accelerations o
 an empty cache of machine code and with a full one. A motion of ten robots without loads begins at the first reference state;
 floating robots do not fall. Its drift is the largest residual of the constraints, relative to the size of the robot.
 
-Loops are eliminated where they close (:mod:`gauss.dynamics.embedded_loops`). Operations of one state with its error check,
-by the general elimination before, and now: Stewart platform 27 436, 12 579; cassie 23 417, 12 931; digit 87 918, 36 901;
-disney 51 885, 29 826; delta 5 454, 3 527; talos 13 108, 8 933; wl16 58 224, 20 378; ten four-bars 43 219, 12 046. Times fall
-less than operations; why was not measured. Of the 12 579 of a Stewart platform
-about 950 are kinematics, articulated inertias and K M⁻¹ Kᵀ of its legs, 1 300 the factor of 18 rows and 6 rates of the
-platform, 3 100 biases, forces and multipliers, 1 500 the rates of all 36 coordinates, those of loop joints among them, 2 200
-the refinement that measures the error, 2 500 the residual of the given state, the rest its limits. In talos, disney and
-cassie the tree alone (2 985, 7 684, 3 604 operations) is as dear as what its loops add.
+Loops are eliminated where they close (:mod:`gauss.dynamics.embedded_loops`). Operations are those of one state with its
+error check, in brackets by the general elimination instead (:mod:`benchmarks.loop_robots.operations`); equal chains of a
+robot are computed in lanes, so that several of them are one instruction.
 
 CPU time of the process; medians of interleaved rounds. Writes benchmarks/results/loop_robots.csv and .md.
 """
@@ -44,6 +39,7 @@ import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
 from benchmarks.command import command, load_at_the_end  # noqa: E402
+from benchmarks.loop_robots.operations import operations  # noqa: E402
 from benchmarks.loop_robots.peers import PEERS, peers  # noqa: E402
 from benchmarks.loop_robots.report import page  # noqa: E402
 from benchmarks.loop_robots.robots import Robot, robots  # noqa: E402
@@ -75,7 +71,7 @@ def measured(folder: str, rounds: int, only: str, seconds: float) -> tuple[list[
     for robot in robots(folder, only):
         line = {"robot": robot.name, "loops": robot.given["loops"], "couplings": robot.given["couplings"]}
         line |= {"nv": robot.given["nv"], "dof": robot.given["dof"], "redundant": _redundant(robot)}
-        line |= _assembled(robot) | _times(robot, rounds) | _first_answers(robot)
+        line |= operations(robot.system) | _assembled(robot) | _times(robot, rounds) | _first_answers(robot)
         if seconds and any(robot.given["id"].endswith(f"/{name}") for name in MOVED):
             line |= _motion(robot, seconds)
         found.append(line)

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.loop_robots.operations import GENERAL, TAKEN
 from gauss.bench.contest import OURS
 from gauss.bench.markdown import formatted_table, head, in_time, number
 
@@ -38,6 +39,7 @@ def page(text: str, names: Sequence[str], lines: list[dict], conditions: list[st
                 "rates": "{nv}",
                 "freedoms": "{dof}",
                 "redundant rows": "{redundant}",
+                "operations": "{operations}",
                 "moved in assembly": "{moved:.2g}",
                 "error": "{error}",
                 "one state": "{ours}",
@@ -65,6 +67,7 @@ def _made(names: Sequence[str], line: dict) -> dict:
     return {
         "robot": line["robot"],
         **{key: f"{_value(line, key):.0f}" for key in ("loops", "couplings", "nv", "dof", "redundant")},
+        "operations": _operations(_value(line, TAKEN), _value(line, GENERAL)),
         "moved": _value(line, "moved"),
         "accuracy": _value(line, "error"),
         "error": number(_value(line, "error")),
@@ -76,6 +79,11 @@ def _made(names: Sequence[str], line: dict) -> dict:
         "cold": in_time(_value(line, "cold")),
         "warm": in_time(_value(line, "warm")),
     }
+
+
+def _operations(taken: float, general: float) -> str:
+    """Numbers of operations; that of the general elimination in brackets."""
+    return f"{taken:.0f}" if np.isnan(general) else f"{taken:.0f} ({general:.0f})"
 
 
 def _summary(made: list[dict]) -> list[str]:

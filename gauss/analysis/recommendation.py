@@ -8,7 +8,7 @@ import numpy as np
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.conditions import closed_form_contacts, refuse_motionless
+from gauss.dynamics.conditions import located_contacts, refuse_motionless
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
@@ -19,7 +19,6 @@ from gauss.integrators import METHODS
 from gauss.scene import Prescribed
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.system import State, System, retract
-from gauss.system.contact_gaps import slips
 
 NEAR_SINGULAR = 1e-3  # σ_min/σ_max of the loop-closure Jacobian below which a configuration is near-singular
 STIFF = 100.0  # fastest decay over the other rates above which an implicit method is recommended
@@ -171,9 +170,7 @@ def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
 
 def _stepped(system: System) -> str:
     """Why motions take time stepping; empty where they need not."""
-    if slips(system.scene):
-        return "contacts have friction"
-    return "".join(closed_form_contacts(Question(system, Laws(system))))
+    return "".join(located_contacts(Question(system, Laws(system))))
 
 
 def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:

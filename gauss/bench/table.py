@@ -1,6 +1,7 @@
 """A table of measurements that is written row by row, so that an interruption costs one row."""
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from gauss.errors import FileError
 
 TEXTS = ("problem", "group", "backend", "reason", "data", "settings")  # columns of names and words, be they "001" or "nan"
 COMMIT = "# commit:"  # line of a header that may differ where a measurement goes on, as the first, the date, does
+OWN_VERSION = r"\bgauss \d[\w.]*, "
 
 
 class ResultTable:
@@ -118,8 +120,8 @@ def _parted(lines: Iterable[str]) -> tuple[list[str], list[str]]:
 
 
 def _lasting(comments: list[str]) -> list[str]:
-    """Lines of a header but those of the date and of the commit."""
-    return [line for line in comments[1:] if not line.startswith(COMMIT)]
+    """Lines of a header without date, commit, and the version of gauss, which the commit tells."""
+    return [re.sub(OWN_VERSION, "", line) for line in comments[1:] if not line.startswith(COMMIT)]
 
 
 def _text(value) -> str:

@@ -3,7 +3,7 @@
 Numbers, texts, arrays, collections and records of this package enter by value, in an encoding from which they could be read
 back: things of different content have different encodings. Top-level functions and classes of this package, numpy and the
 standard mathematics enter by name, for the key of the cache holds their sources or versions
-(:mod:`gauss.codegen.package_digest`). Another function enters by its code, its defaults, the values that it closes over and
+(:mod:`gauss.codegen.disk_cache`). Another function enters by its code, its defaults, the values that it closes over and
 those of its globals. A traced function enters by its operations. Anything else has no digest, and what depends on it is not
 kept: a digest that misses a number would be the key of the code of another mechanism.
 """

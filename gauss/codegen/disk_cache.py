@@ -1,24 +1,39 @@
 """Compiled objects on disk by the content that they are made from: a new process loads them without tracing anything.
 
 The key is the digest of that content (:mod:`gauss.codegen.content_digest`), of our sources and of the environment
-(:mod:`gauss.codegen.package_digest`). An entry is a pickle of the Python object around the machine code: names and sizes of
+(the compiler, numpy, Python, the CPU). An entry is a pickle of the Python object around the machine code: names and sizes of
 its functions, tables, facts found while it was traced. In it stand names instead of the machine code, which is kept as
 object code (:mod:`gauss.codegen.machine`), and instead of the objects that the content consists of, which the new process
 has. An entry is read under the seal of :mod:`gauss.codegen.object_cache`, like the machine code itself.
+
+Reading the sources takes 8 ms; so their digest is kept in the cache under the list of their paths, sizes and times of
+change, which takes 4 ms. Sources that changed after this process began are not those that it has loaded: then there is no
+digest, and nothing is kept.
 """
 
 import hashlib
 import io
+import os
 import pickle
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
+
+import llvmlite
+import llvmlite.binding as llvm
+import numpy as np
 
 from gauss.codegen import machine, object_cache
 from gauss.codegen.content_digest import content_digest
-from gauss.codegen.package_digest import package_digest
+from gauss.codegen.processor import features
+from gauss.lazy import BEGUN
 
 T = TypeVar("T")
+FOLDER = Path(__file__).parent.parent
+READ = 1 << 16  # bytes at a time: more than most sources have
 
 
 def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None) -> T:
@@ -112,3 +127,50 @@ class _Unpickler(pickle.Unpickler):
         if code is None:
             raise _NotCachedError
         return code
+
+
+@cache
+def package_digest() -> bytes | None:
+    """SHA-256 of sources and environment; None if sources have changed since this process began."""
+    files = sorted(_sources(str(FOLDER)))
+    if max(changed for *_, changed in files) >= BEGUN:
+        return None
+    listed = "sources-" + hashlib.sha256(repr((str(FOLDER), files)).encode()).hexdigest()
+    content = object_cache.read(listed)
+    if content is None:
+        content = _content_of([path for path, *_ in files])
+        object_cache.write(listed, content)
+    cpu = llvm.get_process_triple(), llvm.get_host_cpu_name(), features()
+    about = *cpu, llvmlite.__version__, llvm.llvm_version_info, np.__version__, sys.version
+    return hashlib.sha256(content + repr(about).encode()).digest()
+
+
+def _sources(folder: str, inside: str = "") -> Iterator[tuple[str, int, int]]:
+    """Path inside the package, size and last change [ns] of each source."""
+    for entry in os.scandir(folder):
+        if entry.is_dir(follow_symlinks=False):
+            if entry.name != "__pycache__":
+                yield from _sources(entry.path, f"{inside}{entry.name}/")
+        elif entry.name.endswith((".py", ".pyi")):
+            found = entry.stat()
+            yield inside + entry.name, found.st_size, max(found.st_mtime_ns, found.st_ctime_ns)
+
+
+def _content_of(paths: list[str]) -> bytes:
+    total = hashlib.sha256()
+    for path in paths:
+        content = _bytes_of(f"{FOLDER}/{path}")
+        total.update(b"%s\0%d\0%s" % (path.encode(), len(content), content))
+    return total.digest()
+
+
+def _bytes_of(path: str) -> bytes:
+    """Content of a file; a file object would take half as long again, a path object twice."""
+    file = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+    try:
+        parts = [os.read(file, READ)]
+        while len(parts[-1]) == READ:
+            parts.append(os.read(file, READ))
+    finally:
+        os.close(file)
+    return b"".join(parts)

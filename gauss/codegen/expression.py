@@ -4,7 +4,7 @@ So one source computes with floats, or traces its own operations (operator overl
 Derivatives, 2nd ed., ch. 6). Nodes belong to a :class:`gauss.codegen.Graph`.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from numbers import Real
 from operator import attrgetter
@@ -17,6 +17,24 @@ if TYPE_CHECKING:
 
 NUMBERS = (float, Real)  # float first: isinstance then rarely asks the abstract class
 INDEX_OF, OPERANDS_OF = attrgetter("index"), attrgetter("operands")  # of a node, without the overhead of a function
+
+
+def _operation(op: str, swapped: bool = False) -> Callable:
+    """Method for an operation of two operands: one call less than by a common method, for it is most of tracing."""
+
+    def operate(self, other):
+        first, graph = self, self.graph
+        if type(other) is float:
+            other = graph.constant(other)
+        elif type(other) is not Expression or other.graph is not graph:
+            if not isinstance(other, OPERANDS):
+                return NotImplemented
+            if isinstance(other, Expression) and graph.precedes(other.graph):
+                graph, first = other.graph, other.graph.lift(self)
+            other = graph.lift(other)
+        return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
+
+    return operate
 
 
 class Expression:
@@ -50,41 +68,12 @@ class Expression:
 
     __rand__, __ror__ = __and__, __or__
 
-    def _with(self, op: str, other, swapped: bool = False):
-        first, graph = self, self.graph
-        if type(other) is float:
-            other = graph.constant(other)
-        elif type(other) is not Expression or other.graph is not graph:
-            if not isinstance(other, OPERANDS):
-                return NotImplemented
-            if isinstance(other, Expression) and graph.precedes(other.graph):
-                graph, first = other.graph, other.graph.lift(self)
-            other = graph.lift(other)
-        return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
-
-    def __add__(self, other):
-        return self._with("add", other)
-
-    def __radd__(self, other):
-        return self._with("add", other, swapped=True)
-
-    def __sub__(self, other):
-        return self._with("sub", other)
-
-    def __rsub__(self, other):
-        return self._with("sub", other, swapped=True)
-
-    def __mul__(self, other):
-        return self._with("mul", other)
-
-    def __rmul__(self, other):
-        return self._with("mul", other, swapped=True)
-
-    def __truediv__(self, other):
-        return self._with("div", other)
-
-    def __rtruediv__(self, other):
-        return self._with("div", other, swapped=True)
+    __add__, __radd__ = _operation("add"), _operation("add", swapped=True)
+    __sub__, __rsub__ = _operation("sub"), _operation("sub", swapped=True)
+    __mul__, __rmul__ = _operation("mul"), _operation("mul", swapped=True)
+    __truediv__, __rtruediv__ = _operation("div"), _operation("div", swapped=True)
+    __lt__, __gt__ = _operation("less"), _operation("less", swapped=True)
+    __le__, __ge__ = _operation("less_equal"), _operation("less_equal", swapped=True)
 
     def __rpow__(self, base):
         return self.graph.lift(base).log().__mul__(self).exp()
@@ -99,18 +88,6 @@ class Expression:
         if _paths and not self.graph.shared:  # a dict of a law would never find it, whatever its value
             raise TypeError("a traced expression is no key of a dict and no member of a set")
         return id(self)
-
-    def __lt__(self, other):
-        return self._with("less", other)
-
-    def __gt__(self, other):
-        return self._with("less", other, swapped=True)
-
-    def __le__(self, other):
-        return self._with("less_equal", other)
-
-    def __ge__(self, other):
-        return self._with("less_equal", other, swapped=True)
 
     def __neg__(self):
         return self.graph.unary("neg", self)
@@ -170,9 +147,10 @@ class Expression:
 
     def arctan2(self, other):
         """Angle of the point (other, self)."""
-        return self._with("atan2", other)
+        return _arctan2(self, other)
 
 
+_arctan2 = _operation("atan2")
 _paths: list = []  # tracers of `if` over expressions, innermost last; see gauss.codegen.branches
 OPERANDS = (*NUMBERS, Expression)
 Scalar = float | Expression  # numbers over which the mechanics is written

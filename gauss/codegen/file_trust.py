@@ -39,9 +39,17 @@ def is_own_folder(folder: Path) -> bool:
         return False
     if is_own(found):
         return stat.S_ISDIR(found.st_mode)
-    remedy = "Take it from others (chmod go-w), or name another folder in GAUSS_CACHE"
-    _warn(folder, f"belongs to somebody else, or others may write to it. {remedy}")
+    what, remedy = reason_and_remedy(folder, found)
+    _warn(folder, f"{what}; {remedy}")
     return False
+
+
+def reason_and_remedy(folder: Path, found: os.stat_result) -> tuple[str, str]:
+    """Why a folder is not this user's own, and what helps: rights can be changed by the owner only."""
+    elsewhere = "name another folder in GAUSS_CACHE"
+    if found.st_uid != os.getuid():
+        return f"it belongs to the user with number {found.st_uid}", elsewhere
+    return "others may write to it", f"chmod go-w '{folder}', or {elsewhere}"
 
 
 def read_own(path: Path, denied: int = OTHERS_WRITE) -> bytes | None:

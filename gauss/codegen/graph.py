@@ -173,6 +173,13 @@ class Graph:
             return self.select(*operands)
         return self._make(node.op, tuple(operands), node.value)
 
+    def forget(self):
+        """Let go of the nodes, which refer to the graph, too: those that nobody else has are freed at once, not as garbage.
+
+        A node that is made again later is another one.
+        """
+        self.nodes, self._known, self._constants = [None] * len(self.nodes), {}, {}  # type: ignore[list-item]
+
     def _make(self, op: str, operands: tuple, value=None) -> Expression:
         key = (op, value, *map(INDEX_OF, operands))
         node = self._known.get(key)

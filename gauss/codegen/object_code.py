@@ -2,13 +2,15 @@
 
 Two tiers: quick, by LLVM's FastISel (code-generation level 0, no passes over the IR), and optimised. A module is optimised
 in units of a few functions each, so that no call into LLVM takes long: the time until a background thread stops, and until
-another thread may call LLVM, is that of one unit. Both tiers evaluate the same floating-point operations in the same order,
-fused where the IR says so: their results are equal to the last bit.
+another thread may call LLVM, is that of one unit. Functions are visible to the other units; constants are repeated in each
+unit that reads them; functions that use a variable stay in one unit. Both tiers evaluate the same floating-point operations
+in the same order, fused where the IR says so: their results are equal to the last bit.
 """
 
 import gc
+import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import count, islice
 
@@ -16,7 +18,6 @@ import llvmlite
 import llvmlite.binding as llvm
 
 from gauss.codegen.library_symbols import register_symbols_of
-from gauss.codegen.module_units import ModuleUnits
 from gauss.codegen.processor import features
 from gauss.codegen.terminal_line import units_in_progress
 
@@ -26,6 +27,10 @@ RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one 
 UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
 LINKS_PER_COLLECTION = 32  # modules linked between two collections, which take 30 ms
 CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
+FUNCTION = re.compile(r"^define [^\n]*\n\{\n.*?^\}\n", re.MULTILINE | re.DOTALL)
+GLOBAL = re.compile(r'^(@"[^"]*") = .*\n', re.MULTILINE)
+NAME = re.compile(r'@"[^"]*"')
+INTERNAL = re.compile(r"^define internal ")
 
 
 @cache
@@ -136,3 +141,53 @@ def _collect_engines_that_are_gone():
     """Collect garbage from time to time: few Python objects hold much machine code, and the collector counts objects."""
     if next(_links) % LINKS_PER_COLLECTION == 0 and gc.isenabled():
         gc.collect()
+
+
+class ModuleUnits:
+    """Text of a module, divided by functions.
+
+    Parameters
+    ----------
+    ir_text : str
+        The module, as llvmlite writes it.
+    """
+
+    def __init__(self, ir_text: str):
+        head = FUNCTION.sub("", ir_text)
+        self._values = {found.group(1): found.group() for found in GLOBAL.finditer(head)}
+        self._head = GLOBAL.sub("", head) + "\n"
+        self.functions = [INTERNAL.sub("define ", found.group()) for found in FUNCTION.finditer(ir_text)]
+        self._used = [set(NAME.findall(function)) for function in self.functions]
+        variables = {name for name, line in self._values.items() if " constant " not in line}
+        self._together = [k for k, used in enumerate(self._used) if used & variables]
+
+    def short(self, length: int) -> list[str]:
+        """Units of about a length, in characters."""
+        groups, size = [list(self._together)], sum(len(self.functions[k]) for k in self._together)
+        for k, function in enumerate(self.functions):
+            if k in self._together:
+                continue
+            if size and size + len(function) > length:
+                groups.append([])
+                size = 0
+            groups[-1].append(k)
+            size += len(function)
+        return [self._unit(group) for group in groups]
+
+    def apart(self, is_apart: Callable[[str], bool]) -> tuple[str, str]:
+        """Two units: functions without and with a property; those that use variables are taken as one."""
+        chosen = {k for k, function in enumerate(self.functions) if is_apart(function)}
+        chosen |= set(self._together) if chosen.intersection(self._together) else set()
+        return self._unit([k for k in range(len(self.functions)) if k not in chosen]), self._unit(sorted(chosen))
+
+    def _unit(self, mine: list[int]) -> str:
+        """Functions of these numbers, and what they refer to: constants, variables, declared functions; may be empty."""
+        if not mine:
+            return ""
+        used, inside = set().union(*(self._used[k] for k in mine)), set(mine)
+        lines = [line for name, line in self._values.items() if name in used]
+        for k, function in enumerate(self.functions):
+            first = function.partition("\n")[0]
+            if k not in inside and NAME.findall(first)[0] in used:
+                lines.append(first.replace("define ", "declare ", 1) + "\n")
+        return "".join([self._head, *lines, *(self.functions[k] for k in mine)])

@@ -33,7 +33,9 @@ class Schedule(NamedTuple):
 def schedule(function: Function) -> Schedule:
     """Schedule of a function."""
     rewritten = _Reassociation(function)
-    return Schedule(fused(rewritten.depth_first(), rewritten.outputs), rewritten.inputs, rewritten.outputs)
+    found = Schedule(fused(rewritten.depth_first(), rewritten.outputs), rewritten.inputs, rewritten.outputs)
+    rewritten.graph.forget()
+    return found
 
 
 class _Reassociation:

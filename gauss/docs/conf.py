@@ -1,6 +1,6 @@
 """Configuration of Sphinx; read by Sphinx, not imported."""
 
-from gauss.docs import figures, links, order
+from gauss.docs import gallery, links
 from gauss.io.catalog import folder
 from gauss.versions import VERSION
 
@@ -45,9 +45,9 @@ sphinx_gallery_conf = {
     "filename_pattern": r"\.py$",
     "ignore_pattern": r"__init__\.py$",
     "within_subsection_order": "FileNameSortKey",
-    "subsection_order": order.of_sections,
-    "image_scrapers": (figures.scraped,),
-    "reset_modules": (figures.reset,),
+    "subsection_order": gallery.of_sections,
+    "image_scrapers": (gallery.scraped,),
+    "reset_modules": (gallery.reset,),
     "backreferences_dir": None,
     "download_all_examples": False,
     "parallel": True,  # as many processes as Sphinx has

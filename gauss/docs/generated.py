@@ -5,15 +5,29 @@ there.
 """
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
-from gauss.docs.command_line import commands
-from gauss.docs.plans import plan_tables
+from gauss.dynamics import plan
+from gauss.dynamics.rules import Rule, RuleTable
 from gauss.io.catalog import catalog, folder, linkages, networks, servos
 
 PACKAGE = Path(__file__).parents[1]
 INSIDE = PACKAGE / "docs" / "originals"  # of an installed package; see pyproject.toml
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?://|#)([^)#]+)(?:#[^)]*)?\)")
+INTRODUCTION = (
+    "`gauss --help` lists the commands, `gauss COMMAND --help` their options. Wherever a scene is asked for, it is a file, "
+    "the name of a [model](../models.md), or `robot:NAME`. Errors are one line, with the remedy, and end with code 2. "
+    "`gauss --install-completion` lets the shell complete commands and options."
+)
+JOINED = re.compile(r" and (?=[A-Z])")  # of two conditions
+TABLES = {
+    "Motions, by `gauss.simulate`": plan.MOTIONS,
+    "Batches, by `gauss.rollout`": plan.BATCHES,
+    "Accelerations of a state, by `System.accelerations`": plan.ACCELERATIONS,
+    "Functions of a state, by `System.function`": plan.FUNCTIONS,
+    "Accelerations on a device, by `System.function(device=)`": plan.DEVICE_FUNCTIONS,
+}
 
 
 def original(name: str) -> Path:
@@ -80,3 +94,54 @@ def _models() -> str:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
+
+
+def commands(group) -> str:
+    """Page in Markdown.
+
+    Parameters
+    ----------
+    group : click.Group
+        All commands of the program.
+    """
+    return "\n\n".join(["# The command line", INTRODUCTION, *_described(group, "gauss")]) + "\n"
+
+
+def _described(group, name: str) -> Iterator[str]:
+    for key, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from _described(command, f"{name} {key}")
+        else:
+            yield f"## `{name} {key}`"
+            yield (command.help or "").strip()
+            yield "\n".join(["| | |", "|---|---|", *_rows(command.params)])
+
+
+def _rows(parameters) -> Iterator[str]:
+    for parameter in parameters:
+        is_option = parameter.param_type_name == "option"
+        shown = ", ".join([*parameter.opts, *parameter.secondary_opts]) if is_option else parameter.name.upper()
+        yield f"| `{shown}` | {' '.join((parameter.help or '').replace('|', '/').split())} |"
+
+
+def plan_tables() -> str:
+    """Tables in Markdown."""
+    return "\n\n".join(part for title, table in TABLES.items() for part in (f"### {title}", _table(table))) + "\n"
+
+
+def _table(table: RuleTable) -> str:
+    head = ["| | driver | dynamics | applies to | if | then, where a check fails |", "|---|---|---|---|---|---|"]
+    return "\n".join(head + [f"| {k} | {_row(rule)} |" for k, rule in enumerate(table.rules, 1)])
+
+
+def _row(rule: Rule) -> str:
+    conditions = "; ".join(_said(condition) for condition in rule.conditions) or "always"
+    cells = rule.driver, rule.dynamics, _said(rule.when), conditions, rule.fallback or "–"
+    return " | ".join(cell.replace("|", "\\|") for cell in cells)
+
+
+def _said(condition) -> str:
+    """First sentences of the docstrings of a condition, or of two that are joined, as part of a sentence."""
+    sentence = (condition.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+    parts = [part.removeprefix("Whether ") for part in JOINED.split(sentence)]
+    return " and ".join(part[:1].lower() + part[1:] for part in parts) or "all"

@@ -181,7 +181,9 @@ class ArticulatedBody:
         accelerations, rates = {} if base is None else {-1: base}, dict[int, np.ndarray]()
         moved = self._outward_of(loaded if base is None else range(len(self.clusters)))
         for cluster in (self.clusters[place] for place in sorted(moved)):
-            self._carry_outward(cluster, u.get(cluster[0][0].outer, np.zeros(1)), biases, rates, accelerations)
+            first = cluster[0][0].outer
+            own_u = u[first] if first in u else np.zeros(self.tree.joint_kinematics[first].S.shape[1])
+            self._carry_outward(cluster, own_u, biases, rates, accelerations)
         return rates, accelerations
 
     def _carry_outward(self, cluster, own_u, biases, rates: dict, accelerations: dict):

@@ -1,7 +1,11 @@
-"""Dynamics of single states with equal chains in the lanes of vector registers: the rule, and what is written.
+"""Dynamics of single states with equal chains in the lanes of vector registers.
 
 The mechanism is traced with parameters for the numbers in which its chains differ, so that zeros of one chain do not change
 its operations; in the code the parameters are constants again.
+
+Lanes are a choice of code generation, as the width of vectors and the tier are: the plan, its checks and its fallback stay
+as they are, and accelerations agree to rounding. It depends on the code itself, hence no rule of
+:mod:`gauss.dynamics.plan` makes it: :func:`in_chain_lanes` counts what lanes save. ``System.explain()`` lists the chains.
 """
 
 from collections import Counter, defaultdict
@@ -43,7 +47,7 @@ def in_chain_lanes(system: System, laws: Laws, once: Callable, sizes: tuple[int,
     name : str
         Name of the function.
     """
-    kinds = _kinds(system)
+    kinds = chains_for_lanes(system)
     if not kinds:
         return None
     family, twins, values = _parametrised(system, laws, kinds)
@@ -57,8 +61,8 @@ def in_chain_lanes(system: System, laws: Laws, once: Callable, sizes: tuple[int,
     return packed if packed.saving >= LEAST_SAVING else None
 
 
-def _kinds(system: System) -> list[EqualChains]:
-    """Equal chains of each kind; none where they are few of the joints, or relations are beside them."""
+def chains_for_lanes(system: System) -> list[EqualChains]:
+    """Equal chains of each kind that may be computed together; none if they are few of the joints or relations are there."""
     kinds = [] if system.relations.placed else equal_chains(system)
     return kinds if sum(len(equal.of_joint) for equal in kinds) >= LEAST_SHARE * len(system.joints) else []
 

@@ -264,6 +264,12 @@ def few_contact_operations(ask: Question) -> list[str]:
     return [f"its contacts would have about {work:.0e} operations"] if work > MOST_CONTACT_OPERATIONS else []
 
 
+def located_contacts(ask: Question) -> list[str]:
+    """Events of contacts can be located: they have no friction, and their distances are closed forms."""
+    rough = any(getattr(contact, "friction", 0.0) for contact in ask.system.scene.contacts.values())
+    return ["contacts have friction"] if rough else closed_form_contacts(ask)
+
+
 def closed_form_contacts(ask: Question) -> list[str]:
     """The distances of all shapes that may touch are closed forms."""
     shapes = ask.system.scene.shapes

@@ -11,12 +11,13 @@ from gauss.dynamics.store import cached
 from gauss.errors import SlowRouteWarning, user_level
 from gauss.system import System
 
+CALL = 2e-5  # s, of an evaluation of opaque laws that do little themselves
 COSTS = {  # s, and s per body, of an evaluation by a driver and a kind of dynamics
     ("compiled loop", "compiled"): (2e-7, 1e-7),
     ("compiled loop", "embedded loops"): (2e-7, 5e-8),
     ("compiled loop", "tree recursion"): (2e-7, 1e-7),
     ("compiled loop", "call graph"): (1e-6, 1e-7),
-    ("compiled loop", "callbacks"): (1e-5, 1e-7),
+    ("compiled loop", "callbacks"): (CALL, 1e-7),
     ("Python loop", "compiled"): (1e-4, 4e-6),
     ("Python loop", "tree recursion"): (1e-4, 5e-6),
     ("Python loop", "call graph"): (1e-4, 5e-7),

@@ -6,6 +6,7 @@ Python. What follows from the values of drives and of forces on bodies is machin
 where a law asks for them.
 """
 
+import ctypes
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
@@ -68,41 +69,64 @@ class LoadForces:
         self._values, self._loaded = _values(system, self._asked), _loaded(system, self._applied)
         self._posed = bool(self._loaded) or any(needs_poses(bound.load) for bound in self.called)
         self._places = system.structure.n_bodies + 1  # with the ground
+        self.n_q, self.n_in = 1 + system.n_q, 1 + system.n_q + system.n_v
+        self._size = self.n_in + sum(size for *_, size in self._values)
 
     def __call__(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces, and power [W]."""
-        found = self.packed(state, np.concatenate([[state.t], state.q, state.v]))
+        found, numbers = np.empty(self.system.n_v + 3), self.room()
+        numbers[0], numbers[1 : self.n_q], numbers[self.n_q : self.n_in] = state.t, state.q, state.v
+        self.write(state, numbers, address(numbers), address(found))
         return found[: self.system.n_v], found[self.system.n_v :]
 
-    def packed(self, state: State, inputs: np.ndarray) -> np.ndarray:
-        """Generalised forces and power (n_v + 3,) of a state; ``inputs`` are its numbers in one array."""
-        parts = []
+    def room(self) -> np.ndarray:
+        """Array for the numbers of a state, which are followed by the values of laws."""
+        return np.empty(self._size)
+
+    def write(self, state: State, numbers: np.ndarray, place: int, found: int):
+        """Write generalised forces and power (n_v + 3,) of a state to an address.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+        numbers : ndarray
+            A :meth:`room` with its time, coordinates and rates, that nobody else writes to.
+        place, found : int
+            Addresses of ``numbers``, and of the results.
+        """
+        motion = None
         if self.called:
-            motion = self._placed(state, inputs) if self._posed else Kinematics(self.system, state)
-        if self._asked:
-            given = state.t, motion
-            values = [evaluated(law, given, what, size) for law, what, size in self._values]
-            parts.append(_at(self._of_values, np.concatenate([inputs, *values])))
-        if self._applied:
-            parts.append(self._of_others(motion, inputs))
+            motion = self._placed(state, numbers) if self._posed else Kinematics(self.system, state)
+            given, end = (state.t, motion), self.n_in
+            for law, what, size in self._values:
+                numbers[end : end + size] = evaluated(law, given, what, size)
+                end += size
+        if self._asked and not self._applied and self._traced is None:  # the usual case, quickly
+            self._of_values.at(place, found)
+            return
+        parts = [_at(self._of_values, place)] if self._asked else []
+        if self._applied and motion is not None:
+            parts.append(self._of_others(motion, numbers[: self.n_in]))
         if self._traced is not None:
-            parts.append(_at(self._traced, inputs))
-        return parts[0] if len(parts) == 1 else sum(parts, np.zeros(self.system.n_v + 3))
+            parts.append(_at(self._traced, place))
+        total = parts[0] if len(parts) == 1 else sum(parts, np.zeros(self.system.n_v + 3))
+        ctypes.memmove(found, address(total), total.nbytes)
 
     def _of_others(self, motion: Kinematics, inputs: np.ndarray) -> np.ndarray:
         """The same of loads that are neither drives nor forces."""
         applied = Applied(motion, self._applied)
         Q = applied.P
         if self._loaded:
-            wrenches = [part[body] for body in self._loaded for part in (applied.F, applied.M)]
-            Q = Q + _at(self._transposed, np.concatenate([inputs, *wrenches]))
+            given = np.concatenate([inputs, *(part[body] for body in self._loaded for part in (applied.F, applied.M))])
+            Q = Q + _at(self._transposed, address(given))
         return np.concatenate([Q, [applied.driven, applied.loaded, applied.dissipated]])
 
-    def _placed(self, state: State, inputs: np.ndarray) -> Kinematics:
+    def _placed(self, state: State, numbers: np.ndarray) -> Kinematics:
         """Kinematics with poses by machine code, at the first access: many laws need coordinates and rates only."""
 
         def poses() -> tuple[np.ndarray, ...]:
-            found, n = _at(self._poses, inputs), self._places
+            found, n = _at(self._poses, address(numbers)), self._places
             R, x, W, u = found[: 9 * n], found[9 * n : 12 * n], found[12 * n : 15 * n], found[15 * n :]
             return R.reshape(n, 3, 3), x.reshape(n, 3), W.reshape(n, 3), u.reshape(n, 3)
 
@@ -167,10 +191,10 @@ def _loaded(system: System, applied: Sequence[BoundLoad]) -> list[int]:
     return sorted({body for one in applied if not one.on_coordinates for body in _bodies(system, one)})
 
 
-def _at(kernel: Kernel, inputs: np.ndarray) -> np.ndarray:
-    """Outputs of a kernel in one state, without the checks of its arguments."""
+def _at(kernel: Kernel, place: int) -> np.ndarray:
+    """Outputs of a kernel for the inputs at an address, without the checks of its arguments."""
     found = np.empty(kernel.n_out)
-    kernel.at(address(inputs), address(found))
+    kernel.at(place, address(found))
     return found
 
 

@@ -28,17 +28,15 @@ class LoadReceiver(Receiver):
     """
 
     def __init__(self, forces: LoadForces):
-        self.forces, system = forces, forces.system
-        self.n_q, self.given = 1 + system.n_q, np.empty(1 + system.n_q + system.n_v)
-        self.place, self.sizes = address(self.given), (NUMBER * self.given.size, NUMBER * (system.n_v + 3))
+        self.forces, self.n_q, self.n_in, self.size = forces, forces.n_q, forces.n_in, NUMBER * forces.n_in
 
     def __call__(self, given: int, found: int):
         """Evaluate the loads of a state."""
-        ctypes.memmove(self.place, given, self.sizes[0])
-        numbers = self.given.copy()  # a law may keep it
-        state = State(float(numbers[0]), numbers[1 : self.n_q], numbers[self.n_q :])
-        loads = self.forces.packed(state, numbers)
-        ctypes.memmove(found, address(loads), self.sizes[1])
+        numbers = self.forces.room()  # new, for a law may keep it
+        place = address(numbers)
+        ctypes.memmove(place, given, self.size)
+        state = State(numbers.item(0), numbers[1 : self.n_q], numbers[self.n_q : self.n_in])
+        self.forces.write(state, numbers, place, found)
 
 
 def received(function: Callable[..., T], receiver: LoadReceiver) -> Callable[..., T]:

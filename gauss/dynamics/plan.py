@@ -51,6 +51,7 @@ from gauss.dynamics.conditions import (
     has_opaque_laws,
     large_loops,
     large_tree,
+    located_contacts,
     named,
     narrow,
     no_held_inputs,
@@ -125,7 +126,7 @@ def _beyond_accelerations(ask: Question) -> str:
 
 def _refused(ask: Question, why: str) -> str:
     needs = _beyond_accelerations(ask)
-    if closed_form_contacts(ask):
+    if closed_form_contacts(ask) or (_is_nonsmooth(ask) and located_contacts(ask)):
         return f"scene {ask.system.scene.name!r}: {why}; use integrator='time_stepping' with a step, and the backend 'auto'."
     return f"{needs} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
 
@@ -171,8 +172,8 @@ MOTIONS = RuleTable(
         Rule("time stepping", "callbacks", "certified", _both(is_time_stepping, has_opaque_laws), _CALLING_STEP),
         Rule("time stepping", "pair kernels", "", _both(is_time_stepping, shapes_in_contact), _PAIR_KERNELS),
         Rule("time stepping", "certified", when=is_time_stepping, conditions=(no_held_inputs, closed_form_contacts)),
-        Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, closed_form_contacts)),
-        Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, closed_form_contacts)),
+        Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, located_contacts)),
+        Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, located_contacts)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
         Rule(
             "compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, independent_fronts)

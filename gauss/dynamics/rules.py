@@ -58,7 +58,9 @@ class Plan:
         eliminated where they close), "call graph" (a kernel for each kind of
         link and loop), "tree recursion" (a kernel for each kind of link), "callbacks" (compiled, calling opaque laws),
         "unilateral" (compiled, with an active set of contacts), "pair kernels" (kernels of pairs of shapes, shared by all
-        scenes), "certified" (a QP backend solves every state, with a certificate), or "none".
+        scenes), "certified" (a QP backend solves every state, with a certificate), or "none". How wide the vectors of
+        straight-line code are, and whether it computes equal chains of a single state in their lanes
+        (:mod:`gauss.dynamics.chain_lanes`), is left to code generation.
     stabilisation : str
         Constraint stabilisation.
     fallback : str

@@ -11,13 +11,13 @@ from gauss.backends.compulsion import Compulsion
 from gauss.codegen import count, made_from, write
 from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.consistent_states import consistent
-from gauss.dynamics.evaluation_cost import evaluation_cost, slowdown
+from gauss.dynamics.evaluation_cost import CALL, evaluation_cost, slowdown
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import ACCELERATIONS, motion_plan
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import Store
-from gauss.errors import judged_later
+from gauss.errors import SimulationError, judged_later
 from gauss.system import State, Subsystem, System
 
 
@@ -31,17 +31,32 @@ class SystemDynamics(Store):
         """Dynamics of another system, with an empty cache."""
         return SystemDynamics()
 
-    def plans(self, system: System) -> dict[str, Plan]:
-        """Plans of its motions and of its single states, {name: plan}."""
-        return {"motions": motion_plan(system), "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
+    def plans(self, system: System) -> dict[str, Plan | SimulationError]:
+        """Plans of its motions and of its single states, {name: plan}; what motions need where they have none by default."""
+        motions: Plan | SimulationError
+        try:
+            motions = motion_plan(system)
+        except SimulationError as refusal:  # of the default integrator: it says what to use
+            motions = refusal
+        return {"motions": motions, "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
 
     def cost(self, system: System, plan: Plan) -> tuple[float, float]:
         """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""
         return evaluation_cost(system, plan), slowdown(system, plan)
 
+    def equal_chains(self, system: System, plan: Plan) -> list[tuple[int, int]]:
+        """Numbers of equal chains that code of single states may compute together, and of their joints, for each kind."""
+        from gauss.dynamics.chain_lanes import chains_for_lanes
+
+        kinds = chains_for_lanes(system) if plan.dynamics in ("compiled", "embedded loops") else []
+        return [(len(equal.chains), len(equal.chains[0].joints)) for equal in kinds]
+
     def called(self, system: System) -> dict[str, str]:
-        """Loads with opaque laws, and the reasons."""
-        return Laws(system).reasons
+        """Loads with opaque laws: what a call costs, and why they are opaque."""
+        from gauss.dynamics.laws.sampled_laws import SAMPLES
+
+        text = f"about {1e6 * CALL:.0f} µs (estimated), and up to {SAMPLES} times before a motion if it is a law of time"
+        return {name: f"{text}; {why}" for name, why in Laws(system).reasons.items()}
 
     def operations(self, system: System, subsystems: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of subsystems; None for large trees, which are not traced."""

@@ -20,6 +20,7 @@ from gauss.dynamics.error_scale import (
     acceleration_scale,
     centrifugal_scale,
 )
+from gauss.dynamics.gear_trains import on_trains
 from gauss.dynamics.generic_rank import has_full_generic_rank
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
@@ -35,7 +36,6 @@ from gauss.dynamics.rigid_loops import is_in_other_pose, rigid_joints
 from gauss.dynamics.shared_elimination import SharedElimination
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.store import cached_on_disk
-from gauss.dynamics.train_coordinates import on_trains
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
 

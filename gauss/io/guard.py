@@ -15,6 +15,7 @@ from gauss.io.numbers import number
 LARGEST_FILE = 20_000_000  # bytes
 MOST_INCLUDES = 1000  # included files of one file, nested ones counted: more is a mistake, or an attack
 DEEPEST = 200  # elements inside elements; parsers call themselves for each
+DEEPEST_OF = {"mujoco": 499, "mujocoinclude": 499}  # by the outermost element: chains of bodies; the limit of MuJoCo
 LARGEST_MAGNITUDE = 1e20  # of a number, in any SI unit: above those of any mechanism
 NAMES = ("name", "link", "joint", "body")  # attributes that may look like numbers and are none
 
@@ -139,7 +140,7 @@ class _Parser:
     """Expat, which knows lines, with a builder of elements behind it."""
 
     def __init__(self, path: Path):
-        self.path, self.depth, self.builder = path, 0, TreeBuilder()
+        self.path, self.depth, self.deepest, self.builder = path, 0, DEEPEST, TreeBuilder()
         self.places: dict[Element, str] = {}
         self.expat = expat.ParserCreate()
         self.expat.buffer_text = True
@@ -156,9 +157,11 @@ class _Parser:
         return f"{self.path}:{self.expat.CurrentLineNumber}"
 
     def _start(self, tag: str, attributes: dict):
+        if not self.depth:
+            self.deepest = DEEPEST_OF.get(tag, DEEPEST)
         self.depth += 1
-        if self.depth > DEEPEST:
-            raise FileError(f"{self._here}: elements are nested more than {DEEPEST} deep.")
+        if self.depth > self.deepest:
+            raise FileError(f"{self._here}: elements are nested more than {self.deepest} deep.")
         self.places[self.builder.start(tag, attributes)] = self._here
 
     def _end(self, tag: str):

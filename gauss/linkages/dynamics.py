@@ -14,9 +14,8 @@ from gauss.linkages.chain import Chain
 from gauss.linkages.crank_motion import CrankMotion, motor_times, solved
 from gauss.linkages.crank_ranges import closing_ranges, follow, near
 from gauss.linkages.elements import CrankMotor
-from gauss.linkages.kernels import reduced_kernel
+from gauss.linkages.kernels import inertia_terms, reduced_kernel
 from gauss.linkages.motion import move
-from gauss.linkages.reduced import inertia_terms
 from gauss.scene.values import evaluated
 from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 

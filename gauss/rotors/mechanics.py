@@ -12,6 +12,7 @@ import numpy as np
 
 from gauss.codegen import Kernel, Scalar, trace
 from gauss.dynamics.rules import Plan, Rejected
+from gauss.errors import SimulationError
 from gauss.rotors.laws import ROLES, TorqueFunction
 from gauss.rotors.links import GearPair, LinkKinematics
 from gauss.rotors.reduced import ReducedNetwork, psi
@@ -205,7 +206,7 @@ class NetworkEquations:
             self._kernel = trace(self._traced, *sizes(self.reduced), batch=False)
         except Exception as error:  # a law of the user may fail in any way on symbols: it is called then
             if compiled:
-                raise
+                raise SimulationError(f"compiled=True: a law cannot be traced ({error}); leave compiled out.") from error
             return f"a law cannot be traced ({type(error).__name__}: {error})"
         return ""
 

@@ -50,6 +50,12 @@ class Contact(Unilateral):
         self._keep_restitution()
         values.keep(self, friction=values.number(self.friction, f"{self.what}: friction", "1", non_negative=True))
 
+    def between(self, name: str, shape: str, other: str) -> "Contact":
+        """The same contact of two other shapes, named as those of a scene are: they are not checked again."""
+        found = object.__new__(Contact)
+        vars(found).update(vars(self), name=name, shape=shape, other=other)
+        return found
+
     def sides(self, scene) -> tuple[str, ...]:
         """Names of the gap functions: that of the contact, numbered from 1 if there are several."""
         if scene.shapes[self.shape].body == scene.shapes[self.other].body:

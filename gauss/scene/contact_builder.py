@@ -82,13 +82,13 @@ class ContactBuilder(SceneBuilder):
         excluded |= {frozenset((contact.shape, contact.other)) for contact in self._contacts_of_shapes()}
         joints = [joint for joint in self.joints.values() if joint.parent != elements.GROUND]
         excluded |= {frozenset((joint.parent, joint.child)) for joint in joints}
-        taken = self._taken()
-        found = []
+        taken, found = self._taken(), []
+        pattern = elements.Contact("all contacts", "one", "other", restitution, friction)
         for one, other in combinations(self.shapes.values(), 2):
             if self._may_touch(one, other, excluded):
                 name = f"{other.name} on {one.name}"
                 self._require_new(name, "contact", taken)
-                found.append(elements.Contact(name, other.name, one.name, restitution, friction))
+                found.append(pattern.between(name, other.name, one.name))
         self.contacts.update({contact.name: contact for contact in found})
         return found
 

@@ -7,13 +7,14 @@ GJK and EPA: Gilbert, Johnson, Keerthi, IEEE J. Robot. Autom. 4, 1988; van den B
 IEEE Trans. Robot. 40, 2024). Clipping: Sutherland, Hodgman, Comm. ACM 17, 1974.
 """
 
+from functools import lru_cache
 from math import dist, inf, isfinite
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
-from gauss.scene.convex_mesh import ConvexMesh
+from gauss.scene.convex_mesh import MESHES, ConvexMesh, hull_of
 from gauss.scene.curved_shapes import Cone, Cylinder, Ellipsoid
 from gauss.scene.support_faces import Face, Oval, Polytope, Revolved, Segment
 
@@ -51,7 +52,7 @@ def solid_of(shape: Collider) -> Solid | None:
     if isinstance(shape, HalfSpace):
         return None
     if isinstance(shape, ConvexMesh):
-        return Polytope(*shape.hull)
+        return _polytope(shape.vertices)
     if isinstance(shape, Box):
         return _box(0.5 * np.array(shape.size))
     if isinstance(shape, Ellipsoid):
@@ -60,6 +61,11 @@ def solid_of(shape: Collider) -> Solid | None:
         return Segment(0.5 * getattr(shape, "length", 0.0), shape.radius)
     assert isinstance(shape, Cylinder | Cone)
     return Revolved(shape.radius, float(shape.half_edges[2]), isinstance(shape, Cone))
+
+
+@lru_cache(maxsize=MESHES)
+def _polytope(vertices: tuple) -> Polytope:
+    return Polytope(*hull_of(vertices))
 
 
 def _box(half: np.ndarray) -> Polytope:
@@ -167,7 +173,7 @@ class SolidPair:
         return height
 
     def patch(self, one: SolidPose, other: SolidPose, normal: np.ndarray, reach: float) -> tuple[list[ContactPoint], float]:
-        """Corners of one face over the other, and the distance of the solids along its normal [m]."""
+        """Corners of one face over the other, and the distance of the solids along its normal, as of :meth:`_across` [m]."""
         assert self.second is not None
         toward = -normal.dot(one.R), normal.dot(other.R)
         faces = self.first.face(toward[0]), self.second.face(toward[1])
@@ -182,13 +188,21 @@ class SolidPair:
         incident = distant.face(-out.dot(far.R))
         seen = incident.points.dot(far.R.T.dot(own.R)) + (far.x - own.x).dot(own.R)
         heights = (seen - face.points[0]).dot(upward).tolist()
-        across, low = min(heights) - incident.radius, _low(seen, heights, face, reach + incident.radius)
+        across = self._across(
+            min(heights) - incident.radius, out, far, distant, float(out.dot(own.x) + upward.dot(face.points[0]))
+        )
+        low = _low(seen, heights, face, reach + incident.radius)
         if not low:
             return [], across
         table, up = np.array(low), out if k else -out
         depths = table[:, 3:] if k else incident.radius
         places = own.x + (table[:, :3] - depths * upward).dot(own.R.T)
         return [ContactPoint(p[3] - incident.radius, place, up) for p, place in zip(low, places, strict=True)], across
+
+    def _across(self, height: float, out: np.ndarray, far: SolidPose, distant: Solid, base: float) -> float:
+        """Height of a face over another one at ``base``, if it is that of its solid; −∞ if other faces of this are lower."""
+        lowest = out.dot(far.x) - base - float(distant.extent(-out.dot(far.R)[None])[0])
+        return -inf if height > lowest + SAME_DEPTH * self.size else height
 
 
 def _below(vertices: np.ndarray, one: SolidPose, plane: SolidPose, reach: float) -> list[ContactPoint]:

@@ -1,7 +1,7 @@
 """Collision shape of points: their convex hull, with the faces of a mesh where these are given."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +12,7 @@ from gauss.scene import values
 from gauss.scene.curved_shapes import ConvexCollider
 
 FLAT = 1e-9  # least extent of a solid, relative to its largest
+MESHES = 256  # hulls that are kept
 COPLANAR = 1e-7  # difference of normals and of relative distances of two triangles of one face
 
 
@@ -64,6 +65,8 @@ class ConvexMesh(ConvexCollider):
         double = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
         if (double <= FLAT * np.ptp(np.array(self.vertices), axis=0).max() ** 2).any():
             raise SceneError(f"{self.what}: face {int(np.argmin(double))} has no area; leave it out.")
+        _, first, same = np.unique(np.array(self.vertices), axis=0, return_index=True, return_inverse=True)
+        faces = first[same.ravel()][faces]  # one number of vertices that are given several times
         edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         pairs, uses = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
         if (uses != 2).any():
@@ -101,33 +104,55 @@ class ConvexMesh(ConvexCollider):
     @cached_property
     def hull(self) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         """Vertices (k, 3) of the hull from its centre [m], its faces as loops of them, and their normals (f, 3)."""
-        from scipy.spatial import ConvexHull  # few scenes need it
-
-        points = np.array(self.vertices)
-        points = points - 0.5 * (self._bounds[0] + self._bounds[1])
-        found = ConvexHull(points / np.abs(points).max())
-        number = {int(k): place for place, k in enumerate(found.vertices)}
-        own = points[found.vertices]
-        planes, owner = _planes(found.equations, COPLANAR)
-        loops = []
-        for k, plane in enumerate(planes):
-            members = np.array(sorted({number[int(i)] for i in found.simplices[owner == k].ravel()}))
-            around = own[members] @ rotations.along(plane[:3])
-            middle = around - around.mean(axis=0)
-            loops.append(members[np.argsort(np.arctan2(middle[:, 1], middle[:, 0]))])
-        return own, loops, planes[:, :3]
+        return hull_of(self.vertices)
 
 
-def _planes(equations: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
-    """Planes of a hull without repetition, and the plane of each of its simplices."""
-    planes, count = np.empty((len(equations), 4)), 0
-    owner = np.empty(len(equations), dtype=int)
-    for i, one in enumerate(equations):
-        same = np.flatnonzero(np.abs(planes[:count] - one).max(axis=1) <= near)
-        owner[i] = same[0] if same.size else count
-        if not same.size:
-            planes[count], count = one, count + 1
-    return planes[:count], owner
+@lru_cache(maxsize=MESHES)
+def hull_of(vertices: tuple) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Hull of points, as of :attr:`ConvexMesh.hull`; copies of a mesh share it."""
+    from scipy.spatial import ConvexHull  # few scenes need it
+
+    points = np.array(vertices)
+    points = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
+    found = ConvexHull(points / np.abs(points).max())
+    number = np.empty(len(points), dtype=int)
+    number[found.vertices] = np.arange(len(found.vertices))
+    own, triangles = points[found.vertices], number[found.simplices]
+    a, b, c = (own[triangles[:, k]] for k in range(3))
+    is_turned = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
+    triangles[is_turned] = triangles[is_turned][:, [0, 2, 1]]
+    planes, owner = _planes(found.equations, found.neighbors)
+    order = np.argsort(owner, kind="stable")
+    parts = np.split(triangles[order], np.flatnonzero(np.diff(owner[order])) + 1)
+    loops = [part[0] if len(part) == 1 else _loop(own, part, plane[:3]) for part, plane in zip(parts, planes, strict=True)]
+    return own, loops, planes[:, :3]
+
+
+def _loop(own: np.ndarray, triangles: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Corners of a face in order, counterclockwise seen from outside."""
+    members = np.unique(triangles)
+    around = own[members] @ rotations.along(normal)
+    middle = around - around.mean(axis=0)
+    return members[np.argsort(np.arctan2(middle[:, 1], middle[:, 0]))]
+
+
+def _planes(equations: np.ndarray, neighbours: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Planes of the faces of a hull, and the face of each of its triangles: neighbours in one plane are of one face."""
+    near = (np.abs(equations[:, None] - equations[neighbours]).max(axis=2) <= COPLANAR).tolist()
+    owner, beside = np.full(len(equations), -1), neighbours.tolist()
+    first: list[int] = []
+    for k in range(len(equations)):
+        if owner[k] >= 0:
+            continue
+        owner[k], waiting = len(first), [k]
+        while waiting:
+            i = waiting.pop()
+            for j, is_same in zip(beside[i], near[i], strict=True):
+                if is_same and owner[j] < 0 and np.abs(equations[j] - equations[k]).max() <= COPLANAR:
+                    owner[j] = owner[k]
+                    waiting.append(j)
+        first.append(k)
+    return equations[first], owner
 
 
 def _table(entries, what: str, of: str, kind: type) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Gap functions of two solids without a closed form, in numbers: points of their patch of contact."""
+"""Gap functions of two solids, or of a solid and terrain, without a closed form: points of their patch of contact."""
 
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -12,11 +12,15 @@ from gauss.scene import values
 from gauss.scene.box_distances import far
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points
 from gauss.scene.contact_distances import FeaturePair, Touch
-from gauss.scene.contact_patch import SLOTS, ContactPoint, SolidPose
+from gauss.scene.contact_patch import SLOTS, ContactPoint, Solid, SolidPair, SolidPose, solid_of
 from gauss.scene.curved_shapes import BoundedCollider
-from gauss.scene.solid_pairs import solid_pair
+from gauss.scene.height_field import HeightField
+from gauss.scene.support_faces import Segment
+from gauss.scene.terrain import Terrain
+from gauss.scene.terrain_contact import BallOnTerrain, SolidOnTerrain
 
 KEPT = 4096  # patches: all points of one are asked for, also for the pictures of a motion one after the other
+PairOfSolids = SolidPair | BallOnTerrain | SolidOnTerrain
 
 
 @dataclass(frozen=True)
@@ -113,3 +117,26 @@ def axes_of(shape: Collider) -> np.ndarray:
     if isinstance(shape, Capsule):
         return along(values.unit(shape.axis))
     return along(values.unit(shape.normal)) if isinstance(shape, HalfSpace) else np.eye(3)
+
+
+@cache
+def _solid_at(shape: Collider) -> Solid | None:
+    return solid_of(shape)
+
+
+@cache
+def _terrain_of(field: HeightField) -> Terrain:
+    return Terrain(field)
+
+
+@cache
+def solid_pair(first: Collider, second: Collider) -> PairOfSolids:
+    """Contact points of two shapes in their own axes, made once."""
+    solid = _solid_at(first)
+    assert solid is not None
+    if not isinstance(second, HeightField):
+        return SolidPair(solid, _solid_at(second))
+    terrain = _terrain_of(second)
+    if isinstance(solid, Segment) and not solid.half:
+        return BallOnTerrain(solid, terrain)
+    return SolidOnTerrain(solid, terrain)

@@ -36,9 +36,14 @@ class Face(NamedTuple):
 
 def polygon(points: np.ndarray, normal: np.ndarray) -> Face:
     """Face with its sides."""
-    inward = np.cross(normal, np.roll(points, -1, axis=0) - points)
+    return Face(points, normal, sides_of(points, np.roll(points, -1, axis=0), normal))
+
+
+def sides_of(points: np.ndarray, following: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Sides (k, 4), as of :class:`Face`, from corners (k, 3) to the following ones, of faces with outward normals."""
+    inward = np.cross(normals, following - points)
     inward = inward / np.linalg.norm(inward, axis=1)[:, None]
-    return Face(points, normal, np.column_stack([inward, -np.einsum("ij,ij->i", inward, points)]))
+    return np.column_stack([inward, -np.einsum("ij,ij->i", inward, points)])
 
 
 class Polytope:
@@ -53,11 +58,21 @@ class Polytope:
     def __init__(self, vertices: np.ndarray, loops: list[np.ndarray], normals: np.ndarray):
         self.vertices, self.normals = vertices, normals
         self.size = float(np.linalg.norm(vertices, axis=1).max())  # radius of the ball around it [m]
-        self.faces = [polygon(vertices[loop], normal) for loop, normal in zip(loops, normals, strict=True)]
+        counts = np.array([len(loop) for loop in loops])
+        self.first_corner = np.append(0, counts.cumsum())  # of each face, among all corners; their number at the end
+        following = np.arange(1, self.first_corner[-1] + 1)
+        following[self.first_corner[1:] - 1] = self.first_corner[:-1]
+        points = vertices[np.concatenate(loops)]
+        self.corners = np.column_stack([points, sides_of(points, points[following], np.repeat(normals, counts, axis=0))])
 
     def face(self, direction: np.ndarray) -> Face:
         """Face most nearly across a direction."""
-        return self.faces[int(self.normals.dot(direction).argmax())]
+        return self.faces(int(self.normals.dot(direction).argmax()))
+
+    def faces(self, k: int) -> Face:
+        """Face by its number."""
+        corners = self.corners[self.first_corner[k] : self.first_corner[k + 1]]
+        return Face(corners[:, :3], self.normals[k], corners[:, 3:])
 
     def extent(self, directions: np.ndarray) -> np.ndarray:
         """Farthest that it reaches along directions (k, 3) from its centre [m]."""

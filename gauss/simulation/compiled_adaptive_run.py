@@ -43,10 +43,11 @@ class FirstSteps:
     """
 
     def __init__(self, loop: Loop, layout: PointLayout, tolerance: Tolerance):
-        self.loop, ends = loop, np.cumsum([1, layout.n_q, layout.n_v, 3])
-        self.given, self.found = (np.empty(size) for size in loop.arities["start"])
-        self.q, self.v, allowed, self.inputs = np.split(self.given, ends)[1:]
-        allowed[:] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
+        self.loop, (taken, returned) = loop, loop.arities["start"]
+        self.given, self.found = np.empty(taken), np.empty(returned)
+        q_end, v_end = 1 + layout.n_q, 1 + layout.n_q + layout.n_v
+        self.q, self.v, self.inputs = self.given[1:q_end], self.given[q_end:v_end], self.given[v_end + 3 :]
+        self.given[v_end : v_end + 3] = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         self.addresses = address(self.given), address(self.found)
 
     def __call__(self, t: float, q: np.ndarray, v: np.ndarray, inputs: np.ndarray) -> np.ndarray:

@@ -117,7 +117,7 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
 
 def _library(problem: Problem, plan: Plan) -> Trajectory:
     from gauss.dynamics.engines.compiled import projected
-    from gauss.dynamics.train_coordinates import on_trains
+    from gauss.dynamics.gear_trains import on_trains
     from gauss.simulation.library_run import certified_rates, compiled_rates, library_run, projection_kernel, rates_kernel
     from gauss.simulation.residual_run import ResidualEquations
 

@@ -14,7 +14,7 @@ from gauss.codegen import Expression
 from gauss.dynamics.laws.constraint_modes import refuse_surfaces
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.prescribed_jumps import RELATIVE, SMOOTH, generic_state
-from gauss.dynamics.laws.switching import timed_switching
+from gauss.dynamics.laws.switching import called_laws, timed_switching
 from gauss.dynamics.laws.switching_times import APART, Timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError, SwitchingWarning, user_level
@@ -78,8 +78,10 @@ def examine_steps(system: System, laws: Laws, start: State, end: float, step: fl
     """
     name, times = system.scene.name, smooth_timetable(system, laws, start, end, remedy)
     short = times.switches[:-1][np.diff(times.switches) < RESOLVING_STEPS * step]
-    if short.size or times.unresolved(start.t, end, step):
-        warn_of_features(name, step, remedy, float(short[0]) if short.size else None)
+    times = times.join(called_laws(system, laws, start))
+    first = min(float(short[0]) if short.size else np.inf, times.first_coarse(start.t, end, step))
+    if first < np.inf or times.unresolved(start.t, end, step):
+        warn_of_features(name, step, remedy, first if first < np.inf else None)
         return
     jumping = _jumping(system, laws, start, times.switches)
     if jumping.size:
@@ -128,7 +130,7 @@ class StepsAhead:
     def __init__(self, system: System, laws: Laws, step: float):
         refuse_surfaces(system, "a motion in fixed steps of one call each")
         self.system, self.laws, self.step = system, laws, step
-        is_timed = system.relations.asks_time or bool(laws.outputs)
+        is_timed = system.relations.asks_time or bool(laws.outputs) or bool(laws.called)
         self.begin, self.end = (0.0, -math.inf) if is_timed else (-math.inf, math.inf)
 
     def seen_from(self, t: float) -> float:

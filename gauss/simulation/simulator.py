@@ -30,6 +30,7 @@ from gauss.simulation.held_inputs import FLOAT, HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
+from gauss.simulation.moreau.unseen_contacts import PassingWatch
 from gauss.simulation.passed_switching import StepsAhead
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.tolerances import check_tolerances, checked_count
@@ -42,6 +43,7 @@ FAILURES = {
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
     LoopStatus.NOT_FINITE: "the motion is not finite",
 }
+FEW_STEPS = 16  # so many times are written one by one in less time than as arrays
 MOST_STEPS = 10**8  # of one call: their times fill the memory
 STEPS = {("compiled loop", code) for code in ("embedded loops", "compiled", "callbacks")}
 STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
@@ -150,10 +152,13 @@ class Simulator:
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
         self._u, self._before = self._point[run.layout.size - n_u :], self._point.tobytes()
         self._values: Any = self._u.data
+        rates = self._point[1 + run.layout.n_q :][: run.layout.n_v]
+        self._rates, self._passing = rates, PassingWatch(self.system, self.step_size)
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps, self._options = 0.0, 0, (self.step_size, integrator, stabilisation)
-        self._switches, self._warned = bool(run.program.watch), False
+        watch = run.program.watch
+        self._switches, self._warned = bool(watch or watch.phases), False
         self._measure: Callable[[np.ndarray], np.ndarray] | None = None
         self._bind()
         self.reset()
@@ -210,9 +215,10 @@ class Simulator:
         self._point[:] = run.begun(start)
         self._confirmed[:] = self._point
         self._begun, self._steps = float(self._point[0]), 0
-        self._seen = self._ahead.seen_from(self._begun)
+        self._seen = 0.0 if self._passing.has_pairs else self._ahead.seen_from(self._begun)
         run.control.steps = run.control.status = run.control.unseen = 0.0
         self._warned = False
+        self._passing.begin()
         return self.state
 
     def step(self, u=None, n: int = 1):
@@ -231,6 +237,8 @@ class Simulator:
         SwitchingWarning
             Once for each motion, if a law of the state may have switched undetected within a step; every ten thousand
             steps, if a law of time jumps, or has a feature shorter than the step, in the next ones.
+        ContactLawWarning
+            Once for each motion, if shapes may pass through each other unseen at the rates where a call begins or ends.
 
         Raises
         ------
@@ -250,16 +258,20 @@ class Simulator:
             if self._steps > self._seen:
                 self._look_ahead()
             self._loop.call(*self._given, n)
-        except BaseException:  # of an opaque law: the point is that before
-            self._steps -= n
+        except BaseException:  # Ctrl-C, or of an opaque law
+            self._steps, self._point[:] = self._steps - n, np.frombuffer(self._before)
             raise
         if self._run.control.status:
             self._recover(n)
         if self._switches and self._run.control.unseen:
             self._warn_of_switching()
+        if self._passing.has_pairs:
+            self._passing.examine(self._rates.dot(self._rates), self._steps, lambda: [("", self.state)])
 
     def _look_ahead(self):
-        """Look for switching of laws of time in steps that are to be made, and beyond them."""
+        """Look at the shapes, and for switching of laws of time in steps that are to be made, and beyond them."""
+        if self._passing.has_pairs:
+            self._passing.examine(self._rates.dot(self._rates), self._steps, lambda: [("", self.state)])
         self._ahead.look(self.state, self._begun + self._steps * self.step_size)
         self._seen = self._ahead.seen_from(self._begun)
 
@@ -286,14 +298,23 @@ class Simulator:
 
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
-        n = checked_count("n", n)
+        if type(n) is not int or not 0 < n <= len(self._grid):
+            n = self._room_for(checked_count("n", n))
+        begin, h, first = self._begun, self.step_size, self._steps + 1
+        few = n <= FEW_STEPS
+        self._times[:n] = (
+            [begin + h * k for k in range(first, first + n)] if few else begin + h * np.arange(first, first + n)
+        )
+        self._steps += n
+
+    def _room_for(self, n: int) -> int:
+        """Let the grid hold the steps of a call, of which it returns the number."""
         if n > MOST_STEPS:
             raise SimulationError(f"n: expected no more than {MOST_STEPS} steps in a call, got {n}.")
         if n > len(self._grid):
             self._grid = _unchecked(n)
             self._bind()
-        self._times[:n] = self._begun + self.step_size * np.arange(self._steps + 1, self._steps + n + 1)
-        self._steps += n
+        return n
 
     def _recover(self, n: int):
         """Repeat steps of contacts in Python; raise a SimulationError where a step has failed."""

@@ -12,6 +12,7 @@ from gauss.system import System, rate_units
 DEFAULT_ATOL = 1e-12  # relative to the scale of the scene: 1 rad, its length, and these in its time
 WHOLE = 1e-9  # share of a step by which a duration may differ from a whole number of steps
 KINDS = {"angle": "rad/s", "length": "m/s"}
+SCALARS = (float, int)  # exact types that need no array to be checked
 
 
 def tolerance(system: System, rtol: float, atol) -> Tolerance:
@@ -67,11 +68,10 @@ def _units(system: System) -> np.ndarray:
 def check_tolerances(**numbers):
     """Raise a SimulationError if a value is not a positive number; ``atol`` may be None, a pair or a mapping, too."""
     for name, value in numbers.items():
-        if name == "atol" and (value is None or isinstance(value, Mapping)):
-            continue
         if name == "atol":
-            _pair(value, name)
-        elif not _is_positive(value) or np.ndim(value):
+            if value is not None and not isinstance(value, Mapping):
+                _pair(value, name)
+        elif not _is_positive(value) or (type(value) not in SCALARS and np.ndim(value)):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
         elif name == "rtol" and value >= 1.0:
             raise SimulationError(f"rtol: expected a number below 1, a share of each coordinate and rate, got {value!r}.")
@@ -96,7 +96,7 @@ def step_count(duration, step, what: str) -> int:
 
 def _pair(value, what: str) -> tuple[float, float]:
     """Absolute tolerance of coordinates, and of rates."""
-    is_pair = type(value) is not float and np.ndim(value) > 0
+    is_pair = type(value) not in SCALARS and np.ndim(value) > 0
     if is_pair and np.shape(value) != (2,):
         raise SimulationError(f"{what}: expected a number, or a pair for coordinates and rates, got {value!r}.")
     if not _is_positive(value):
@@ -105,7 +105,7 @@ def _pair(value, what: str) -> tuple[float, float]:
 
 
 def _is_positive(value) -> bool:
-    if type(value) is float:
+    if type(value) in SCALARS:
         return 0.0 < value < np.inf
     try:
         given = np.asarray(value)

@@ -92,7 +92,7 @@ def warn_of_undetected(scene: str, where: str):
     """
     remedy = "shorten the step, or use 'dop853'"
     warnings.warn(
-        f"{scene!r}: {where} a law may have switched, or had a narrow peak, undetected; {remedy}.",
+        f"{scene!r}: {where} a law may have switched, peaked or oscillated undetected; {remedy}.",
         SwitchingWarning,
         stacklevel=user_level(),
     )

@@ -47,10 +47,13 @@ class Dynamics(Protocol):
         """Operations of one evaluation of the forward dynamics of subsystems; None if these are not traced."""
 
     def plans(self, system: "System") -> dict:
-        """Plans of its motions and of single states, {what: plan}."""
+        """Plans of its motions and of single states, {what: plan}, or the error that says what they need."""
 
     def cost(self, system: "System", plan) -> tuple[float, float]:
         """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""
+
+    def equal_chains(self, system: "System", plan) -> list[tuple[int, int]]:
+        """Numbers of equal chains that code of single states may compute together, and of their joints, for each kind."""
 
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""

@@ -15,22 +15,24 @@ def _method(system) -> list[str]:
     """Plans of motions and of single states."""
     if system.dynamics is None:
         return ["  solved by: the certified recursion; it was built without machine code"]
-    try:
-        plans, lines = system.dynamics.plans(system), []
-    except SimulationError as refusal:  # of the default integrator: it says what to use
-        return [f"  motions: {refusal}"]
+    lines, plans = list[str](), system.dynamics.plans(system)
     for what, plan in plans.items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
+        if isinstance(plan, SimulationError):
+            continue
         cost, ratio = system.dynamics.cost(system, plan)
         if ratio > CLOSE_ROUTES:
             lines.append(
                 f"    about {1e6 * cost:.0f} µs an evaluation (estimated), {ratio:.0f} times the fastest that is barred"
             )
+    if equal := system.dynamics.equal_chains(system, plans["accelerations"]):
+        words = ", ".join(f"{chains} of {joints} joint{'s' * (joints > 1)}" for chains, joints in equal)
+        lines.append(f"    equal chains in the lanes of vector registers, where that code is shorter: {words}")
     lines.append(f"  machine code: {OPTIMISER.status()}")
     costs = system.dynamics.called(system)
     return lines + [
-        f"  the law of {name!r} is an opaque Python callback, called in every evaluation ({why})"
-        for name, why in costs.items()
+        f"  the law of {name!r} is an opaque Python callback, called in every evaluation: {cost}"
+        for name, cost in costs.items()
     ]
 
 

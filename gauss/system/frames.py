@@ -25,21 +25,26 @@ def invert(pose: Pose) -> Pose:
 
 def relative(scene: Scene, seen_from: str, body: str) -> Pose:
     """Reference pose of a body frame seen from another, by their common base, which loses fewest digits."""
-    from_path, body_path = _path(scene, seen_from), _path(scene, body)
-    base = next(name for name in from_path if name in body_path)
-    return compose(invert(_climb(scene, from_path, base)), _climb(scene, body_path, base))
+    from_path, body_path = _paths(scene, seen_from, body)
+    return compose(invert(_climb(scene, from_path)), _climb(scene, body_path))
 
 
-def _path(scene: Scene, body: str) -> list[str]:
-    path = [body]
-    while path[-1] != GROUND:
-        path.append(scene.bodies[path[-1]].on)
-    return path
+def _paths(scene: Scene, *bodies: str) -> list[list[str]]:
+    """Bodies between each of two bodies and their common base, which both ways look for step by step."""
+    ways = [{body: None} for body in bodies]
+    ends = list(bodies)
+    while True:
+        for end, other in zip(ends, ways[::-1], strict=True):
+            if end in other:
+                return [path[: path.index(end)] for path in map(list, ways)]
+        ends = [end if end == GROUND else scene.bodies[end].on for end in ends]
+        for way, end in zip(ways, ends, strict=True):
+            way[end] = None
 
 
-def _climb(scene: Scene, path: list[str], base: str) -> Pose:
+def _climb(scene: Scene, path: list[str]) -> Pose:
     pose = IDENTITY
-    for name in path[: path.index(base)]:
+    for name in path:
         body = scene.bodies[name]
         pose = compose((rotation_matrix(body.rotation), np.array(body.position)), pose)
     return pose

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen import Function, Graph
 from gauss.errors import SceneError
-from gauss.scene import Scene
+from gauss.scene import Contact, Scene
 from gauss.system.symbolic_mechanism import Symbols
 
 
@@ -33,7 +33,7 @@ def refuse_changed(system):
 
 def _with_functions(scene: Scene):
     every = [*scene.relations.values(), *scene.contacts.values(), *scene.set_valued.values()]
-    names = {kind: _fields(kind) for kind in {type(relation) for relation in every}}
+    names = {kind: () if kind is Contact else _fields(kind) for kind in {type(relation) for relation in every}}
     return [relation for relation in every if any(callable(getattr(relation, name)) for name in names[type(relation)])]
 
 

@@ -3,6 +3,8 @@ import pytest
 
 import gauss
 
+pytestmark = pytest.mark.slow
+
 DIFFERENCE, ACCURACY = 1e-5, 1e-8  # central differences, relative to the largest derivative
 DURATION, STEP = 0.2, 0.01
 
@@ -72,7 +74,6 @@ def route(request):
 
 
 @pytest.mark.peer
-@pytest.mark.slow
 @pytest.mark.parametrize("make", [cart, lambda: gauss.load("four_bar")], ids=["cart-pole", "four-bar"])
 def test_gradients_of_accelerations(route, make):
     system, rng = gauss.compile_scene(make()), np.random.default_rng(1)
@@ -85,7 +86,6 @@ def test_gradients_of_accelerations(route, make):
 
 
 @pytest.mark.peer
-@pytest.mark.slow
 @pytest.mark.parametrize("make", [cart, stopped], ids=["smooth", "with an impact"])
 def test_gradients_of_motions_are_those_of_motion_gradient(route, make):
     """Weights of the last state alone, along its directions that keep the constraints: all, without loops."""
@@ -102,7 +102,6 @@ def test_gradients_of_motions_are_those_of_motion_gradient(route, make):
 
 
 @pytest.mark.peer
-@pytest.mark.slow
 def test_gradients_of_whole_motions(route):
     """Weights of all states, against differences of an input and of the start."""
     system, steps = gauss.compile_scene(cart()), 5

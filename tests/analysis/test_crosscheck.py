@@ -92,6 +92,7 @@ def test_agreement(name):
     assert outcome.passed, f"\n{outcome}"
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize(
     "change",
@@ -149,6 +150,7 @@ def test_a_tree_that_moves_no_inertia_is_refused():
         crosscheck(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["loads", "gears", "closed by screw"])
 def test_random_states_are_consistent_and_repeatable(name):
     system = gauss.compile_scene(SCENES[name]())

@@ -16,6 +16,8 @@ from gauss.export.exported_function import exported_functions
 from gauss.system import random_state
 from tests.support import mechanisms
 
+pytestmark = pytest.mark.slow
+
 DIGITS = 50
 STEP = mpmath.mpf(10) ** -15  # of coordinates, rates and loads
 EXACT = 1e-11  # relative to the largest entry: rounding of the derivatives in double precision, times the condition of M

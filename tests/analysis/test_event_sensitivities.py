@@ -7,6 +7,8 @@ import pytest
 import gauss
 from gauss.errors import ArgumentError, SimulationError, StateError, SwitchingWarning
 
+pytestmark = pytest.mark.slow
+
 ACCURACY = 1e-8  # of extrapolated differences of motions of tolerance 1e-13, relative to the largest derivative
 DIFFERENCE = 1e-4  # largest of the differences that are extrapolated, in the unit of what is changed
 ROUND_OFF = 1e-11  # between the forward and the adjoint derivative, relative to the largest
@@ -123,7 +125,6 @@ def end(system, span, state):
     return np.concatenate([found.q[-1], found.v[-1]])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_transition_matrices_through_events_are_derivatives_of_motions(name):
     system, start, span = differentiable(name)
@@ -138,7 +139,6 @@ def test_transition_matrices_through_events_are_derivatives_of_motions(name):
         close(found.start[-1][:, k], extrapolated(moved), found.start)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum at a stop", "four-bar", "stick and slip"])
 def test_the_adjoint_through_events_is_the_transpose(name):
     system, start, span = differentiable(name)
@@ -153,7 +153,6 @@ def test_the_adjoint_through_events_is_the_transpose(name):
         close(found.parameters[parameter], weights @ slope[-1], slope, ROUND_OFF)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "body"),
     [("pendulum at a stop", "rod"), ("double pendulum", "lower"), ("four-bar", "coupler"), ("friction", "mass")],
@@ -189,7 +188,6 @@ OF_EVENTS = [
 ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "parameter"), OF_EVENTS)
 def test_derivatives_by_restitution_stops_and_friction(name, parameter):
     scene, rates, span = SCENES[name]()
@@ -237,7 +235,6 @@ def test_parameters_of_events_without_a_derivative_are_named(name, parameter, er
         gauss.sensitivities(system, span, state=start, parameters=[parameter], **METHOD)
 
 
-@pytest.mark.slow
 def test_derivatives_by_a_centre_of_mass_through_an_impact():
     scene, rates, span = SCENES["double pendulum"]()
     system, start = started(scene, rates)
@@ -251,7 +248,6 @@ def test_derivatives_by_a_centre_of_mass_through_an_impact():
     close(found.parameters["com:lower"][-1][:, 0], extrapolated(longer), found.start)
 
 
-@pytest.mark.slow
 def test_gradients_by_held_inputs_through_an_impact():
     scene, rates, _ = SCENES["cart-pole"]()
     span = 0.2

@@ -13,6 +13,7 @@ def series():
     return gauss.excitation(gauss.load("double_pendulum"), 5.0, harmonics=3, limits=LIMITS, trials=8)
 
 
+@pytest.mark.slow
 def test_the_series_keeps_its_limits_and_is_periodic(series):
     t = np.linspace(0.0, series.period, 4001)
     q, v, a = series.at(t)
@@ -23,6 +24,7 @@ def test_the_series_keeps_its_limits_and_is_periodic(series):
     np.testing.assert_allclose(q[0], q[-1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_rates_are_derivatives(series):
     t = np.linspace(0.1, 4.0, 7)
     (less, v0, _), (more, v1, _) = series.at(t - DIFFERENCE), series.at(t + DIFFERENCE)
@@ -31,6 +33,7 @@ def test_rates_are_derivatives(series):
     np.testing.assert_allclose((v1 - v0) / (2 * DIFFERENCE), a, atol=ROUGH)
 
 
+@pytest.mark.slow
 def test_it_identifies_better_than_random_series(series):
     """The least singular value grows: intervals of the worst parameter are narrower than by the first random series."""
     assert series.condition < series.random_condition

@@ -34,6 +34,7 @@ def state_dependent(law):
     return lambda t, motion: law(t) * gauss.math.cos(motion.coordinate("pin"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ask", QUESTIONS.values(), ids=QUESTIONS)
 def test_values_are_those_of_the_named_time(ask):
     for t in (0.0, 0.7):
@@ -45,6 +46,7 @@ def test_values_are_those_of_the_named_time(ask):
         assert np.allclose(timed, constant, rtol=SAME, atol=SAME)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ask", QUESTIONS.values(), ids=QUESTIONS)
 def test_a_time_that_is_not_named_is_warned_of_on_every_call(ask):
     scene = arm(torque)
@@ -77,6 +79,7 @@ def double(**law) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 def test_what_is_moved_does_not_rest():
     with pytest.raises(SimulationError, match="motor"):
         gauss.equilibrium(double(speed=1.0))

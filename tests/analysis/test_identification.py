@@ -93,6 +93,7 @@ def dynamic_parameters(P) -> np.ndarray:
     return np.array([P[3, 3], *P[:3, 3], *(moments[i, k] for i, k in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)))])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tree", "four_bar", "slider_crank"])
 def test_the_regressor_gives_the_forces(name):
     """Y π of consistent accelerations are the loads that cause them, projected on the independent coordinates."""
@@ -125,6 +126,7 @@ def test_a_pendulum_in_closed_form():
     assert set(base.unidentifiable) == set(found.names) - set(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tree", "double_pendulum", "four_bar"])
 def test_forces_depend_on_base_parameters_alone(name):
     system = gauss.compile_scene(tree() if name == "tree" else gauss.load(name))
@@ -152,6 +154,7 @@ def test_a_double_pendulum_has_six_base_parameters():
     assert len(base) == 6 and np.linalg.matrix_rank(np.concatenate([base.combinations, expected]), tol=OF_RANK) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tree", "double_pendulum", "four_bar", "slider_crank"])
 def test_exact_data_give_the_true_dynamics(name):
     """From a scene with other bodies; the identified one moves as the true one."""
@@ -179,6 +182,7 @@ def is_physical(body: gauss.Body) -> bool:
     return np.linalg.eigvalsh(P)[0] >= -NEGATIVE * np.trace(P)
 
 
+@pytest.mark.slow
 def test_loads_of_the_scene_are_known():
     scene = tree()
     first, second = list(scene.joints)[:2]
@@ -193,6 +197,7 @@ def test_loads_of_the_scene_are_known():
     assert set(found.scene.loads) == {"S", "F"} and first != second
 
 
+@pytest.mark.slow
 def test_confidence_of_noisy_data():
     """(x − x̂)ᵀ C⁻¹ (x − x̂) is χ² of r degrees: within five standard deviations; the noise within 10 %."""
     system = gauss.compile_scene(tree())
@@ -238,6 +243,7 @@ def test_inertias_of_few_noisy_samples_are_those_of_bodies():
     assert np.all(found.residual >= 0.0) and found.scene.bodies.keys() == system.scene.bodies.keys()
 
 
+@pytest.mark.slow
 def test_measured_loops_are_projected_onto_the_constraints():
     system = gauss.compile_scene(solid(gauss.load("four_bar")))
     q, v, a = samples(system, 40)
@@ -258,6 +264,7 @@ def test_a_motion_that_does_not_excite_is_refused_by_name():
         gauss.identify(system, q, 0.0 * v, 0.0 * a, system.gravity_forces(q))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change, error, words",
     [
@@ -293,6 +300,7 @@ def test_scenes_whose_forces_are_unknown_are_refused():
         gauss.base_parameters(gauss.load("double_pendulum"), [[0.0, 0.0]])
 
 
+@pytest.mark.slow
 def test_the_figure_shows_each_coordinate():
     pytest.importorskip("matplotlib")
     system = gauss.compile_scene(gauss.load("double_pendulum"))
@@ -301,6 +309,7 @@ def test_the_figure_shows_each_coordinate():
     assert [axes.get_ylabel() for axes in figure.axes] == [f"{name} [N m]" for name in system.coordinates]
 
 
+@pytest.mark.slow
 def test_a_report_holds_table_and_figures(tmp_path):
     pytest.importorskip("matplotlib")
     system = gauss.compile_scene(gauss.load("double_pendulum"))

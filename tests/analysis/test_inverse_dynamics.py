@@ -33,6 +33,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_forward_dynamics_undone(scene):
     """Accelerations under a drive force give this force back, wherever in the loop the drive sits."""

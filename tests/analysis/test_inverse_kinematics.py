@@ -55,6 +55,7 @@ def test_two_links_have_their_closed_form(pendulum, x, y):
     assert abs(np.exp(1j * A) - np.exp(1j * turned)) < MET
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("move", [(0.05, 0.02, -0.03), (-0.1, 0.0, 0.05), (0.0, 0.12, -0.08)])
 def test_a_delta_robot_has_its_closed_form(delta, move):
     base, arm, forearm, platform = 0.2, 0.25, 0.5, 0.05
@@ -71,6 +72,7 @@ def test_a_delta_robot_has_its_closed_form(delta, move):
         assert np.abs(np.exp(1j * angles) - np.exp(1j * hip)).min() < MET
 
 
+@pytest.mark.slow
 def test_the_legs_of_a_stewart_platform_reach_a_pose():
     system = gauss.compile_scene(gauss.load("stewart_platform"))
     position, rpy = np.array([0.05, -0.03, 1.08]), (0.1, -0.15, 0.2)
@@ -84,6 +86,7 @@ def test_the_legs_of_a_stewart_platform_reach_a_pose():
         assert abs(found.state.q[system.joint(f"leg{k}").q][0] - longer) < MET
 
 
+@pytest.mark.slow
 def test_a_loop_follows_the_posture_of_another_joint():
     system = gauss.compile_scene(gauss.load("four_bar"))
     found = gauss.inverse_kinematics(system, gauss.PostureTarget({"D": 0.3}))
@@ -220,6 +223,7 @@ def test_the_rate_of_a_rotation_vector(free):
     assert np.abs(rate - (errors[1] - errors[0]) / (2 * h)).max() < SLOPE
 
 
+@pytest.mark.slow
 def test_rates_close_loops_and_take_a_share_of_the_error(delta):
     state, step = delta.initial_state(), 0.01
     goal = gauss.PointTarget("platform", np.array([0.03, 0.0, -0.33]), gain=0.5)

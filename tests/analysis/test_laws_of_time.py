@@ -36,6 +36,7 @@ def by_gradient(scene) -> tuple[float, float]:
     return tuple(gauss.motion_gradient(scene, 1.0, loss, step=STEP).value for loss in (lambda q, v: v[0], lambda q, v: q[0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("motion", [moved, by_gradient])
 def test_motions_with_derivatives(law, motion):
@@ -44,6 +45,7 @@ def test_motions_with_derivatives(law, motion):
     assert verdict(lambda: motion(slider(force)), [rate, place]) in allowed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_feedback_motions(law):
     force, rate, place = LAWS[law]
@@ -87,6 +89,7 @@ def test_an_optimal_motion_of_free_duration_warns_of_a_narrow_peak():
         gauss.optimal_motion(scene, (0.1, 10.0), start=rest, end=rest | {"x": 1.0}, cost="time")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", sorted(EXACT))
 def test_fitted_motions(law):
     scene = slider(LAWS[law][0])
@@ -104,6 +107,7 @@ def pendulum(law, stop: bool):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stop", [False, True])
 @pytest.mark.parametrize("law", ["pulse", "jump", "two pulses"])
 def test_derivatives_by_the_start(law, stop):

@@ -30,6 +30,7 @@ def governor(speed):
     return scene, length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [6.0, 9.0])
 def test_a_governor_swings_about_the_angle_of_its_speed(speed):
     """cos θ = g / (l Ω²), and ω = Ω sin θ about it; hanging, it is unstable beyond Ω² = g / l."""
@@ -61,6 +62,7 @@ def two_armed_governor(speed, angle=0.6):
     return scene, length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [9.0, 12.0])
 def test_a_governor_with_a_collar_swings_about_the_angle_of_its_speed(speed):
     """With 2 m (l θ̇)² / 2 + M (2 l sin θ θ̇)² / 2 and cos θ = (m + M) g / (m l Ω²), at a pose far from that of the scene."""
@@ -117,6 +119,7 @@ def test_a_bicycle_has_the_eigenvalues_of_the_benchmark():
         assert np.abs(found - wanted).min() <= CLOSED * abs(wanted)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spin", [1.0, 2.0, 3.0, 8.0])
 def test_a_disk_rolls_upright_beyond_a_speed(spin):
     """λ² = (4 / 5) g / r − (12 / 5) Ω² of a thin disk: stable beyond Ω² = g / (3 r) (Routh, Advanced Rigid Dynamics).

@@ -77,6 +77,7 @@ def test_a_pendulum_has_its_frequency():
     assert rest.stability == "marginal" and "A" in str(modes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis, is_stable", [(0, True), (1, False), (2, True)])
 def test_a_free_body_turns_stably_about_its_extreme_axes(axis, is_stable):
     """λ² = ω² (I₁ − I₂)(I₃ − I₁) / (I₂ I₃) about axis 1 (Euler)."""
@@ -96,11 +97,13 @@ def test_a_free_body_turns_stably_about_its_extreme_axes(axis, is_stable):
     assert (model.eigenvalues.real.max() > 0.1) == (not is_stable)
 
 
+@pytest.mark.slow
 def test_freedoms_of_a_loop_with_redundant_rows_are_counted_once():
     model = gauss.linearise(gauss.load("bricard"))
     assert model.A.shape == (2, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bricard", "parallelogram", "four_bar", "cardan"])
 def test_states_a_little_off_their_constraints_have_the_same_freedoms(name):
     """Redundant rows contradict each other there; rates are those of the coordinates, in which no other is better."""
@@ -121,6 +124,7 @@ def test_states_far_from_their_constraints_are_refused(change):
         gauss.linearise(system, change(system.initial_state()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass", [1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13])
 def test_light_rods_of_loops_are_modelled_or_refused(mass):
     """Masses that differ by many orders take digits of the multipliers; the model without the rod's mass is the limit."""
@@ -146,12 +150,14 @@ def test_light_rods_of_loops_are_modelled_or_refused(mass):
         assert mass < 1e-6 and "too few digits" in str(error)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cardan", "turntable"])
 def test_neutral_rest_is_marginal(name):
     """A balanced joint stays wherever it is put: both its eigenvalues are zero."""
     assert {one.stability for one in gauss.equilibria(gauss.load(name), starts=8)} == {"marginal"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum", "four_bar", "bricard"])
 def test_modes_are_those_of_the_state_of_rest(name):
     """ω² = V″ / M of one freedom, by energies along it."""
@@ -171,6 +177,7 @@ def test_modes_are_those_of_the_state_of_rest(name):
     assert gauss.modes(system, rest.state).shapes == pytest.approx(found.shapes)
 
 
+@pytest.mark.slow
 def test_what_sticks_binds_rates():
     """A double pendulum whose upper joint sticks: the lower one swings as a pendulum about it."""
     scene = gauss.load("double_pendulum")
@@ -188,6 +195,7 @@ def test_what_sticks_binds_rates():
     assert model.A[2] == pytest.approx([-weight, -weight, 0.0])
 
 
+@pytest.mark.slow
 def test_rolling_binds_rates_alone():
     model = gauss.linearise(gauss.load("rolling_disk"))
     assert len([one for one in model.states if one.endswith(" rate")]) == 3 and len(model.states) == 8
@@ -196,6 +204,7 @@ def test_rolling_binds_rates_alone():
     assert np.sort_complex(given.eigenvalues) == pytest.approx(np.sort_complex(model.eigenvalues), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_pole_is_balanced_by_the_regulator_of_its_linear_model():
     scene = gauss.load("cart_pole")
     scene.input("push", "rail")
@@ -222,6 +231,7 @@ def test_a_regulated_arm_has_the_forces_that_hold_it():
     assert kept.state.q[0] == system.initial_state().q[0]
 
 
+@pytest.mark.slow
 def test_equilibria_of_a_linkage_are_the_extremes_of_its_energy():
     found = gauss.equilibria(gauss.load("four_bar"), starts=16)
     assert len(found) == 4 and found[0].stability == "marginal" and found[-1].stability == "unstable"
@@ -240,6 +250,7 @@ def test_outputs_are_slopes_of_what_is_measured():
     assert model.B[2:] == pytest.approx(response)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "call, error, words",
     [
@@ -296,6 +307,7 @@ def test_the_regulator_of_a_mass_is_the_closed_form():
         assert model.lqr([a, b], [r]) == pytest.approx(np.array([[stiff, np.sqrt(b / r + 4.0 * stiff)]]), rel=RICCATI)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make", [lambda: two_pendulums(True), lambda: driven("four_bar", "A"), lambda: driven("cart_pole", "rail")]
 )
@@ -340,6 +352,7 @@ def test_what_is_printed_of_a_model_is_short():
     assert len(repr(gauss.linearise(two_pendulums(True)))) < 1500
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "weights", [{"Q": [1.0]}, {"Q": [1.0, -1.0, 1.0, 1.0]}, {"R": "x"}, {"R": [[np.nan]]}, {"Q": [[0, 1], [0, 0]]}]
 )

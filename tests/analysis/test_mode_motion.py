@@ -4,6 +4,8 @@ import pytest
 import gauss
 from gauss.errors import ArgumentError
 
+pytestmark = pytest.mark.slow
+
 CLOSED = 1e-10  # residual of the loop of a sample, in units of length
 
 

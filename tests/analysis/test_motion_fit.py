@@ -94,6 +94,7 @@ def test_inputs_are_held_between_samples():
     assert found.values["pole.mass"] == pytest.approx(scene.bodies["pole"].mass, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_parameters_that_are_not_identified_are_named():
     scene = gauss.load("pendulum")
     t, measured = motion(scene, 0.5, ("A",), 11)
@@ -209,6 +210,7 @@ def test_events_without_derivatives_are_refused_by_name():
         gauss.fit_motion(scene, [0.0, 0.1], {"flight.x": [0.0, 0.0]}, ["body.mass"], step=0.01)
 
 
+@pytest.mark.slow
 def test_the_figure_shows_each_column(tmp_path):
     pytest.importorskip("matplotlib")
     scene = gauss.load("pendulum")

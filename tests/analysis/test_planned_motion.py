@@ -70,6 +70,7 @@ def test_derivatives_are_continuous(pendulum, shape, smooth):
         assert np.abs(law(inner - h) - law(inner + h)).max() < 1e-6  # h times the next derivative
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", SHAPES)
 def test_drives_follow(shape):
     scene = gauss.load("double_pendulum")
@@ -94,6 +95,7 @@ def test_positions_rates_and_accelerations_trace():
     assert np.abs(motion.q - found.position(motion.t)).max() < 1e-7  # a speed is integrated
 
 
+@pytest.mark.slow
 def test_accelerations_and_torques_of_a_loop(delta):
     start = delta.initial_state()
     first = {name: float(start.q[delta.joint(name).q][0]) for name in HIPS}
@@ -119,6 +121,7 @@ def test_a_trajectory_of_a_four_bar_is_closed():
     assert np.abs(motion.q[:, 0] - found.position(motion.t)[:, 0]).max() < ROUNDED
 
 
+@pytest.mark.slow
 def test_points_may_be_states(delta):
     one, other = (
         delta.initial_state(),
@@ -155,6 +158,7 @@ def test_a_path_slows_down_for_its_coordinates(pendulum):
     assert max(shares) <= 1.0 + ROUNDED and max(shares) > 0.99 and found.duration > 1.05
 
 
+@pytest.mark.slow
 def test_a_pose_turns_about_a_fixed_axis():
     system = gauss.compile_scene(gauss.load("stewart_platform"))
     legs = [f"leg{k}" for k in range(1, 7)]

@@ -10,6 +10,8 @@ from gauss.errors import SimulationError, StateError
 from gauss.system import retract
 from models import families
 
+pytestmark = pytest.mark.slow
+
 AGREEMENT = 1e-12  # relative to the largest entry of a matrix: another order of operations
 STEP, DIFFERENCES = 1e-5, 1e-6  # of central differences, and what they leave
 MATRICES = "ABCD"
@@ -62,7 +64,6 @@ def moving(system, rng):
     return system.initial_state(start.q, start.v + 0.3 * system.scale.rates * rng.normal(size=system.n_v))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_matrices_are_those_of_linearise(name):
     system, rng = gauss.compile_scene(SCENES[name]()), np.random.default_rng(1)
@@ -77,7 +78,6 @@ def test_matrices_are_those_of_linearise(name):
         assert np.abs(found - wanted).max(initial=0.0) <= AGREEMENT * max(1.0, np.abs(wanted).max(initial=0.0)), one
 
 
-@pytest.mark.slow
 def test_a_batch_of_states_has_a_model_each():
     system, rng = gauss.compile_scene(gauss.load("four_bar")), np.random.default_rng(2)
     prepared = pickle.loads(pickle.dumps(gauss.prepare_linear_model(system)))
@@ -88,7 +88,6 @@ def test_a_batch_of_states_has_a_model_each():
             assert np.abs(batch[k] - alone).max(initial=0.0) <= AGREEMENT * max(1.0, np.abs(alone).max(initial=0.0))
 
 
-@pytest.mark.slow
 def test_many_loops_are_modelled_state_by_state():
     """Of a moved platform, by differences of its accelerations along the constraints: not by linearise, which it calls."""
     system, rng = gauss.compile_scene(families.stewart_platform()), np.random.default_rng(3)

@@ -62,6 +62,7 @@ def pressed():
 RESTS = {"motor": motor_pendulum, "controller": controlled, "muscle": muscled, "cylinder": pressed}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RESTS)
 def test_states_rest_at_their_closed_form(name):
     scene, wanted = RESTS[name]()
@@ -74,6 +75,7 @@ def test_states_rest_at_their_closed_form(name):
     assert found == pytest.approx(wanted, rel=REST)
 
 
+@pytest.mark.slow
 def test_a_linkage_rests_where_the_motor_holds_it():
     scene = gauss.load("four_bar")
     scene.starts.clear()
@@ -86,6 +88,7 @@ def test_a_linkage_rests_where_the_motor_holds_it():
         assert held.forces["A"] == pytest.approx(0.8 * 4.0, rel=REST)
 
 
+@pytest.mark.slow
 def test_models_at_rest_keep_the_start_of_states():
     """About the pressures of the start, not about none, at which an open valve has another slope."""
     model = gauss.linearise(cylinder())
@@ -104,6 +107,7 @@ def test_what_does_not_rest_is_named():
         gauss.equilibrium(scene)
 
 
+@pytest.mark.slow
 def test_derivatives_and_fits_name_states_as_linear_models_do():
     scene, t = motor(pendulum()), np.linspace(0.0, 0.5, 26)
     assert gauss.sensitivities(scene, 0.1, step=0.01).states == ("A", "integral of motor current", "A rate", "motor current")

@@ -4,6 +4,8 @@ import pytest
 import gauss
 from gauss.errors import ArgumentError, SceneError
 
+pytestmark = pytest.mark.slow
+
 MASS, STIFFNESS = 2.0, 8.0
 
 

@@ -47,6 +47,7 @@ MOTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 def test_machine_code_finds_the_multipliers_of_certified_solutions(name):
     motion = gauss.simulate(MOTIONS[name](), 0.2, times=SAMPLES, progress=False)
@@ -62,6 +63,7 @@ def test_redundant_constraints_are_left_to_certified_solutions():
     assert sample_multipliers(system, np.zeros(1), start.q[None], start.v[None]) is None
 
 
+@pytest.mark.slow
 def test_each_sample_is_solved_once_for_all_joints(monkeypatch):
     solved, solve = [], sample_forces.solution_at
     monkeypatch.setattr(sample_forces, "solution_at", lambda *given: solved.append(given) or solve(*given))
@@ -86,6 +88,7 @@ def test_forces_follow_laws_that_change():
     assert np.array_equal(gauss.drive_forces(motion, "J1"), 2.0 * before)
 
 
+@pytest.mark.slow
 def test_a_recorded_motion_has_the_rates_and_forces_of_the_simulated_one():
     motion = gauss.simulate(gauss.load("heavy_top"), 0.1, times=np.linspace(0.0, 0.1, 201), progress=False)
     signs = np.where(np.arange(201) % 3 == 1, -1.0, 1.0)[:, None]
@@ -117,6 +120,7 @@ def test_recordings_that_do_not_fit_are_refused(t, q, v, words):
         gauss.Trajectory.from_coordinates(gauss.compile_scene(mechanisms.rods(2)), t, q, v)
 
 
+@pytest.mark.slow
 def test_recordings_that_leave_the_loop_constraints_are_warned_of():
     motion = gauss.simulate(gauss.load("four_bar"), 0.1, times=np.linspace(0.0, 0.1, 101), progress=False)
     with warnings.catch_warnings():

@@ -50,6 +50,7 @@ def started(system):
     return system.projected(system.state(start.q, v)) if system.closes else system.state(start.q, v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_transition_matrix_is_the_derivative_by_the_start(name):
     system = gauss.compile_scene(gauss.load(name))
@@ -69,6 +70,7 @@ def test_the_transition_matrix_is_the_derivative_by_the_start(name):
         close(found.start[-1][:, k], derivative(moved), np.abs(found.start[-1]).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SMOOTH)
 def test_the_adjoint_is_the_transpose_of_the_forward_derivative(name):
     system = gauss.compile_scene(gauss.load(name))
@@ -86,6 +88,7 @@ def test_the_adjoint_is_the_transpose_of_the_forward_derivative(name):
         np.testing.assert_allclose(one, weights @ other[-1], atol=1e-11 * np.abs(other[-1]).max(initial=1.0), rtol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "body"), [("double_pendulum", "upper"), ("cart_pole", "pole"), ("four_bar", "coupler")])
 def test_derivatives_by_parameters_are_those_of_other_scenes(name, body):
     scene = gauss.load(name)
@@ -107,6 +110,7 @@ def test_derivatives_by_parameters_are_those_of_other_scenes(name, body):
     close(by_gravity[-1][:, down], derivative(pulled), accuracy=accuracy)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["parent_at", "child_at"])
 def test_derivatives_by_lengths_of_a_tree(where):
     system = gauss.compile_scene(gauss.load("double_pendulum"))
@@ -140,6 +144,7 @@ def test_gradients_by_inputs_are_those_of_held_tables():
         close(found.inputs[k, 0], derivative(changed), np.abs(found.inputs).max())
 
 
+@pytest.mark.slow
 def test_gradients_at_a_limit_of_an_input_are_one_sided():
     """Those of a scene without limits up to the limit itself, and zero beyond."""
     found = {}
@@ -154,6 +159,7 @@ def test_gradients_at_a_limit_of_an_input_are_one_sided():
     assert found[None].all() and not found[-50.0, 2.0].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", TABLEAUS)
 def test_methods_converge_to_the_exact_transition_matrix(integrator):
     scene = gauss.Scene("oscillator", gravity=(0, 0, 0))

@@ -15,7 +15,10 @@ from gauss.export.exported_function import exported_functions
 from tests.analysis.test_event_sensitivities import bouncing, started, stopped
 
 Extended = np.longdouble
-pytestmark = pytest.mark.skipif(np.finfo(Extended).eps > 1e-18, reason="long double has no extended precision here")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(np.finfo(Extended).eps > 1e-18, reason="long double has no extended precision here"),
+]
 ACCURACY = 1e-9  # relative to the largest derivative; at most 4.5e-11 is seen
 STEP = 0.01  # s
 DIFFERENCE = Extended(1e-8)  # truncation 1e-16, rounding 1e-19 over it, times the growth of the motion
@@ -125,7 +128,6 @@ SCENES = {  # scene, rates at the start and span; joint, bound, side, restitutio
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_transition_matrices_are_differences_in_extended_precision(name):
     make, stop = SCENES[name]

@@ -39,6 +39,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", WRONG)
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_what_a_function_does_wrong_is_said(entry, wrong):
@@ -75,6 +76,7 @@ MOTIONLESS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("analysis", MOTIONLESS)
 def test_a_scene_in_which_nothing_moves_is_named(analysis):
     with pytest.raises(GaussError, match="rigid"):

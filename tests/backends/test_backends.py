@@ -112,6 +112,7 @@ def test_forms_are_the_same_problem(problem, form, backend):
     assert np.abs(residuals + pull * found.inequality_multipliers).max() <= 1e-5 * forces
 
 
+@pytest.mark.slow
 def test_unknown_forms_and_settings_are_named():
     with pytest.raises(BackendError, match="F2s"):
         gauss.solve(tree(), "osqp", form="F4")
@@ -174,6 +175,7 @@ def test_redundant_copy_in_a_spatial_tree_leaves_unique_reactions():
     assert np.allclose(one.multipliers[12:18], two.multipliers[12:18] + two.multipliers[18:24], rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_contradicting_rows_are_reported_by_name():
     compulsion = coupled()
     D = compulsion.D.copy()

@@ -19,6 +19,7 @@ PLAIN = (*GENTLE, "heavy tip 1e9", "mm and g", "stiff Baumgarte", "noisy copies"
 WINDOWS = 30  # of a ladder: more than SPARSE_FROM_ROWS rows close its loops
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*PLAIN, "ladder 3 near flat"])
 def test_answers_are_exact_or_refused(name):
     compulsion = make_problem(name).compulsion
@@ -32,6 +33,7 @@ def test_answers_are_exact_or_refused(name):
         assert certificate.error > TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLAIN)
 def test_open_reactions_are_those_that_the_dense_factorisation_finds(name):
     compulsion = make_problem(name).compulsion
@@ -50,6 +52,7 @@ def _ladder():
     return system, system.initial_state()
 
 
+@pytest.mark.slow
 def test_a_long_ladder_is_certified_by_it():
     system, state = _ladder()
     load = np.random.default_rng(0).normal(size=system.n_v)
@@ -67,6 +70,7 @@ def test_states_of_a_long_ladder_meet_their_constraints():
     assert np.abs(velocity_residual_of(system, kinematics(system, state))).max() <= 1e-12
 
 
+@pytest.mark.slow
 def test_near_dependent_rows_are_left_to_the_dense_factorisation():
     """The flat ladder: the sparse answer is not certified, so the dense one is given."""
     system, _ = _ladder()

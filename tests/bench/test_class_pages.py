@@ -43,6 +43,7 @@ def test_answers_without_a_reference_are_named_by_their_residuals():
     assert "class mine, file" in text and "Level low" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "has_errors"),
     [({"form": FILE}, True), ({"form": "F2s", "level": "low"}, False), ({"form": "F2s", "group": INCONSISTENT}, False)],

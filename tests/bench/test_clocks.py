@@ -3,9 +3,13 @@
 import time
 from functools import partial
 
+import pytest
+
 from gauss.bench.clocks import FEWEST, ROUNDS, WALL_PER_CPU, timed
 from gauss.bench.levels import LIMIT
 from gauss.bench.worker import Worker
+
+pytestmark = pytest.mark.slow
 
 
 def computed(seconds: float):

@@ -29,6 +29,7 @@ def test_no_answer_is_worse_than_its_certificate_says():
         assert np.isnan(row["error"]) or row["certificate"] <= max(WIDE * row["error"], 1e-13)
 
 
+@pytest.mark.slow
 def test_certificates_hold_for_every_body():
     for number in range(len(KINDS)):
         _, compulsion = fuzzed(0, number)

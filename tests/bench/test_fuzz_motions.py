@@ -59,6 +59,7 @@ def test_scenes_that_cannot_move_are_refused(number):
     assert row["verdict"] == "refused", row
 
 
+@pytest.mark.slow
 def test_random_scenes_have_elements_of_many_kinds():
     scenes = [moved_scene(0, number) for number in range(200)]
     assert len({element for given in scenes for element in given.elements}) > 25

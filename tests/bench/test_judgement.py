@@ -137,6 +137,7 @@ def test_solvers_are_held_to_what_they_promise():
     assert gap_alone[0] >= gap_alone[1] and gap_alone[1] <= 1.0
 
 
+@pytest.mark.slow
 def test_solvers_are_not_asked_for_what_they_do_not_take():
     """Dense matrices that fill the memory, and equality rows alone: no failures, and named with the reason."""
     (large,) = of_suite("large", ["large net 100"])

@@ -39,6 +39,7 @@ def test_reference_is_as_good_as_it_says():
     assert np.abs(found.positions - exact).max() <= DIGITS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["dop853", "rk4"])
 def test_finer_settings_are_more_exact(method):
     found = list(attempts(_pendulum(), DURATION, methods=[method], time_limit=0.3))
@@ -192,6 +193,7 @@ def test_unknown_backends_are_named():
         list(attempts(_pendulum(), DURATION, backends=["recursio"]))
 
 
+@pytest.mark.slow
 def test_ladder_reference_data():
     """The error is that of centres of mass: those of the ladder's first crank, from its angle."""
     data = mechanisms.reference("n-four-bar")["table"]
@@ -200,6 +202,7 @@ def test_ladder_reference_data():
     assert found[0] == pytest.approx([np.sin(theta) / 2, np.cos(theta) / 2, 0.0], abs=1e-10)
 
 
+@pytest.mark.slow
 def test_readme_has_the_numbers_of_the_tables_of_qp_solvers():
     """Written by ``python -m benchmarks.qp_numbers`` when tables have been measured."""
     assert qp_numbers.section() in (BENCHMARKS / "README.md").read_text(encoding="utf-8")

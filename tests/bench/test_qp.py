@@ -161,6 +161,7 @@ def test_an_interrupted_comparison_goes_on(tmp_path):
     assert len(compare(tmp_path, problems=SMALL, **some).rows) == len(rows)
 
 
+@pytest.mark.slow
 def test_rows_of_other_settings_or_numbers_are_measured_again(tmp_path, monkeypatch):
     """A row is known by the digests of its problem and of its solver's settings; it takes the place of the older one."""
     some = {"backends": ["daqp"], "levels": ["high"], "progress": False, "name": "mine"}
@@ -240,6 +241,7 @@ def test_shifted_means():
     assert shifted_mean([0.0, 3e-3]) == pytest.approx(1e-3)  # √(1 · 4) − 1 milliseconds
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("form", FORMS)
 def test_problems_are_read_by_qpsolvers(tmp_path, form):

@@ -70,6 +70,7 @@ def test_references_leave_no_residuals_and_shifted_ones_do(small, name):
         assert programme.residuals(-x, *programme.multipliers(-x, y, z))[0] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "name", "solver"), CASES)
 def test_solvers_of_cones_and_of_coulombs_law(small, kind, name, solver):
     """Whoever claims to have kept 1e-9 is near the reference."""

@@ -10,7 +10,7 @@ import pytest
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference
 from gauss.bench.suite import CLASSES, instances, recipes
-from gauss.bench.suite.check import EXACT, ROUNDED, checked
+from gauss.bench.suite.catalogue import EXACT, ROUNDED, checked
 from gauss.bench.suite.classes.mechanisms import of_compulsion
 from gauss.bench.suite.doubled import product
 from gauss.bench.suite.instance import SOLVED, with_reference
@@ -115,6 +115,7 @@ def test_a_verdict_without_proof_is_refused(few):
             checked(wrong)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "stewart", "three stops", "light tip 1e-9"])
 def test_references_agree_with_those_of_fifty_digits(name):
     """Two ways to extended precision, from the full form and from F2, whose making rounds: they differ by that."""
@@ -148,6 +149,7 @@ def test_a_foreign_solver_finds_answers_and_multipliers_of_the_same_signs(some):
     assert tried > 3
 
 
+@pytest.mark.slow
 def test_coulombs_law_holds_contact_by_contact(some):
     for instance in some["coulomb"]:
         r = instance.reference.x.hi.reshape(-1, 3)
@@ -162,6 +164,7 @@ def test_coulombs_law_holds_contact_by_contact(some):
         assert ((r[:, 1:] * u[:, 1:]).sum(axis=1)[slides] < 0).all()
 
 
+@pytest.mark.slow
 def test_steps_of_a_sequence_have_one_shape_and_change_what_is_active():
     names = [
         recipe.name for recipe in recipes("sequences") if "dropped box" in recipe.name or "falling chain" in recipe.name
@@ -173,6 +176,7 @@ def test_steps_of_a_sequence_have_one_shape_and_change_what_is_active():
         assert len({tuple(step.reference.active) for step in own}) > 2
 
 
+@pytest.mark.slow
 def test_stages_of_control_are_banded(some):
     for instance in some["mpc"]:
         steps, n_x, n_u = instance.stages

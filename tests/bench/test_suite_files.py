@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gauss.bench.suite import CLASSES, instances, recipes
-from gauss.bench.suite.check import checked
+from gauss.bench.suite.catalogue import checked
 from gauss.bench.suite.fclib import read_fclib
 from gauss.bench.suite.files import export_suite, fingerprint, read_npz
 from gauss.bench.suite.instance import SOLVED

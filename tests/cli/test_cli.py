@@ -33,6 +33,7 @@ def test_run_writes_what_it_is_asked_for(tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_events_are_counted_by_their_kind():
     result = call("run", "friction_oscillator", "--duration", 3)
     assert "4 × slips, 1 × holds" in result.output  # at the half swings of 0.1 π s, until it sticks
@@ -78,6 +79,7 @@ def test_check_agrees(scene):
     assert "joint accelerations" in result.output
 
 
+@pytest.mark.slow
 def test_check_fails_with_an_exit_code():
     result = call("check", "spatial_tree", "--states", 2, "--tolerance", 1e-30)
     assert result.exit_code == 1
@@ -172,6 +174,7 @@ def test_output_is_written_as_its_ending_says(arguments, ending, tmp_path):
     assert path.stat().st_size > 0 and f"written to {path}" in result.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [("rotors", "gear_runup"), ("linkage", "four_bar"), ("run", "pendulum")])
 @pytest.mark.parametrize("ending, remedy", [(".png", "--plot"), (".gif", "--video"), (".html", "--html"), (".txt", ".csv")])
 def test_output_of_another_kind_is_refused_at_once(command, ending, remedy, tmp_path):
@@ -188,6 +191,7 @@ def test_output_whose_library_is_missing_is_refused_before_the_motion(ending, li
     assert isinstance(result.exception, MissingPackageError) and f"{library} is not installed" in str(result.exception)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the device that is full is one of Linux")
 def test_a_full_disk_is_one_line():
     with open("/dev/full", "w") as full:
@@ -211,6 +215,7 @@ class Interrupted(ModuleType):
         raise AttributeError(name)
 
 
+@pytest.mark.slow
 def test_a_folder_of_the_name_of_a_model_hides_nothing(tmp_path, monkeypatch):
     (tmp_path / "four_bar").mkdir()
     (tmp_path / "mine").mkdir()

@@ -15,6 +15,7 @@ COUNTS = [1, 3, 8, STATES - 1, STATES, STATES + 1, 3 * STATES, 3 * STATES + 13]
 SEED, LENGTH = 5, 250  # of a random function long enough for blocks; its first output is an input, its last a constant
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", COUNTS)
 def test_columns_in_blocks_are_those_of_single_states(count):
     kernel = trace(formula(SEED, LENGTH), 2)
@@ -25,6 +26,7 @@ def test_columns_in_blocks_are_those_of_single_states(count):
     assert np.isnan(together[:, -1]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("shortest", [0, 10_000], ids=["blocks", "vectors"])
 def test_rows_in_blocks_are_those_of_single_states(count, shortest, monkeypatch):

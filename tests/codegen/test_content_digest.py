@@ -157,6 +157,7 @@ def test_code_that_two_functions_share_is_told_from_other_code():
     assert len(set(found)) == len(found) and twice(_closing_over(2.0), other) == found[0]
 
 
+@pytest.mark.slow
 def test_a_scene_has_one_key_in_all_processes():
     """Neither the seed of hashes nor the order in which settings are given enters."""
     code = """

@@ -16,7 +16,7 @@ from gauss.codegen import Kernel, from_disk, machine, object_cache, trace
 from gauss.codegen import cache_size as size
 from gauss.errors import CacheWarning
 
-disk_cache, digest = (import_module(f"gauss.codegen.{name}") for name in ("disk_cache", "package_digest"))
+disk_cache = import_module("gauss.codegen.disk_cache")
 GIVEN = np.array([2.0, 3.0])
 pytestmark = pytest.mark.disk
 
@@ -54,6 +54,7 @@ def test_what_was_made_once_is_read_and_gives_the_same(place):
     assert anew and other(GIVEN)[0] != 9.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["made-", "object"])
 @pytest.mark.parametrize("spoil", ["gone", "cut", "changed", "swapped"])
 def test_what_is_damaged_is_made_anew(what, spoil, place):
@@ -122,20 +123,20 @@ def test_other_sources_and_another_machine_have_other_keys(what, place, monkeypa
     made(1.5)
     match what:
         case "sources":
-            monkeypatch.setattr(digest, "_content_of", lambda paths: b"other")
+            monkeypatch.setattr(disk_cache, "_content_of", lambda paths: b"other")
         case "cpu":
-            monkeypatch.setattr(digest.llvm, "get_host_cpu_name", lambda: "other")
+            monkeypatch.setattr(disk_cache.llvm, "get_host_cpu_name", lambda: "other")
         case "python":
-            monkeypatch.setattr(digest.sys, "version", "other")
+            monkeypatch.setattr(disk_cache.sys, "version", "other")
         case _:
-            monkeypatch.setattr(getattr(digest, {"numpy": "np"}.get(what, what)), "__version__", "other")
-    monkeypatch.setattr(disk_cache, "package_digest", digest.package_digest.__wrapped__)
+            monkeypatch.setattr(getattr(disk_cache, {"numpy": "np"}.get(what, what)), "__version__", "other")
+    monkeypatch.setattr(disk_cache, "package_digest", disk_cache.package_digest.__wrapped__)
     assert made(1.5)[1]
 
 
 def test_sources_changed_since_the_process_began_keep_nothing(place, monkeypatch):
-    monkeypatch.setattr(digest, "BEGUN", 0)
-    monkeypatch.setattr(disk_cache, "package_digest", digest.package_digest.__wrapped__)
+    monkeypatch.setattr(disk_cache, "BEGUN", 0)
+    monkeypatch.setattr(disk_cache, "package_digest", disk_cache.package_digest.__wrapped__)
     assert made(1.5)[1] and made(1.5)[1] and not entries(place)
 
 

@@ -136,6 +136,7 @@ def test_shipped_scenes_run_on_a_device(path, assembled):
     assert ".entry" in assembled.texts[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((ROOT / "models" / "rotors").glob("*.toml")), ids=lambda path: path.stem)
 def test_links_that_time_stepping_does_not_take_are_named(path):
     system = gauss.compile_scene(to_scene(load_rotors(path)))
@@ -231,6 +232,7 @@ def test_what_a_device_refuses():
         refuse_libraries("declare void @gauss_lapack_dgeqp3()")
 
 
+@pytest.mark.slow
 def test_batches_beyond_the_memory_of_a_device_are_split(monkeypatch):
     system = gauss.compile_scene(mechanisms.rods(1))
     q, v = _states(system, 9)
@@ -249,6 +251,7 @@ def test_batches_beyond_the_memory_of_a_device_are_split(monkeypatch):
         gauss.rollout(system, q, v, device="lanes", **run)
 
 
+@pytest.mark.slow
 def test_single_precision_says_its_error():
     system = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5]))
     q, v = _states(system, 200)

@@ -73,8 +73,9 @@ def test_a_file_that_others_may_write_to_is_not_run_and_is_replaced(mode, kept):
 @pytest.mark.parametrize("what", ["file", "folder", "key"])
 def test_what_somebody_else_owns_is_not_used(what, kept):
     os.chown({"file": kept, "folder": kept.parent, "key": kept.parent / file_trust.KEY_FILE}[what], 12345, -1)
-    with pytest.warns(CacheWarning):
+    with pytest.warns(CacheWarning) as said:
         assert object_cache.read(kept.name) is None
+    assert "chmod" not in str(said[0].message)  # only the owner can
 
 
 def test_a_link_is_not_followed(kept, tmp_path):

@@ -37,6 +37,7 @@ def formula(seed: int, size: int = 80):
     return function
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.integers(1, 60))
 @settings(deadline=None)
 def test_every_operation_is_in_one_piece_and_finds_its_operands(seed, length):
@@ -60,6 +61,7 @@ def test_every_operation_is_in_one_piece_and_finds_its_operands(seed, length):
     assert all(len(part.nodes) <= 3 * length + 10 for part in parts)  # constants, and what stays together, on top
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 @settings(deadline=None)
 def test_values_that_live_at_once_have_places_of_their_own(seed):

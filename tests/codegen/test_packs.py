@@ -11,6 +11,8 @@ from gauss.codegen import packed_function as packed_function_module
 from gauss.codegen.packed_function import PackedFunction
 from gauss.codegen.packs import Packs
 
+pytestmark = pytest.mark.slow
+
 OWN, SHARED, DEPTH = 4, 3, 12  # inputs of a chain, inputs of all chains, operations of a chain
 OPERATIONS: tuple[Callable, ...] = (
     lambda x, y, c: x * y + c,
@@ -51,7 +53,6 @@ def chains(count: int, seed: int, odd: int = 0):
     return write(function, SHARED + OWN * count), seeds
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("length", [400, 15], ids=["in one piece", "in pieces"])
 @pytest.mark.parametrize("count", [2, 3, 5, 8])
 def test_packs_round_like_single_operations(count, length, monkeypatch):

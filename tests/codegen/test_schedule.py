@@ -25,6 +25,7 @@ def _random_sums(seed: int):
     return function
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 def test_values_stay(seed):
     function = _random_sums(seed)
@@ -37,6 +38,7 @@ def test_values_stay(seed):
     assert np.abs(found - expected).max() <= ROUNDING * max(1.0, np.abs(expected).max())
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000))
 def test_operands_come_first_and_nothing_twice(seed):
     nodes = schedule(write(_random_sums(seed), 4)).nodes

@@ -36,6 +36,7 @@ def in_stages():
     return staged(place, FUNCTIONS, 3, name="place")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(FUNCTIONS))
 @pytest.mark.parametrize("length", [2000, 4])
 @pytest.mark.parametrize("inlined", [False, True])

@@ -126,6 +126,7 @@ SLOPES = {  # y' of y = (a, b), with what each recurrence does
 ORDERS = [*((name, 9) for name in SLOPES), ("product", 1), ("time", 2), ("quotient", HIGHEST_ORDER)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, order", ORDERS)
 def test_recurrences(name, order):
     function = write(lambda t, y: np.array(SLOPES[name](t[0], *y), dtype=object), 1, 2)

@@ -14,7 +14,7 @@ import gauss
 from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, processor, terminal_line, tiers, write
 from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
-from gauss.codegen.module_units import FUNCTION, ModuleUnits
+from gauss.codegen.object_code import FUNCTION, ModuleUnits
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.errors import ArgumentError
 from gauss.io.catalog import shipped
@@ -129,6 +129,7 @@ def test_an_unknown_tier_is_refused(monkeypatch):
         machine.load(text(6.0))
 
 
+@pytest.mark.slow
 def test_the_cache_goes_from_quick_to_optimised_code(place):
     """A process that ended early leaves quick code with its module, from which the next one goes on."""
     OPTIMISER.stop()
@@ -178,7 +179,7 @@ SCRIPT = """
 import os, sys, time
 import gauss
 from gauss.codegen import optimiser
-from gauss.codegen.module_units import FUNCTION, ModuleUnits
+from gauss.codegen.object_code import FUNCTION, ModuleUnits
 from gauss.codegen.optimiser import OPTIMISER
 optimiser.REST = 0.0
 system = gauss.compile_scene(gauss.load("n_four_bar", n=3))

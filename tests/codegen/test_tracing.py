@@ -98,6 +98,7 @@ def test_jacobian_agrees_with_casadi():
         assert np.abs(traced(point).reshape(10, 2) - expected).max() <= 1e-13 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("which", range(10))
 def test_forward_and_reverse_agree_with_casadi(which):
@@ -149,6 +150,7 @@ def test_random_formulas(steps):
     assert trace(formula, 2, batch=False)(point) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-3, 1.0, 50.0, 1e3, 1e5, 1e8, 1e300])
 def test_sine_and_cosine_to_one_ulp(size, monkeypatch):
     rng = np.random.default_rng(3)
@@ -240,6 +242,7 @@ def test_what_another_user_owns_is_not_run(tmp_path, monkeypatch):
     assert object_cache.read(name) is None
 
 
+@pytest.mark.slow
 def test_code_is_kept_by_graph_processor_and_version(tmp_path, monkeypatch):
     monkeypatch.setenv("GAUSS_CACHE", str(tmp_path))
 

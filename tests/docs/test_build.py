@@ -11,6 +11,8 @@ from gauss import cli
 from gauss.docs.groups import GROUPS
 from tests.support.extras import others
 
+pytestmark = pytest.mark.slow
+
 COLLECTED = """
 import sys
 sys.modules.update(dict.fromkeys(sys.argv[2:]))  # as if they were not installed
@@ -22,7 +24,6 @@ collect(Path(sys.argv[1]), get_command(app))
 """
 
 
-@pytest.mark.slow
 def test_the_documentation_builds_without_a_warning(tmp_path):
     pytest.importorskip("furo")
     with warnings.catch_warnings():
@@ -34,7 +35,6 @@ def test_the_documentation_builds_without_a_warning(tmp_path):
     assert (tmp_path / "reference" / "names" / "gauss.simulate.html").exists()
 
 
-@pytest.mark.slow
 def test_the_extra_has_what_the_reference_needs(tmp_path):
     pytest.importorskip("gymnasium")
     run = subprocess.run([sys.executable, "-c", COLLECTED, str(tmp_path), *others("docs")], capture_output=True, text=True)

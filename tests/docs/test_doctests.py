@@ -9,6 +9,8 @@ import pytest
 from gauss.docs import reference
 from gauss.docs.groups import GROUPS
 
+pytestmark = pytest.mark.slow
+
 NEEDS = {"gauss.gym": "gymnasium", "gauss.view": "viser", "gauss.export.to_sympy": "sympy", "gauss.export.Formulas": "sympy"}
 NEEDS |= {"gauss.export.latex_document": "sympy", "gauss.export.to_casadi": "casadi", "gauss.export.to_jax": "jax"}
 NEEDS |= {"gauss.jax_": "jax", "gauss.torch_": "torch"}
@@ -30,7 +32,6 @@ def _examples() -> dict[str, list[doctest.DocTest]]:
 EXAMPLES = _examples()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_examples_of_docstrings(name, tmp_path, monkeypatch):
     for start, package in NEEDS.items():

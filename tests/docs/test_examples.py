@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gauss.docs.order import SECTIONS
+from gauss.docs.gallery import SECTIONS
 from gauss.docs.uses import examples
 from gauss.io.catalog import folder
 from gauss.versions import version_of

@@ -2,8 +2,10 @@
 
 from importlib import import_module
 
+import pytest
+
 import gauss
-from gauss.docs import plans, reference
+from gauss.docs import generated, reference
 from gauss.docs.groups import GROUPS
 from gauss.docs.uses import names_in, uses
 from gauss.dynamics.plan import MOTIONS
@@ -42,6 +44,7 @@ def test_every_name_of_gauss_is_used_by_a_page_or_an_example():
     assert [name for name in typed if f"gauss.{name}" not in used] == []
 
 
+@pytest.mark.slow
 def test_every_public_name_has_an_example():
     used = uses()
     assert [name for name in GROUPED if name not in used and name not in EXAMPLES] == []
@@ -60,6 +63,6 @@ def test_pages_of_the_reference_name_what_they_document():
 
 
 def test_the_table_of_plans_has_a_row_for_every_rule():
-    tables = plans.plan_tables()
+    tables = generated.plan_tables()
     for number, rule in enumerate(MOTIONS.rules, 1):
         assert f"| {number} | {rule.driver} | {rule.dynamics} | " in tables

@@ -10,7 +10,7 @@ from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.mechanism import forward_dynamics
+from gauss.dynamics.mechanism import Mechanism, forward_dynamics
 from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Point, Rates
@@ -64,6 +64,16 @@ def test_numbers_and_machine_code_agree_with_the_recursion(name):
             kernel(np.concatenate([[0.0], state.q, state.v, effort]))[: system.n_v],
         ):
             assert np.abs(found - expected).max(initial=0.0) <= tolerance * np.abs(expected).max(initial=0.0)
+
+
+@pytest.mark.parametrize("kind", sorted(PAIRS))
+def test_single_efforts_reach_joints_beyond_them(kind):
+    """A force on one joint moves those further out, of any number of freedoms, on which nothing acts: M⁻¹, by columns."""
+    system = gauss.compile_scene(mechanisms.two_bodies(kind, 2))
+    state = random_state(system, np.random.default_rng(2))
+    mechanism, none = Mechanism(system, state.q, state.v), np.zeros(0)
+    found = np.array([mechanism.response(unit, none)[0] for unit in np.eye(system.n_v)])
+    assert np.abs(found @ system.mass_matrix(state.q) - np.eye(system.n_v)).max(initial=0.0) <= FAR
 
 
 LOOPS = {

@@ -196,6 +196,7 @@ def test_sparse_matrices_of_blocks_add_what_lies_in_one_place():
     assert from_blocks([], (3, 4)).csc().shape == (3, 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "rolling_disk", "planetary_gears", "stewart_platform"])
 def test_loop_constraints_alone_have_a_velocity_residual(name):
     """A v + B q̇ − C of all rows, with rates that meet no loop: zero in the tree."""

@@ -32,6 +32,7 @@ def closed_chain(distance: float = 1.2) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_paths_end_near_the_guess(seed):
     system = gauss.compile_scene(closed_chain())
@@ -46,6 +47,7 @@ def test_paths_end_near_the_guess(seed):
     assert np.array_equal(again.state.q, found.state.q)  # deterministic
 
 
+@pytest.mark.slow
 def test_what_no_pose_closes_is_refused_with_its_residual():
     system = gauss.compile_scene(closed_chain(distance=9.0))
     with pytest.raises(AssemblyError, match="'held'.*other starts.*does not reach") as refused:
@@ -55,6 +57,7 @@ def test_what_no_pose_closes_is_refused_with_its_residual():
     assert np.linalg.norm(off) == pytest.approx(missing, rel=0.2)  # the closest pose is stretched
 
 
+@pytest.mark.slow
 def test_a_start_that_is_kept_is_no_news():
     scene = closed_chain()
     state = gauss.compile_scene(scene).initial_state()
@@ -66,6 +69,7 @@ def test_a_start_that_is_kept_is_no_news():
     assert found.q[0] == pytest.approx(state.q[0], abs=CLOSED)
 
 
+@pytest.mark.slow
 def test_a_start_that_is_changed_is_told():
     scene = closed_chain()
     scene.start("J0", 3.0)  # away from the place: the chain cannot close

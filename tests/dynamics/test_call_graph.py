@@ -23,6 +23,8 @@ from gauss.system import retract
 from tests.support import mechanisms
 from tests.support.welded import Welded
 
+pytestmark = pytest.mark.slow
+
 AGREED = 1e-11  # relative: both are regularised alike, and rounded otherwise
 PROXIMAL = 1e-9  # relative: of Pinocchio's iteration
 MET_RESIDUAL = 1e-12  # gap of settled states [rad, m]
@@ -139,7 +141,6 @@ def case(request):
     return system, consistent_state(system), CallGraphKernels(system)
 
 
-@pytest.mark.slow
 def test_accelerations_are_those_of_the_certified_recursion(case):
     system, state, _ = case
     load = np.random.default_rng(2).normal(size=system.n_v)
@@ -152,7 +153,6 @@ def test_accelerations_are_those_of_the_certified_recursion(case):
     assert error <= AGREED and gap <= 1e-10
 
 
-@pytest.mark.slow
 def test_batches_of_states_are_evaluated_one_by_one():
     system = gauss.compile_scene(gauss.load("n_four_bar", n=43))
     states = [consistent_state(system, seed) for seed in range(3)]
@@ -163,7 +163,6 @@ def test_batches_of_states_are_evaluated_one_by_one():
         assert np.array_equal(found[k], system.accelerations(state, load[k]))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITTEN)
 def test_they_are_those_of_the_code_that_is_written_out(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -174,7 +173,6 @@ def test_they_are_those_of_the_code_that_is_written_out(name):
     assert np.abs(found - whole).max() <= AGREED * np.abs(whole).max()
 
 
-@pytest.mark.slow
 def test_wrong_accelerations_are_noticed(case):
     system, state, kernels = case
     effort = gauss.assemble(system, state).P
@@ -192,7 +190,6 @@ def test_wrong_accelerations_are_noticed(case):
         assert error(wrong) >= 1e-8
 
 
-@pytest.mark.slow
 def test_states_are_brought_back_to_the_constraints(case):
     """The gap closes, the motion that a state had already stays, and a state that meets them does not move."""
     system, state, kernels = case
@@ -210,7 +207,6 @@ def test_states_are_brought_back_to_the_constraints(case):
     assert np.abs(slip).max() <= 10 * MET_RESIDUAL * (1.0 + np.abs(settled.v).max())
 
 
-@pytest.mark.slow
 def test_states_off_the_constraints_are_told():
     system = gauss.compile_scene(gauss.load("n_four_bar", n=2))
     state, load = consistent_state(system), np.zeros(system.n_v)
@@ -222,7 +218,6 @@ def test_states_off_the_constraints_are_told():
         assert 1e-8 <= gap <= 1e-4, name
 
 
-@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("n", [2, 40])
 def test_a_ladder_accelerates_as_in_pinocchio(n):
@@ -239,7 +234,6 @@ def test_a_ladder_accelerates_as_in_pinocchio(n):
     assert np.abs(found - exact).max() <= AGREED * scale
 
 
-@pytest.mark.slow
 def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
     """Tables of twice as many loops are twice as long, to one per cent; the functions are the same ones."""
     for family, sizes in (("n_four_bar", (10, 20, 40)), ("hung_chain", (20, 40, 80))):
@@ -251,7 +245,6 @@ def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
         assert kernels[2].values.size <= 4.1 * kernels[0].values.size
 
 
-@pytest.mark.slow
 def test_explain_says_which_way_is_taken():
     assert "gauss.mobility" in mechanisms.ladder().explain()
     plans = [motion_plan(mechanisms.ladder(n)) for n in (50, 5)]
@@ -259,7 +252,6 @@ def test_explain_says_which_way_is_taken():
     assert has_large_loops(gauss.compile_scene(gauss.load("hung_chain", n=200)))
 
 
-@pytest.mark.slow
 def test_platforms_in_a_stack_are_called_loop_by_loop():
     """Each loop is coupled with all others, through the platforms below: too much for straight-line code."""
     system = gauss.compile_scene(mechanisms.platforms(8))
@@ -270,7 +262,6 @@ def test_platforms_in_a_stack_are_called_loop_by_loop():
     assert np.abs(found - solution.qdd).max() <= AGREED * np.abs(solution.qdd).max()
 
 
-@pytest.mark.slow
 def test_a_long_ladder_moves_on_its_constraints():
     """Fifty windows fall; energy is kept, constraints hold, and the cranks stay parallel."""
     system = mechanisms.ladder()
@@ -284,7 +275,6 @@ def test_a_long_ladder_moves_on_its_constraints():
     assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
 
 
-@pytest.mark.slow
 def test_a_long_chain_with_couplings_moves_on_them():
     system = gauss.compile_scene(_coupled_chain(30))
     motion = gauss.simulate(system, 0.1, times=[0.05, 0.1], progress=False)
@@ -295,7 +285,6 @@ def test_a_long_chain_with_couplings_moves_on_them():
     assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
 
 
-@pytest.mark.slow
 def test_it_goes_through_the_flat_posture():
     """There all closing rows fade at once; machine code goes on, on the constraints, and the cranks stay parallel."""
     system = mechanisms.ladder()
@@ -308,7 +297,6 @@ def test_it_goes_through_the_flat_posture():
     assert np.ptp(motion.q[:, [system.column(f"A{i}") for i in range(51)]], axis=1).max() <= 1e-6
 
 
-@pytest.mark.slow
 def test_it_falls_as_one_window_does_that_weighs_as_much():
     """Cranks stay parallel: the ladder has the freedom of one rod, with the inertia and weight of all of them."""
     n, times = 50, np.array([0.2, 0.4])
@@ -326,7 +314,6 @@ def test_it_falls_as_one_window_does_that_weighs_as_much():
     assert np.abs(motion.q[:, system.column("A0")] - expected.q[:, 0]).max() <= 1e-9
 
 
-@pytest.mark.slow
 def test_baumgarte_draws_it_back():
     system = mechanisms.ladder()
     motion = gauss.simulate(system, 0.2, stabilisation="baumgarte", progress=False)
@@ -335,7 +322,6 @@ def test_baumgarte_draws_it_back():
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
 
 
-@pytest.mark.slow
 def test_loads_on_joints_act_and_are_called():
     scene = gauss.load("n_four_bar", n=50)
     calls = []

@@ -13,6 +13,8 @@ from gauss.dynamics.traced_system import Program
 from tests.dynamics.test_call_graph import consistent_state
 from tests.dynamics.test_tree_program import SAME_ENERGY, SAME_MOTION
 
+pytestmark = pytest.mark.slow
+
 SAME_STATE = 1e-11  # relative: both are regularised alike, and rounded otherwise
 BY_PYTHON = Plan("Python loop", "call graph")
 METHODS = {
@@ -36,7 +38,6 @@ def _ladder() -> gauss.Scene:
     return scene
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_compiled_loops_of_scenes_with_many_loops_move_like_loops_of_python(method):
     system = gauss.compile_scene(_ladder())
@@ -51,7 +52,6 @@ def test_compiled_loops_of_scenes_with_many_loops_move_like_loops_of_python(meth
         assert np.abs(found - expected).max() <= SAME_MOTION * max(1.0, np.abs(expected).max()), name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SMALL)
 def test_functions_of_loops_are_those_of_the_code_that_is_written_out(name):
     """Rates, projection and energies; potential energies but for a constant."""

@@ -109,6 +109,11 @@ def _lanes(system) -> PackedFunction | None:
     return in_chain_lanes(system, laws, once, (system.n_q, system.n_v, system.n_v, 1), "lanes")
 
 
+def _reported(system) -> list[tuple[int, int]]:
+    """Chains that ``explain`` reports: their number and that of their joints."""
+    return system.dynamics.equal_chains(system, ACCELERATIONS.plan(Question(system, Laws(system, False))))
+
+
 def _one_by_one(system) -> Kernel:
     """The function with its constants folded, one operation after the other."""
     laws = Laws(system)
@@ -193,6 +198,7 @@ def _related() -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*WALKERS, *LOOPS])
 def test_equal_numbers_belong_to_each_chain_once(name):
     system = gauss.compile_scene((WALKERS | LOOPS)[name]())
@@ -203,6 +209,7 @@ def test_equal_numbers_belong_to_each_chain_once(name):
     assert len(set(places)) == len(places)
     own = {equal.subsystem.Phi[6 * body + 3] for chain in equal.chains for body in chain.bodies}  # masses
     assert own <= set(found[places])
+    assert (len(equal.chains), len(equal.chains[0].joints)) in _reported(system)
 
 
 @pytest.mark.slow
@@ -228,6 +235,8 @@ LEFT_ALONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LEFT_ALONE)
 def test_other_mechanisms_keep_their_code(name):
-    assert _lanes(gauss.compile_scene(LEFT_ALONE[name]())) is None
+    system = gauss.compile_scene(LEFT_ALONE[name]())
+    assert _lanes(system) is None and not _reported(system)

@@ -55,6 +55,7 @@ def test_the_step_is_the_least_in_the_mass_metric():
     assert abs(change @ direction) <= 1e-12 * np.abs(momenta(guess)).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "cardan", "rolling_disk", "planetary_gears"])
 def test_a_state_that_meets_the_constraints_stays_as_it_is(name):
     """By numpy first, then by machine code; a state off the constraints is projected by either."""
@@ -147,6 +148,7 @@ def test_rates_that_contradict_each_other_are_named():
         gauss.compile_scene(scene).initial_state()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [1e-9, 1e-7])
 def test_noise_of_typed_digits_is_used_and_said(noise):
     """A hinge given twice, the second a little off: the motion is that of one hinge, within the noise."""

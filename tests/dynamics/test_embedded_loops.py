@@ -16,6 +16,8 @@ from gauss.dynamics.plan import FUNCTIONS
 from gauss.dynamics.rules import Question
 from tests.support import mechanisms
 
+pytestmark = pytest.mark.slow
+
 ROUNDING = 1e-10  # relative to the largest entry: both eliminations lose digits near singular states
 CERTIFIED = 1e-9  # of accelerations that passed the check
 

@@ -18,6 +18,8 @@ from gauss.integrators import Point, Rates
 from gauss.system import retract
 from tests.dynamics.test_embedded_loops import SCENES, _platform
 
+pytestmark = pytest.mark.slow
+
 SAME = 1e-9  # relative to the largest output: both eliminations lose digits near singular states
 DAMPED = 1e-3  # of the error of wrong accelerations: the general elimination damps the residual of the constraints
 REGULARISED = 1e-6  # of projected states: so are the Newton steps of the general elimination
@@ -44,7 +46,6 @@ def _outputs(system, kind: type[Program], drift: Drift) -> dict[str, np.ndarray]
     }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("drift", [Drift(), Drift(gains=(3.0, 4.0))], ids=["projection", "Baumgarte"])
 @pytest.mark.parametrize("name", ["four_bar", "slider_crank", "rolling_disk", "belt", "platform on hinges", "crossed loops"])
 def test_functions_of_both_eliminations_agree(name, drift):
@@ -55,7 +56,6 @@ def test_functions_of_both_eliminations_agree(name, drift):
         assert found[key] == pytest.approx(own, rel=within, abs=within * max(1.0, np.abs(own).max())), key
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", MOTIONS)
 def test_motions_of_both_eliminations_agree(name):
     system = gauss.compile_scene(MOTIONS[name]())
@@ -65,7 +65,6 @@ def test_motions_of_both_eliminations_agree(name):
         assert np.abs(one - two).max() <= SAME_MOTION * max(1.0, np.abs(two).max())
 
 
-@pytest.mark.slow
 def test_a_batch_makes_the_motions_of_the_general_elimination():
     system = gauss.compile_scene(gauss.load("slider_crank"))
     start = system.initial_state()
@@ -74,7 +73,6 @@ def test_a_batch_makes_the_motions_of_the_general_elimination():
     assert np.abs(batch.q[:, -1] - expected.q[-1]).max() <= SAME_MOTION * max(1.0, np.abs(expected.q[-1]).max())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", [{}, RK4], ids=["dop853", "rk4"])
 def test_a_motion_near_a_singular_front_goes_on_with_the_general_elimination(method, monkeypatch):
     """A stretched leg cannot meet its own rows, though the platform moves on."""

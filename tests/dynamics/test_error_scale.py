@@ -76,6 +76,7 @@ def test_stiff_scenes_that_come_to_rest_stay_compiled(make):
     assert np.abs(motion.q - explicit.q).max() <= 1e-10 and np.abs(motion.v - explicit.v).max() <= 1e-9
 
 
+@pytest.mark.slow
 def test_errors_beyond_rounding_are_seen():
     system = gauss.compile_scene(held_chain())
     program = Program(system, Laws(system))

@@ -6,6 +6,8 @@ import pytest
 import gauss
 from gauss.errors import SceneError, SimulationError
 
+pytestmark = pytest.mark.slow
+
 STEP = 1e-3
 AGREEMENT = 1e-8  # relative to the largest force, of machine code and certified solutions
 AT_REST = 1e-6

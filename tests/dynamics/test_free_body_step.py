@@ -9,6 +9,8 @@ from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 
+pytestmark = pytest.mark.slow
+
 STEP = 1e-3  # [s]
 SAME_STEP = 1e-9  # coordinates and rates after a step of two solvers, each with laws to 1e-10
 SAME_MOTION = 1e-6  # the same after 150 steps

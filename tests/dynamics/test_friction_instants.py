@@ -68,6 +68,7 @@ def test_the_instant_is_that_of_the_motion():
     assert abs(system.accelerations(motion.state(2))[0] - difference[0]) <= 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("v", [1.0, -1.0])
 def test_derivatives_where_friction_slides(v):
     system, h = arm(), 1e-5
@@ -78,6 +79,7 @@ def test_derivatives_where_friction_slides(v):
         assert abs(getattr(found, name)[0, 0] - slope) <= DIFFERENCED * (1.0 + abs(slope))
 
 
+@pytest.mark.slow
 def test_derivatives_where_friction_sticks_and_between():
     system = arm()
     stuck = gauss.derivatives(system, system.state([0.3], [0.0]), [-2.0])

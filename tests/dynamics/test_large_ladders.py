@@ -9,8 +9,9 @@ from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.plan import motion_plan
 from tests.support import mechanisms
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_a_large_ladder_has_the_certified_accelerations():
     system = mechanisms.ladder(60)
     state, load = system.initial_state(), np.random.default_rng(0).standard_normal(system.n_v)
@@ -19,7 +20,6 @@ def test_a_large_ladder_has_the_certified_accelerations():
     assert np.abs(system.accelerations(state, load) - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
-@pytest.mark.slow
 def test_work_grows_with_the_number_of_windows():
     estimated = [sum(part.loop_elimination_work for part in mechanisms.ladder(n).parts) for n in (20, 40, 80)]
     written = [system.dynamics.operations(system, system.subsystems) for system in map(mechanisms.ladder, (3, 6, 12))]
@@ -27,7 +27,6 @@ def test_work_grows_with_the_number_of_windows():
         assert large - middle == pytest.approx(2 * (middle - small), rel=0.05)
 
 
-@pytest.mark.slow
 def test_loops_that_share_one_long_branch_are_not_written_down():
     scene, previous = gauss.Scene("mast"), "ground"
     for i in range(120):

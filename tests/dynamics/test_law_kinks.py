@@ -7,6 +7,8 @@ import gauss
 from gauss.analysis.derivatives import derivatives
 from gauss.errors import SimulationError
 
+pytestmark = pytest.mark.slow
+
 CLOSE = 1e-9  # relative, of derivatives of simple laws
 
 # law of (x, v), start (x, v), and its derivatives there; None where it has none

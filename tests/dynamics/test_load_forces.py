@@ -12,6 +12,8 @@ from gauss.dynamics.rules import Plan, Question
 from gauss.system import random_state
 from tests.support import mechanisms
 
+pytestmark = pytest.mark.slow
+
 ROUNDING = 1e-10  # of accelerations, relative to the largest
 SAME_MOTION = 1e-9  # of coordinates and work
 CALLED = {("compiled loop", "compiled"): "callbacks"}  # dynamics whose machine code calls opaque laws
@@ -48,7 +50,6 @@ def case(request):
     return gauss.compile_scene(_loaded(make())), dynamics
 
 
-@pytest.mark.slow
 def test_loads_beside_machine_code_have_the_accelerations_of_the_certified_recursion(case):
     system, dynamics = case
     of_states = "embedded loops" if system.has_closures and dynamics == "compiled" else dynamics
@@ -60,7 +61,6 @@ def test_loads_beside_machine_code_have_the_accelerations_of_the_certified_recur
         assert np.abs(system.accelerations(one) - expected).max() <= ROUNDING * np.abs(expected).max()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("driver", ["compiled loop", "Python loop"])
 def test_a_motion_under_loads_beside_machine_code_is_the_certified_one(case, driver):
     system, dynamics = case

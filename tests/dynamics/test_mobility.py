@@ -39,6 +39,7 @@ COUNTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", COUNTS)
 def test_freedoms(case):
     make, counted, freedoms, redundant = COUNTS[case]
@@ -112,6 +113,7 @@ def test_reactions_of_two_hinges_are_open_until_a_compliance_decides():
     assert upper.force[0, 0] == pytest.approx(-lower.force[0, 0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_compliance_that_leaves_something_open_says_so():
     with pytest.warns(NonUniqueReactionWarning, match="moment"):
         gauss.reactions(_door(), "upper", compliance={"upper": [0, 0, 0, 0, 0, 1e-6]})
@@ -144,6 +146,7 @@ def test_rows_that_contradict_each_other_are_an_error_with_the_name():
         gauss.simulate(scene, 1.0)
 
 
+@pytest.mark.slow
 def test_explain_says_what_cannot_be_assembled():
     scene = mechanisms.rods(2)
     scene.distance("far", "rod2", "ground", at=(1, 0, 0), length=3.0)

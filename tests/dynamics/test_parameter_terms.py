@@ -74,6 +74,7 @@ def test_inertial_parameters_of_a_tree(kind, size, step):
         assert relative(-system.mass_matrix(state.q) @ slopes, by) <= EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", ["stiffness:S", "damping:S", "length:S"])
 def test_constants_of_loads(parameter):
     scene = sprung_tree()
@@ -94,6 +95,7 @@ def with_moved_joint(system, where: str, name: str, shift: np.ndarray):
     return replace(system, joints=joints, dynamics=system.mechanics.anew())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", ["parent_at", "child_at"])
 def test_lengths_of_a_tree(where):
     system = gauss.compile_scene(gauss.load("random_tree", n=4, seed=1))
@@ -108,6 +110,7 @@ def test_lengths_of_a_tree(where):
     assert relative(found, np.array(expected).T) <= EXACT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", ["child_at:A", "parent_at:B", "parent_at:C", "child_at:D"])
 def test_lengths_of_a_loop_at_fixed_coordinates(parameter):
     scene = gauss.load("four_bar")
@@ -126,6 +129,7 @@ def test_lengths_of_a_loop_at_fixed_coordinates(parameter):
     assert not found[:, 2].any()  # across the plane: the rows that it would contradict are redundant
 
 
+@pytest.mark.slow
 def test_lengths_of_a_loop_along_closed_linkages():
     """With the coordinates and rates that keep the loop closed: ∂q̈/∂p + ∂q̈/∂q dq/dp + ∂q̈/∂v dv/dp, the crank held."""
     system = gauss.compile_scene(gauss.load("four_bar"))
@@ -242,6 +246,7 @@ def test_constants_of_loads_along_joints_of_a_loop(joint, parameter):
         assert relative(derivative(start.q, start.v, a), expected) <= EXACT
 
 
+@pytest.mark.slow
 def test_the_regressor_is_that_of_pinocchio():
     pin = pytest.importorskip("pinocchio")
     from gauss.analysis.crosscheck.pinocchio_ import twin
@@ -263,6 +268,7 @@ def test_the_regressor_is_that_of_pinocchio():
     assert relative(found, system.function("inverse_dynamics")(state.q, state.v, a)) <= AGREEMENT
 
 
+@pytest.mark.slow
 def test_batches_are_single_states():
     system = gauss.compile_scene(gauss.load("four_bar"))
     start = system.initial_state()

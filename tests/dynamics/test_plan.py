@@ -180,6 +180,7 @@ def test_every_rule_of_the_table_is_taken_by_some_case(plans):
     assert taken == {(rule.driver, rule.dynamics, rule.fallback) for rule in MOTIONS.rules}
 
 
+@pytest.mark.slow
 def test_what_was_rejected_names_what_speaks_against_it(plans):
     mode = {
         "an opaque law": "drive of J1",
@@ -228,6 +229,7 @@ def test_something_else_than_a_plan_is_refused():
         gauss.simulate(mechanisms.rods(1), 0.1, progress=False, plan="compiled loop")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, (_, options, *_) in CASES.items() if not options])
 def test_explain_prints_the_plan_of_a_motion(name, plans):
     system = gauss.compile_scene(CASES[name][0]())

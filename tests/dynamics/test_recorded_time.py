@@ -56,6 +56,7 @@ def test_reading_the_time_is_recorded(motion, name):
     assert reads_time(law, motion) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", [lambda t, motion: t, lambda t, motion: motion.t, lambda t, motion: motion.state.t])
 def test_jumps_are_located_however_the_time_is_read(motion, time):
     found = sampled_times(lambda t, at: 1.0 if float(time(t, at)) > 0.7 else 0.0, motion, 0.0, 1.0).switches

@@ -57,6 +57,7 @@ def test_whole_turns_are_no_other_pose():
     assert motions[0].q[-1, 0] == pytest.approx(motions[1].q[-1, 0], rel=CERTIFIED)
 
 
+@pytest.mark.slow
 def test_other_poses_are_refused_where_the_reduced_system_is_taken():
     system = gauss.compile_scene(_dyad())
     own, _, mirrored = _states(system)

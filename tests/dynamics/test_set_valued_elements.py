@@ -11,6 +11,8 @@ from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.errors import NonUniqueReactionWarning, SceneError, SimulationError, StateError
 from gauss.system import ContactMode, phase_scene
 
+pytestmark = pytest.mark.slow
+
 g = 9.81
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 HELD = 1e-20  # m, m/s: rounding of forces that balance, over the mass and for a tenth of a second
@@ -19,7 +21,6 @@ ROUNDING = 1e-14
 RELEASE = 1e-8  # s: an element lets go when its force exceeds the limit by 1e-9
 
 
-@pytest.mark.slow
 def test_every_half_swing_is_shorter_by_the_same_until_friction_holds():
     trajectory = gauss.simulate(gauss.load("friction_oscillator"), 1.8, **TIGHT)
     half, turns = np.pi / 10, np.array([0.21 - 0.04 * k for k in range(6)])
@@ -38,7 +39,6 @@ def test_every_half_swing_is_shorter_by_the_same_until_friction_holds():
     assert force[-1] == pytest.approx(100.0 * trajectory.q[-1, 0], abs=EXACT)  # no more than it takes
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("push", [1.999, 2.001, -2.001])
 def test_a_joint_sticks_up_to_its_limit(push):
     scene = gauss.load("friction_oscillator")
@@ -52,7 +52,6 @@ def test_a_joint_sticks_up_to_its_limit(push):
     assert force == pytest.approx(-push if sticks else -2.0 * np.sign(push), abs=EXACT)
 
 
-@pytest.mark.slow
 def test_a_rising_push_breaks_loose_when_it_should():
     scene = gauss.load("friction_oscillator")
     scene.start("rail", position=0.0)
@@ -64,7 +63,6 @@ def test_a_rising_push_breaks_loose_when_it_should():
     assert trajectory.q[:, 0] == pytest.approx(0.04 * late - 0.004 * np.sin(10 * late), abs=EXACT)
 
 
-@pytest.mark.slow
 @pytest.mark.peer
 def test_a_double_pendulum_with_friction_moves_as_another_integrator_says():
     frictions = np.array([0.8, 0.4])
@@ -88,7 +86,6 @@ def test_a_double_pendulum_with_friction_moves_as_another_integrator_says():
     assert np.column_stack([trajectory.q, trajectory.v])[1:] == pytest.approx(other, abs=1e-8)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_what_holds_minimises_the_compulsion_with_friction(seed):
     """Against a search over all cases of three joints at rest: the least of ½|a − a_free|² − Pᵀq̈ + Σ limit |q̈|."""
@@ -114,7 +111,6 @@ def test_what_holds_minimises_the_compulsion_with_friction(seed):
     assert (np.abs(list(selected.forces.values())) <= limits * (1 + 1e-12)).all()
 
 
-@pytest.mark.slow
 def test_a_limited_drive_keeps_its_speed_as_long_as_it_can():
     scene = gauss.Scene("winch", gravity=(0, 0, 0))
     scene.body("drum", 1.0, (1.0, 1.0, 2.0))
@@ -137,7 +133,6 @@ def test_a_limited_drive_keeps_its_speed_as_long_as_it_can():
     assert found.dissipated[-1] == 0.0  # it is a drive
 
 
-@pytest.mark.slow
 def test_an_effort_is_cut_off_at_its_limit_by_compiled_code_too():
     scene = gauss.Scene("motor", gravity=(0, 0, 0))
     scene.body("rotor", 1.0, (1.0, 1.0, 2.0))
@@ -150,7 +145,6 @@ def test_an_effort_is_cut_off_at_its_limit_by_compiled_code_too():
         assert gauss.drive_forces(trajectory, "A").max() == 1.5
 
 
-@pytest.mark.slow
 def test_friction_in_every_joint_of_a_loop_holds_though_its_shares_are_open():
     scene = gauss.load("four_bar")
     scene.starts.clear()
@@ -165,7 +159,6 @@ def test_friction_in_every_joint_of_a_loop_holds_though_its_shares_are_open():
         gauss.reactions(trajectory, next(iter(scene.joints)))
 
 
-@pytest.mark.slow
 def test_a_stop_with_friction_and_reactions_of_what_holds():
     """A beam on a hinge with friction, at rest against a stop: the stop bears what friction leaves."""
     scene = gauss.Scene("beam", gravity=(0, -g, 0))
@@ -181,7 +174,6 @@ def test_a_stop_with_friction_and_reactions_of_what_holds():
     assert np.abs(instant.qdd).max() < EXACT
 
 
-@pytest.mark.slow
 def test_time_stepping_takes_joint_friction_and_converges_with_the_step():
     scene = gauss.load("friction_oscillator")
     exact, errors = gauss.simulate(scene, 1.8, times=[1.8], **TIGHT), []
@@ -205,7 +197,6 @@ def test_time_stepping_sticks_exactly_and_bears_what_it_takes():
     assert gauss.set_valued_forces(motion, "friction of rail") == pytest.approx(-1.9, abs=EXACT)
 
 
-@pytest.mark.slow
 def test_a_drive_of_limited_force_pulls_a_block_over_rough_ground():
     """4 N against friction of 0.1 · 2 · 9.81 N until the speed is 1 m/s, then what friction takes; its work is that."""
     scene, h = gauss.Scene("tug", gravity=(0, 0, -g)), 1e-2
@@ -247,7 +238,6 @@ MISTAKES = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistakes_are_named(mistake):
     make, error, message = MISTAKES[mistake]

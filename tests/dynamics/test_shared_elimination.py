@@ -12,6 +12,8 @@ from gauss.dynamics.traced_system import Program
 from gauss.integrators import Point, Rates
 from gauss.system import retract
 
+pytestmark = pytest.mark.slow
+
 SAME = 1e-12  # relative to the largest output: a Newton step and three solutions in a row
 NEAR = 1e-3  # of the units of the coordinates: distance of the states from the constraints
 NAMES = ("four_bar", "bricard", "cardan", "slider_crank", "rolling_disk", "planetary_gears")  # those with constraints
@@ -32,7 +34,6 @@ def outputs(system, drift: Drift) -> dict[str, np.ndarray]:
     return {name: Kernel(function, batch=False)(given) for name, (function, given) in found.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "drift"), [*((name, Drift()) for name in NAMES), ("four_bar", BAUMGARTE)])
 def test_calls_compute_what_one_piece_computes(name, drift, monkeypatch):
     """Loops, redundant rows, couplings, relations, rolling; with projection and with Baumgarte feedback."""

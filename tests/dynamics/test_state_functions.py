@@ -1,24 +1,19 @@
-"""Functions of a state agree with Pinocchio and MuJoCo, with each other, with derivatives; batches with single states."""
-
-import copy
+"""Functions of a state agree with Pinocchio and MuJoCo, with each other, with derivatives."""
 
 import numpy as np
 import pytest
 
 import gauss
-from gauss.codegen import content_digest
-from gauss.codegen.python_wrapper import as_doubles
 from gauss.dynamics.kinematics import kinematics
-from gauss.errors import ArgumentError, SimulationError, StateError
+from gauss.errors import SimulationError, StateError
 from gauss.system import State, random_state, retract
 from tests.support import mechanisms
+from tests.support.state_functions import names, relative
 
 LEAST_SQUARES = 1e-8  # of linear models of overconstrained loops, whose null space is cut off by a rank
 AGREEMENT = 1e-12  # relative to the largest entry, of sums in another order
 OF_STEPS = 1e-7  # of central differences, relative
 STEP = 1e-5
-OF_Q = "mass_matrix", "gravity_forces", "center_of_mass", "momentum_matrix", "potential_energy"
-OF_Q_V = "bias_forces", "coriolis_matrix", "momentum", "kinetic_energy"
 REFERENCES = "world", "local", "local_world_aligned"
 TREES = {
     "tree of all kinds": lambda: gauss.load("random_tree", n=6, seed=0),
@@ -28,17 +23,6 @@ TREES = {
 QUICK_ROBOTS = ("panda",)
 ROBOTS = ("ur5", "talos", "kinova", "anymal", "hyq", "tiago", "double_pendulum", "allegro_left_hand", "solo12", "baxter")
 LOOPS = {"four-bar": ("four_bar", "A"), "bricard": ("bricard", "J1"), "slider-crank": ("slider_crank", "A")}
-
-
-def relative(found, expected) -> float:
-    """Largest difference relative to the largest entry."""
-    return np.abs(np.asarray(found) - expected).max() / max(np.abs(expected).max(), 1e-300)
-
-
-def names(system) -> list[str]:
-    """All functions of a system, for its last frame."""
-    frame = list(system.frames)[-1]
-    return [*OF_Q, *OF_Q_V, *(f"{name}:{frame}" for name in ("forward_kinematics", "jacobian", "jacobian_rate"))]
 
 
 def by_pinocchio(system, state, frame, reference):
@@ -98,16 +82,19 @@ def check_against_pinocchio(scene, references):
                 assert max(relative(*pair) for pair in pairs) <= tolerance, (name, reference)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_trees_agree_with_pinocchio(name):
     check_against_pinocchio(TREES[name](), REFERENCES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*QUICK_ROBOTS, *(pytest.param(name, marks=pytest.mark.slow) for name in ROBOTS)])
 def test_robots_agree_with_pinocchio(name):
     check_against_pinocchio(gauss.load(f"robot:{name}", mimic=False), ["local"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*QUICK_ROBOTS, *(pytest.param(name, marks=pytest.mark.slow) for name in ROBOTS)])
 def test_robots_agree_with_mujoco(name):
     mujoco = pytest.importorskip("mujoco")
@@ -139,6 +126,7 @@ def test_robots_agree_with_mujoco(name):
     assert relative(position, data.body(body).xpos) <= AGREEMENT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_the_terms_agree_with_each_other(name):
     system = gauss.compile_scene(TREES[name]())
@@ -160,6 +148,7 @@ def test_the_terms_agree_with_each_other(name):
     assert rate(system.potential_energy) == pytest.approx(g @ v, rel=OF_STEPS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_the_coriolis_matrix_has_the_symmetry_of_christoffel_symbols(name):
     """C(v) w − C(w) v = M [v, w], the bracket of rates: v × w of angular velocities about moving axes, else zero."""
@@ -176,6 +165,7 @@ def test_the_coriolis_matrix_has_the_symmetry_of_christoffel_symbols(name):
     assert np.abs(torsion - system.mass_matrix(q) @ bracket).max() <= AGREEMENT * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(name):
     scene, joint = LOOPS[name]
@@ -210,6 +200,7 @@ def test_terms_for_independent_coordinates_are_those_of_the_constrained_motion(n
     assert relative(J_rate, rate(lambda q: system.jacobian(q, frame, **which))) <= 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_derivatives_for_independent_coordinates_are_those_of_the_motion_on_the_constraints(name):
     """Against the linear model of the same state, and against each other: inverse dynamics undoes the accelerations."""
@@ -229,6 +220,7 @@ def test_derivatives_for_independent_coordinates_are_those_of_the_motion_on_the_
         assert np.abs(by_effort @ found + undone).max() <= 1e-9 * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_independent_rates_meet_the_loop_constraints(name):
     scene, joint = LOOPS[name]
@@ -250,6 +242,7 @@ DIFFERENTIATED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DIFFERENTIATED)
 def test_derivatives_agree_with_those_of_one_state(name):
     system = gauss.compile_scene(DIFFERENTIATED[name]())
@@ -260,6 +253,7 @@ def test_derivatives_agree_with_those_of_one_state(name):
         assert relative(part, other) <= 1e-11 or not other.any()
 
 
+@pytest.mark.slow
 def test_derivatives_of_inverse_dynamics_undo_those_of_the_accelerations():
     system = gauss.compile_scene(TREES["tree of all kinds"]())
     state = random_state(system, np.random.default_rng(4))
@@ -269,151 +263,6 @@ def test_derivatives_of_inverse_dynamics_undo_those_of_the_accelerations():
     M = system.mass_matrix(state.q)
     assert relative(M @ by_load, np.eye(system.n_v)) <= 1e-10
     assert relative(-M @ by_q, efforts[0]) <= 1e-10 and relative(-M @ by_v, efforts[1]) <= 1e-10
-
-
-class Foreign:
-    """Array of another library on the CPU: its memory is shared by DLPack alone."""
-
-    def __init__(self, array):
-        self.array = array
-
-    def __dlpack__(self, **options):
-        return self.array.__dlpack__(**options)
-
-    def __dlpack_device__(self):
-        return self.array.__dlpack_device__()
-
-
-@pytest.fixture(scope="module")
-def arm():
-    return gauss.compile_scene(TREES["tree of all kinds"]())
-
-
-def states(system, count):
-    rng = np.random.default_rng(2)
-    found = [random_state(system, rng) for _ in range(count)]
-    return np.array([state.q for state in found]), np.array([state.v for state in found])
-
-
-def test_a_batch_is_made_of_single_states_bit_for_bit(arm):
-    Q, V = states(arm, 13)
-    functions = [arm.bias_forces, arm.mass_matrix, arm.function(*names(arm)), arm.function("kinetic_energy")]
-    for f in functions:
-        given = (Q,) if f is arm.mass_matrix else (Q, V)
-        found, alone = f(*given), [f(*(x[k] for x in given)) for k in range(13)]
-        if isinstance(found, tuple):
-            for k, part in enumerate(found):
-                assert np.array_equal(part, [one[k] for one in alone])
-        else:
-            assert np.array_equal(found, alone)
-    assert arm.mass_matrix(Q[:0]).shape == (0, arm.n_v, arm.n_v)
-    assert np.array_equal(arm.mass_matrix(Q[:12].reshape(3, 4, -1)).reshape(12, arm.n_v, arm.n_v), arm.mass_matrix(Q[:12]))
-
-
-def test_arrays_of_any_strides_types_and_libraries_give_the_same(arm):
-    Q, V = states(arm, 9)
-    expected, wide = arm.bias_forces(Q, V), np.zeros((9, 2 * arm.n_q))
-    wide[:, ::2] = Q
-    unaligned = np.frombuffer(b"x" + Q.tobytes(), dtype=np.uint8)[1:].view(float).reshape(Q.shape)
-    for q in (wide[:, ::2], np.asfortranarray(Q), Q[::-1].copy()[::-1], unaligned, Q.tolist(), Foreign(Q), Q.astype(">f8")):
-        assert np.array_equal(arm.bias_forces(q, V), expected)
-    assert np.array_equal(arm.bias_forces(Q, V[0]), [arm.bias_forces(q, V[0]) for q in Q])
-    out, room = np.zeros_like(V), np.zeros((9, 2, arm.n_v))
-    assert arm.bias_forces(Q, V, out=out) is out and np.array_equal(out, expected)
-    arm.bias_forces(Q, V, out=room[:, 1])
-    assert np.array_equal(room[:, 1], expected) and not room[:, 0].any()
-    other = Foreign(np.zeros_like(V))
-    assert arm.bias_forces(Q, V, out=other) is other and np.array_equal(other.array, expected)
-    rates = V.copy()
-    assert np.array_equal(arm.bias_forces(Q, rates, out=rates), expected)  # over one of the arguments
-    empty = np.zeros((9, 0)), np.zeros((9, 0, arm.n_v)), np.zeros((9, 0))
-    assert arm.loop_constraints(Q, V, out=empty) is empty  # of no loops
-    parts = np.zeros((9, 3, 3)), np.zeros((9, 3))
-    frame = list(arm.frames)[-1]
-    assert arm.forward_kinematics(Q, frame, out=parts) is parts
-    assert all(np.array_equal(*pair) for pair in zip(parts, arm.forward_kinematics(Q, frame), strict=True))
-
-
-def test_tensors_of_torch_share_their_memory(arm):
-    torch = pytest.importorskip("torch")
-    Q, V = states(arm, 9)
-    q, v, out = torch.from_numpy(Q), torch.from_numpy(V), torch.zeros(9, arm.n_v, dtype=torch.float64)
-    taken = as_doubles(q)
-    assert taken is not None and taken.ctypes.data == q.data_ptr()
-    expected, place = arm.bias_forces(Q, V), out.data_ptr()
-    assert arm.bias_forces(q, v, out=out) is out and out.data_ptr() == place and np.array_equal(out.numpy(), expected)
-    found = arm.bias_forces(q, v)
-    assert torch.from_dlpack(found).data_ptr() == found.ctypes.data and np.array_equal(found, expected)
-    with pytest.raises(StateError, match="detach"):
-        arm.bias_forces(q.clone().requires_grad_(True), v)
-    with pytest.raises(StateError, match="Tensor of shape"):
-        arm.bias_forces(torch._neg_view(q), v)  # noqa: SLF001  # as the imaginary part of a conjugate: memory of the other sign
-
-
-def test_arrays_of_jax_share_their_memory(arm):
-    jax = pytest.importorskip("jax")
-    Q, V = states(arm, 9)
-    with jax.enable_x64(True):
-        q, v = jax.numpy.array(Q), jax.numpy.array(V)
-        taken = as_doubles(q)
-        assert taken is not None and taken.ctypes.data == q.unsafe_buffer_pointer()
-        found = arm.bias_forces(q, v)
-        assert jax.dlpack.from_dlpack(found).unsafe_buffer_pointer() == found.ctypes.data
-        assert np.array_equal(found, arm.bias_forces(Q, V))
-        with pytest.raises(StateError, match="writeable"):
-            arm.bias_forces(q, v, out=jax.numpy.zeros_like(v))
-
-
-def test_functions_that_a_system_keeps_leave_its_content_known():
-    system = gauss.compile_scene(gauss.load("four_bar"))
-    q, before = system.initial_state().q, content_digest(system)
-    system.mass_matrix(q), system.jacobian(q, "coupler"), system.null_space(q, independent="A")  # noqa: B018
-    assert before is not None and content_digest(system) == before
-    assert not {"mass_matrix", "jacobian", "null_space"} & vars(copy.copy(system)).keys()
-
-
-def test_quaternions_are_normalised_or_refused(arm):
-    Q, V = states(arm, 5)
-    place = next(iter(arm.quaternions.values()))
-    typed = Q.copy()
-    typed[3, place] *= 1 + 1e-7
-    assert relative(arm.bias_forces(typed, V), arm.bias_forces(Q, V)) <= AGREEMENT
-    typed[3, place] *= 2
-    with pytest.raises(StateError, match="has length 2, not 1") as refusal:
-        arm.bias_forces(typed, V)
-    assert refusal.value.__notes__ == ["in row 3 of the batch"]
-
-
-MISTAKES = {
-    "size": (lambda s, q, v: s.mass_matrix(q[1:]), StateError, r"q: expected \d+ numbers, or rows of them"),
-    "batches": (lambda s, q, v: s.bias_forces([q] * 2, [v] * 3), StateError, "batches of different lengths: q .2, "),
-    "rates": (lambda s, q, v: s.bias_forces(q, np.full_like(v, np.inf)), StateError, "v: expected .* finite numbers"),
-    "frame": (lambda s, q, v: s.jacobian(q, "hand"), StateError, "no body or frame 'hand'. Known: "),
-    "no frame": (lambda s, q, v: s.jacobian(q), ArgumentError, "jacobian: expected the name of a frame .* one of 'ground'"),
-    "axes": (lambda s, q, v: s.jacobian(q, "ground", reference="globe"), ArgumentError, "no axes 'globe'. Known: local, "),
-    "name": (lambda s, q, v: s.function("mass_matrx"), ArgumentError, "Did you mean 'mass_matrix'"),
-    "frame of none": (lambda s, q, v: s.function("mass_matrix:hand"), ArgumentError, "takes no frame, got 'hand'"),
-    "no coordinates": (lambda s, q, v: s.null_space(q), ArgumentError, "expected the names of independent joints"),
-    "few": (lambda s, q, v: s.function("mass_matrix", independent=()), StateError, r"expected \d+ different .* got none"),
-    "argument": (lambda s, q, v: s.evaluate("bias_forces", q), StateError, "bias_forces: expected v as well"),
-    "masked": (lambda s, q, v: s.mass_matrix(np.ma.array(q, mask=q > q.min())), StateError, r"q: expected \d+ numbers"),
-    "beside": (lambda s, q, v: s.function("forward_dynamics", "momentum"), ArgumentError, "forward_dynamics: compiled"),
-    "of parameter": (lambda s, q, v: s.parameter_derivatives("mass"), ArgumentError, "'mass': expected 'gravity', or"),
-    "one out": (
-        lambda s, q, v: s.acceleration_derivatives(q, v, v, out=(np.zeros((s.n_v, s.n_v)),) * 3),
-        StateError,
-        "out: expected 3 arrays, one for each result, got arrays that share memory",
-    ),
-    "out": (lambda s, q, v: s.mass_matrix(q, out=np.zeros(3)), StateError, r"out: expected a writeable array of shape"),
-}
-
-
-@pytest.mark.parametrize("case", MISTAKES)
-def test_mistakes_are_named(arm, case):
-    call, kind, words = MISTAKES[case]
-    (q,), (v,) = states(arm, 1)
-    with pytest.raises(kind, match=words):
-        call(arm, q, v)
 
 
 def test_coordinates_that_determine_nothing_are_refused():

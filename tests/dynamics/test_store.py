@@ -55,6 +55,7 @@ def test_pairs_of_one_name_are_not_taken_for_each_other(first, second):
     assert np.abs(other - alone).max() > 1e-12
 
 
+@pytest.mark.slow
 def test_near_parameters_of_generalised_alpha_are_told_apart():
     near, system = (0.5, 0.5000001), _system()
     kept = [_end(system, gauss.generalised_alpha(rho), step=0.02) for rho in near]
@@ -63,6 +64,7 @@ def test_near_parameters_of_generalised_alpha_are_told_apart():
     assert np.abs(alone[0] - alone[1]).max() > 1e-13
 
 
+@pytest.mark.slow
 def test_a_method_of_ones_own_is_seen_to_change():
     """A step that closes over a number is traced anew when the number changes."""
     factor, system = [1.0], _system()

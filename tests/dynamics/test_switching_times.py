@@ -21,6 +21,7 @@ from tests.support.switching import bell, slider
 # False alarms: what is smooth throughout is not warned of, and makes the steps that it made.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [lambda t: gm.sin(3.0 * t), lambda t: gm.sin(300.0 * t) * gm.cos(t), lambda t: 1.0 + t**3])
 def test_laws_that_move_throughout_need_no_mesh(law):
     system = gauss.compile_scene(slider(law))
@@ -69,6 +70,7 @@ def grown(x, y, steps):
     return known[-1]
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(STEPS_OF_A_GRAPH, ENDS, ENDS, st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1)), min_size=1, max_size=5))
 def test_intervals_enclose(steps, first, second, shares):
@@ -96,6 +98,7 @@ def decided(t, answers):
     return total
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-2, 2), st.integers(-3, 3)), min_size=1, max_size=4), st.lists(st.floats(-3, 3), max_size=8)
@@ -109,6 +112,7 @@ def test_branches_are_the_function_that_was_traced(answers, points):
         assert found.low == found.high == pytest.approx(decided(point, answers), abs=1e-14)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.floats(0.01, 9.99), min_size=1, max_size=12, unique=True), st.booleans())
 def test_all_switching_times_are_found(places, waves):
@@ -127,6 +131,7 @@ def test_all_switching_times_are_found(places, waves):
     assert all(np.abs(expected - place).min() < close for place in found)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.floats(-5, -0.5), st.floats(0.0, 10.0))
 def test_the_mesh_shows_a_bell_wherever_it_is(exponent, place):

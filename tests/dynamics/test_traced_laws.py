@@ -15,6 +15,7 @@ def _hanging(law, n: int = 140) -> gauss.System:
     return gauss.compile_scene(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law, traced",
     [

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.train_coordinates import followers, on_trains
+from gauss.dynamics.gear_trains import followers, on_trains
 
 ROUNDOFF = 8 * np.finfo(float).eps  # residual of a coupling relative to its terms: round-off of one state, none of a sum
 STEPS, STEP = 5_000, 1e-3  # after which coordinates that are summed by themselves are some 1e-14 apart
@@ -59,6 +59,7 @@ CASES = [("wheels", method) for method in (*PROJECTED, *ADAPTIVE)]
 CASES += [(scene, method) for scene in ("wheels in reverse", "rotors") for method in ("dop853", "rk4", "verlet")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene, integrator", CASES)
 def test_trains_do_not_drift(scene, integrator):
     system, end = gauss.compile_scene(SCENES[scene]()), STEPS * STEP
@@ -67,6 +68,7 @@ def test_trains_do_not_drift(scene, integrator):
     assert residual(system, motion.q, motion.v) <= ROUNDOFF
 
 
+@pytest.mark.slow
 def test_trains_do_not_drift_in_time_stepping_and_in_batches():
     system, end = gauss.compile_scene(wheels()), STEPS * STEP
     motion = gauss.simulate(system, end, integrator="time_stepping", step=STEP)
@@ -85,6 +87,7 @@ def test_without_projection_trains_are_left_alone():
     assert ROUNDOFF < residual(system, motion.q, motion.v) < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "gauss4"])
 def test_energy_does_not_suffer(integrator):
     """Projected and left alone, the energy error is the same: that of the method, or round-off."""

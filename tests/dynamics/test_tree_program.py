@@ -12,6 +12,8 @@ from gauss.dynamics.traced_system import Program
 from gauss.dynamics.tree_program import TreeProgram
 from gauss.system import random_state
 
+pytestmark = pytest.mark.slow
+
 SAME_MOTION = 1e-9  # relative: the loops sum in different orders, which changes lengths of steps
 SAME_ENERGY = 1e-13  # relative to the magnitude of the potential energy, or the kinetic energy
 BY_PYTHON = Plan("Python loop", "tree recursion")
@@ -44,7 +46,6 @@ def system(request):
     return gauss.compile_scene(SCENES[request.param]())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_compiled_loops_of_large_trees_move_like_loops_of_python(system, method):
     compiled, stepped = (

@@ -101,6 +101,7 @@ def test_a_large_tree_takes_unit_quaternions_and_numbers_only():
             f(*given, still)
 
 
+@pytest.mark.slow
 def test_laws_of_a_large_tree_are_called_as_they_are_now():
     strength = [1.0]
     scene = _large()

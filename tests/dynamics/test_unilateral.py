@@ -47,6 +47,7 @@ def test_machine_code_presses_as_the_quadratic_programme_does(name):
     assert len(opened) > 1
 
 
+@pytest.mark.slow
 def test_a_law_that_is_called_acts_beside_closed_gaps():
     scene, calls = gauss.load("box_on_plane_4"), []
     scene.loads.clear()
@@ -61,6 +62,7 @@ def test_a_law_that_is_called_acts_beside_closed_gaps():
     assert calls
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("push", "stays"), [(0.0, 4), (100.0, 0)])
 @pytest.mark.parametrize("operations", [0, None])
 def test_what_stays_closed_is_known_at_once_or_once_it_was_asked_often(push, stays, operations, monkeypatch):
@@ -78,6 +80,7 @@ def test_what_stays_closed_is_known_at_once_or_once_it_was_asked_often(push, sta
     assert len(staying(state, gaps)) == stays
 
 
+@pytest.mark.slow
 def test_gaps_do_not_keep_forward_dynamics_from_being_compiled():
     system = gauss.compile_scene(gauss.load("box_on_plane_4"))
     state, load = system.initial_state(), np.array([3.0, 0, 50.0, 0, 0, 0])

@@ -105,6 +105,7 @@ class Library:
         return tuple(results.values())
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 @pytest.mark.parametrize("name", SCENES)
 def test_code_of_c_is_the_functions_of_a_state(name, tmp_path):
@@ -134,6 +135,7 @@ def test_angles_of_any_size(tmp_path):
         close((found,), (system.gravity_forces(np.array([angle])),))
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", SCENES)
 def test_functions_of_casadi_and_their_derivatives(name):
@@ -189,6 +191,7 @@ def test_functions_of_jax_and_their_derivatives(name):
         close(backward(*given.values()), [one.sum(axis=0) for one in theirs])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum", "double_pendulum", "cart_pole", "four_bar"])
 def test_formulas_have_the_values_of_the_functions(name):
     sympy = pytest.importorskip("sympy")
@@ -206,6 +209,7 @@ def test_formulas_have_the_values_of_the_functions(name):
         close([plain(*np.concatenate(vectors))], [wanted])
 
 
+@pytest.mark.slow
 def test_whole_numbers_are_shown_as_such():
     sympy = pytest.importorskip("sympy")
     (result,) = export.to_sympy(gauss.load("four_bar"), "mass_matrix").results.values()

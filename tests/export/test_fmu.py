@@ -203,6 +203,7 @@ def test_what_no_unit_can_hold_is_named(make, named, tmp_path):
         export.save_as(gauss.load("pendulum"), "fmu", tmp_path, ["mass_matrix"])
 
 
+@pytest.mark.slow
 def test_files_of_units_have_the_parameters_that_are_asked(tmp_path):
     (path,) = export.save_as(gauss.load("pendulum"), "fmu", tmp_path, parameters=["rod.mass"])
     with zipfile.ZipFile(path) as unit:
@@ -211,6 +212,7 @@ def test_files_of_units_have_the_parameters_that_are_asked(tmp_path):
         export.save_as(gauss.load("pendulum"), "c", tmp_path, parameters=["rod.mass"])
 
 
+@pytest.mark.slow
 def test_the_command_writes_tunable_parameters(tmp_path):
     given = ["export", "pendulum", "--to", "fmu", "--parameter", "rod.mass", "--output", str(tmp_path)]
     assert call(*given).exit_code == 0

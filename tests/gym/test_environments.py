@@ -15,12 +15,14 @@ ROUNDING = 1e-10  # SIMD code and scalar code over a few actions
 TASKS = [gym.cart_pole_swing_up, gym.acrobot, gym.four_bar_press]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("make", TASKS)
 def test_environments_pass_the_checker(make):
     check_env(gym.MechanismEnv(make()), skip_render_check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", TASKS)
 def test_motions_of_a_vector_environment_are_those_of_single_ones(make):
     many, one = gym.MechanismVectorEnv(make(), 5), gym.MechanismEnv(make())
@@ -61,6 +63,7 @@ def test_a_failed_motion_terminates_with_its_reason():
     assert terminated and "shorten the step" in info["failure"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", [[np.nan], [np.inf], [1.0, 2.0], 1.0, []])
 def test_wrong_actions_are_errors_and_change_nothing(action):
     environment = gym.MechanismEnv(gym.cart_pole_swing_up())

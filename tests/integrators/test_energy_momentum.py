@@ -48,6 +48,7 @@ def _turning() -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 def test_momentum_of_a_cyclic_coordinate_is_conserved():
     system = gauss.compile_scene(_turning())
     mechanics = MomentumForm(Program(system, Laws(system)))

@@ -158,6 +158,7 @@ def test_energy_of_symplectic_methods_is_bounded(integrator, largest, scene):
     assert abs(trend) <= 0.2 * np.abs(off).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene, h, largest",
     [(lambda: gauss.load("double_pendulum"), 5e-4, 5e-14), (mechanisms.four_bar, 5e-4, 3e-13)],
@@ -171,6 +172,7 @@ def test_energy_of_gauss6_walks_at_random(scene, h, largest):
     assert np.ptp((energy.kinetic + energy.potential) / energy.scale) <= largest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", MECHANICAL)
 def test_mechanical_methods_say_what_they_need(integrator):
     with pytest.raises(SimulationError, match="'knife edge|binds velocities"):
@@ -181,6 +183,7 @@ def test_mechanical_methods_say_what_they_need(integrator):
         gauss.simulate(scene, 0.1, integrator=integrator, step=0.01)
 
 
+@pytest.mark.slow
 def test_a_step_that_cannot_be_solved_says_so():
     with pytest.raises(SimulationError, match="shorten the step"):
         gauss.simulate(mechanisms.four_bar(), 10.0, integrator="gauss4", step=0.5)
@@ -197,6 +200,7 @@ def test_maps_of_the_chart_are_inverse():
         assert np.abs(again - omega).max() <= 1e-12
 
 
+@pytest.mark.slow
 def test_stiff_scenes_cost_radau_no_small_steps():
     """A joint spring of 1e6 N m/rad with a damper: explicit steps are as short as its decay, implicit ones as the motion."""
     scene = mechanisms.rods(2)
@@ -231,6 +235,7 @@ def test_newton_in_machine_code_is_that_of_numbers(start):
     assert solved(np.array(start), np.array([60.0]))[1][0] > 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.8, 1.0])
 def test_generalised_alpha_damps_high_frequencies_as_asked(rho):
     """A spring whose period is a thousandth of the step loses the share 1 − ρ∞ of its amplitude in a step, on average."""

@@ -45,6 +45,7 @@ def test_error_follows_the_tolerance(name):
     assert (_errors(closed_forms.SCENES[name](), settings) <= FOLLOWS * tolerances).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [np.pi / 2, 1e-9, 3.0])
 def test_missing_terms_make_no_step_too_long(start):
     """Of a pendulum let go from the horizontal, the series has every fourth term."""
@@ -53,6 +54,7 @@ def test_missing_terms_make_no_step_too_long(start):
     assert (_errors(closed_forms.pendulum(start), settings) <= FOLLOWS * np.maximum(tolerances, 1e-15)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("power", [3, 7, 11])
 def test_a_series_may_begin_with_nothing_but_its_first_term(power):
     """A mass on a spring of force −xⁿ starts in the middle: its series has every (n + 1)th term."""
@@ -73,6 +75,7 @@ def test_a_series_may_begin_with_nothing_but_its_first_term(power):
         assert np.abs(energy - 0.5).max() <= FOLLOWS * tolerance
 
 
+@pytest.mark.slow
 def test_finer_tolerances_take_higher_orders_and_few_more_steps():
     system, steps, orders = gauss.compile_scene(mechanisms.rods(2)), [], []
     for tolerance in (1e-3, 1e-6, 1e-8):
@@ -138,6 +141,7 @@ def _hidden():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "build, options, words",
     [

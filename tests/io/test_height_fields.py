@@ -10,7 +10,7 @@ from gauss.errors import FileError
 from gauss.rotations import from_quaternion
 from gauss.scene import HeightField
 from gauss.scene.contact_patch import SolidPose
-from gauss.scene.solid_pairs import solid_pair
+from gauss.scene.patch_distances import solid_pair
 
 FLOAT32 = 1e-7  # [m] MuJoCo keeps heights in single precision
 DISTANCES = 1e-9  # [m] of the same surface; MuJoCo's tolerance of nearest points is 1e-6, which balls do not need

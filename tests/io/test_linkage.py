@@ -26,6 +26,7 @@ def test_the_command_says_what_a_linkage_is_and_does():
         assert words in result.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", linkages())
 def test_every_shipped_linkage_is_reported(name):
     result = call("linkage", name, "--steps", 24)
@@ -134,6 +135,7 @@ def test_formats_that_are_none(tmp_path, monkeypatch):
     assert isinstance(result.exception, FileError) and "written as .npz or .csv" in str(result.exception)
 
 
+@pytest.mark.slow
 def test_speeds_and_steps():
     """Inertia forces grow with the square of the speed."""
     outputs = (call("linkage", "slider_crank", "--speed", speed, "--steps", 36).output for speed in (1.0, 100.0))

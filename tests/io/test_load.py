@@ -26,6 +26,7 @@ def test_scenes_survive_a_file_unchanged(name, tmp_path):
     assert gauss.load(gauss.save(scene, tmp_path / "scene.toml")) == scene
 
 
+@pytest.mark.slow
 @given(mass=POSITIVE, moment=POSITIVE, point=st.tuples(FINITE, FINITE, FINITE), stiffness=POSITIVE, text=st.text(min_size=1))
 def test_numbers_and_names_survive_to_the_last_bit(mass, moment, point, stiffness, text, tmp_path_factory):
     name = text if text.strip() else "x"
@@ -129,6 +130,7 @@ def test_mistakes_in_files_are_named_with_the_file(mistake, tmp_path):
     assert "scene.toml" in str(caught.value)
 
 
+@pytest.mark.slow
 @given(text=st.text())
 def test_any_text_is_a_scene_or_a_clear_error(text, tmp_path_factory):
     path = tmp_path_factory.mktemp("any") / "scene.toml"
@@ -176,6 +178,7 @@ def test_motions_are_readable_without_gauss(tmp_path):
     assert np.array_equal(archive["positions"][:, 1], trajectory.body("rod2").position)
 
 
+@pytest.mark.slow
 def test_every_name_of_the_package_exists():
     assert all(hasattr(gauss, name) for name in gauss.__all__)
     assert sorted(gauss.__all__) == gauss.__all__
@@ -189,6 +192,7 @@ def test_names_that_no_file_can_hold_are_refused(name):
         scene.frame(name, "rod")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".csv", ".json", ".nc"])
 def test_columns_that_no_file_can_hold_are_refused(tmp_path, ending):
     with pytest.raises(FileError, match="no file can hold"):

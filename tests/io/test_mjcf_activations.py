@@ -40,6 +40,7 @@ ACTIVE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", ACTIVE)
 def test_forces_of_activations_are_those_of_mujoco(tmp_path, name):
@@ -47,6 +48,7 @@ def test_forces_of_activations_are_those_of_mujoco(tmp_path, name):
     assert deviation(path, quietly(path)) < SAME
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", [name for name in ACTIVE if "without" not in name])
 @pytest.mark.parametrize("control", [0.0, 0.6, -0.7])
@@ -73,6 +75,7 @@ def test_machine_code_of_activations_is_kept_by_their_content(tmp_path, name):
     assert one is not None and one == other
 
 
+@pytest.mark.slow
 def test_an_activation_stays_in_its_range(tmp_path):
     path = written(
         tmp_path, *acting('<general name="m" joint="h" dyntype="integrator" actlimited="true" actrange="-1 0.5"/>')
@@ -96,6 +99,7 @@ def test_a_key_frame_starts_activations(tmp_path):
     assert system.initial_state().v[system.joint("m activation").v] == 0.7
 
 
+@pytest.mark.slow
 def test_friction_of_a_sum_acts_along_it(tmp_path):
     """Sliding, it is the constant force of its limit against the rate of the sum."""
     slides = '<body><joint name="{0}" type="slide" axis="{1}"/><geom size="0.1" mass="2"/></body>'

@@ -103,7 +103,6 @@ def test_actuators_of_any_number_of_controls_are_refused_by_name(tmp_path, name)
 
 LEFT = {  # actuators, the rest of the file, its head, what is named
     "key frames": ("", '<keyframe><key name="home" qpos="1 1"/><key name="start"/><key/></keyframe>', "", "home, key 2"),
-    "sensors": ("", '<sensor><jointpos name="angle" joint="h"/></sensor>', "", "measure.*: angle"),
     "equalities": ("", '<equality><joint name="e" joint1="h" joint2="k" active="false"/></equality>', "", "not active: e"),
     "actuators": ('<motor name="m" joint="h" group="3"/>', "", '<option actuatorgroupdisable="3"/>', "switched off: m"),
 }

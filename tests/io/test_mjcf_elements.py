@@ -14,7 +14,6 @@ from tests.support.files import quietly
 
 SAME = 1e-11  # relative: two exact engines, but for rounding
 WITHIN = 1e-7  # relative: MuJoCo ends the search of a path through a geom at an angle of 1e-6
-CLOSED = 1e-6  # relative, where the reference of closed loops is found by differences
 
 ARM = """<site name="hook" pos="0.2 0.1 1.5"/><body name="a" pos="0 0 1"{a}><joint name="h" axis="0 1 0"{h}/>
 <geom size="0.1" pos="0.4 0 0.1"{g}/><site name="p" pos="0.3 0 0.1"/><site name="q" pos="0.1 0 0.3"/>
@@ -154,6 +153,7 @@ def _file(folder, bodies, rest="", head=""):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", ELEMENTS)
 def test_elements_accelerate_as_in_mujoco(tmp_path, name):
@@ -168,11 +168,12 @@ def test_paths_through_geoms_accelerate_as_in_mujoco(tmp_path, name):
     assert deviation(path, quietly(path)) < WITHIN
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", HELD)
 def test_held_tendons_accelerate_as_in_mujoco(tmp_path, name):
     path = _file(tmp_path, *HELD[name])
-    assert deviation(path, quietly(path)) < CLOSED
+    assert deviation(path, quietly(path)) < SAME
 
 
 @pytest.mark.parametrize("name", ELEMENTS | THROUGH | HELD)

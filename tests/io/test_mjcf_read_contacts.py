@@ -80,6 +80,7 @@ def test_gaps_are_the_distances_of_mujoco(path):
     assert looked > 100
 
 
+@pytest.mark.slow
 def test_a_box_dropped_from_a_file_comes_to_rest_on_its_face(tmp_path):
     file = tmp_path / "box.xml"
     file.write_text("""<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1"/>

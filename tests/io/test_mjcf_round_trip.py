@@ -29,6 +29,7 @@ def _again(folder, scene, **options) -> gauss.Scene:
     return quietly(path, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(shipped().keys() - WITHOUT))
 def test_shipped_models_are_read_as_they_were_written(tmp_path, name):
     scene = gauss.load(name)
@@ -103,7 +104,7 @@ def test_outputs_are_sensors(tmp_path):
     joint, body = next(iter(scene.joints)), list(scene.bodies)[-1]
     for kind in ("coordinate", "rate"):
         scene.output(kind, kind, joint)
-    for kind in ("position", "velocity", "angular_velocity", "gyroscope", "accelerometer", "rotation"):
+    for kind in ("position", "velocity", "angular_velocity", "gyroscope", "accelerometer", "acceleration"):
         scene.output(kind, kind, body, at=(0.1, 0.2, 0.3))
     path = tmp_path / "sensors.xml"
     path.write_text(to_mjcf(scene))
@@ -112,7 +113,7 @@ def test_outputs_are_sensors(tmp_path):
     data.qvel[:] = 1.0
     mujoco.mj_forward(model, data)
     assert [model.sensor(k).name for k in range(model.nsensor)] == list(scene.outputs)[:-1]
-    assert "output 'rotation'" in path.read_text()
+    assert "output 'acceleration'" in path.read_text()
     system = gauss.compile_scene(scene)
     motion = gauss.dynamics.kinematics.kinematics(system, system.state(v=np.ones(system.n_v)))
     at = (0.1, 0.2, 0.3)

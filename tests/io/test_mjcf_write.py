@@ -56,6 +56,7 @@ def test_robots(name):
     assert accelerations < SAME
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("order", ["ABCD", "BCDA"])
 def test_loops_of_hinges(order):
@@ -75,6 +76,7 @@ def loaded(kind: str):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("kind", KINDS)
 def test_drives(kind):
@@ -102,6 +104,7 @@ LOADS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", LOADS)
 def test_loads(name):
@@ -239,3 +242,16 @@ def test_limits_that_mujoco_would_enforce_are_named_in_the_file():
     scene.revolute("A--", "ground", "a", axis=(1, 0, 0), limits=(-1.0, 1.0))
     text = to_mjcf(scene)
     assert "limits of joint 'A- -'" in text and mujoco.MjModel.from_xml_string(text).jnt_limited[0] == 0
+
+
+@pytest.mark.parametrize("bodies, fits", [(496, True), (497, False)])
+def test_chains_that_mujoco_would_not_open_are_refused_by_name(tmp_path, bodies, fits):
+    scene = gauss.Scene("chain")
+    for k in range(bodies):
+        scene.body(f"link {k}", 1.0, (0.1, 0.1, 0.1), position=(0.2 * k, 0.0, 0.0))
+        scene.revolute(f"hinge {k}", f"link {k - 1}" if k else "ground", f"link {k}", frame=f"link {k}")
+    if fits:
+        assert mujoco.MjModel.from_xml_string(to_mjcf(scene)).nv == bodies
+    else:
+        with pytest.raises(FileError, match="body 'link 496'"):
+            to_mjcf(scene)

@@ -11,6 +11,7 @@ from gauss.io.mjcf.write import to_mjcf
 from tests.support.in_mujoco import GIVES_WAY, mujoco_run
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_a_ball_slides_and_begins_to_turn(friction):

@@ -58,6 +58,7 @@ def test_a_dataset_holds_the_motion_under_names(motion):
     assert (units["reaction_force"], units["reaction_moment"]) == ("N", "N m")
 
 
+@pytest.mark.slow
 def test_orientations_are_the_rotations_of_the_bodies(motion):
     orientation = gauss.to_dataset(motion).orientation.sel(body="coupler").values
     turned = np.array([rotations.from_quaternion(row) for row in orientation])
@@ -74,6 +75,7 @@ def test_poses_are_those_of_the_bodies(count):
         assert turned[:, i] == pytest.approx(motion.body(name).rotation, abs=ROUNDING)
 
 
+@pytest.mark.slow
 def test_every_coordinate_and_rate_has_its_unit():
     found = gauss.to_dataset(gauss.simulate(_all_pairs(), 1e-3, times=[0.0]))
     units = dict(zip(found.coordinate.values.tolist(), found.coordinate_unit.values.tolist(), strict=True))
@@ -83,6 +85,7 @@ def test_every_coordinate_and_rate_has_its_unit():
     assert [rates[name] for name in ("B.wx", "F.z", "F.wz", "C.slide")] == ["rad/s", "m/s", "rad/s", "m/s"]
 
 
+@pytest.mark.slow
 def test_netcdf_is_read_without_gauss(motion, tmp_path):
     path = gauss.save(motion, tmp_path / "motion.nc")
     ran = subprocess.run([sys.executable, "-c", READER, str(path)], capture_output=True, text=True, cwd=tmp_path)
@@ -116,6 +119,7 @@ def test_a_scene_that_no_file_can_hold_says_so():
     assert about["scene_toml"] == about["scene_sha256"] == ""
 
 
+@pytest.mark.slow
 def test_a_changed_scene_has_another_hash(motion):
     hashes = {gauss.to_dataset(motion).attrs["scene_sha256"]}
     scene = gauss.load("four_bar")
@@ -154,6 +158,7 @@ def test_a_missing_library_is_named(motion, monkeypatch):
         gauss.to_dataset(motion)
 
 
+@pytest.mark.slow
 def test_a_motion_comes_back_from_zarr(motion, tmp_path):
     path = gauss.save(motion, tmp_path / "motion.zarr")
     again = gauss.load_motion(path)
@@ -163,6 +168,7 @@ def test_a_motion_comes_back_from_zarr(motion, tmp_path):
     assert np.array_equal(folder["position"][:], gauss.to_dataset(motion).position.values)
 
 
+@pytest.mark.slow
 def test_a_motion_under_servos_is_labelled():
     tracking = servo.simulate(gauss.load("servo/crane"), 0.05, times=[0.0, 0.025, 0.05])
     found = gauss.to_dataset(tracking)
@@ -172,6 +178,7 @@ def test_a_motion_under_servos_is_labelled():
     assert found.q.values == pytest.approx(tracking.motion.q, abs=0)
 
 
+@pytest.mark.slow
 def test_a_motion_of_rotors_is_labelled(tmp_path):
     network = gauss.load_rotors("gear_runup")
     run = rotors.simulate(network, 0.2)

@@ -79,6 +79,7 @@ def test_meshes_that_are_lost_are_named(robot, loss):
         assert visuals_of(scene) == []
 
 
+@pytest.mark.slow
 def test_the_command_line_shows_the_meshes_of_saved_motions(robot, monkeypatch):
     viewer = pytest.importorskip("gauss.view.viewer", exc_type=ImportError)
     from typer.testing import CliRunner
@@ -94,6 +95,7 @@ def test_the_command_line_shows_the_meshes_of_saved_motions(robot, monkeypatch):
         assert [visual.body for visual in given[meshes]] == ["base", "arm"]
 
 
+@pytest.mark.slow
 def test_a_scene_that_no_robot_gave_has_no_meshes_to_lose(tmp_path):
     from gauss.io.visuals import visuals_of
 
@@ -123,6 +125,7 @@ NONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", NONE)
 def test_what_is_no_motion_is_told_in_one_line(tmp_path, what):
     make, words = NONE[what]
@@ -133,6 +136,7 @@ def test_what_is_no_motion_is_told_in_one_line(tmp_path, what):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".csv", ".json", ".npz"])
 def test_numbers_without_their_scene_are_refused_with_what_is_read(tmp_path, ending):
     path = gauss.save(gauss.simulate(gauss.load("pendulum"), 0.01), tmp_path / f"motion{ending}")
@@ -164,6 +168,7 @@ def test_names_of_gaps_are_taken_apart_as_they_were(names):
     assert separated(joined(names)) == names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".nc", ".zarr"])
 def test_events_name_their_gaps_again(tmp_path, ending):
     scene = gauss.load("pendulum")

@@ -85,6 +85,7 @@ def test_trees_accelerate_as_the_scene_that_was_written(tmp_path, seed):
     assert found == pytest.approx(expected, rel=SAME, abs=SAME * abs(expected).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["ABCD", "BCDA"])
 def test_loops_are_closed(tmp_path, order):
     scene = four_bar(order)
@@ -126,6 +127,7 @@ SAID = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAID)
 def test_however_poses_are_said(tmp_path, name):
     given = {"a": "<pose>0.5 0 0 0 0 0.2</pose>", "child": "b", "axis": "<xyz>1 0 0</xyz>", "joint": "", "frame": ""}

@@ -53,6 +53,7 @@ def _arm(**parts) -> str:
     return ARM.format(**PLAIN | parts).replace('<joint name="A"', WHOLE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_the_frame_of_the_model_is_carried_by_its_canonical_link(tmp_path, way):
     one, other = (_load(tmp_path, _arm(**parts)) for parts in WAYS[way])

@@ -65,6 +65,7 @@ def test_rod_on_a_support_by_its_closed_form():
     assert run.motion.coordinate("track")[-1] == pytest.approx(9.81 * np.tan(0.15) / 2, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_table_is_a_contact_or_a_servo(tmp_path):
     """[[prescribed]] is kept by whatever force that takes; [[servo.prescribed]] by the actuators alone."""
     text = servo_files()["servo/inverted_pendulum"].read_text()
@@ -173,6 +174,7 @@ def test_command_line_draws_what_was_reached_before_the_hold_was_lost(tmp_path):
     assert figure.exists() and "hold" in result.output
 
 
+@pytest.mark.slow
 def test_command_line_explains_and_lists_servos():
     assert "index reduction" in call("explain", "servo/crane").output
     listed = call("models").output

@@ -47,6 +47,7 @@ def test_what_moves_the_robot_and_is_left_out_is_named(arm):
     assert scene.joints["shoulder"].limits is None
 
 
+@pytest.mark.slow
 def test_limits_hold_the_start_and_become_stops(arm):
     with pytest.warns(NotImportedWarning, match="limits that leave no motion, of wrist"):
         scene = gauss.load(arm, limits="start")
@@ -128,6 +129,7 @@ def _motor(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("reduction", "n"), [("", 1.0), ("<mechanicalReduction> -50 </mechanicalReduction>", -50.0)])
 def test_a_motor_acts_on_its_joint_times_the_reduction(tmp_path, reduction, n):
     """τ = n u, within the effort of 10 N m of the joint."""

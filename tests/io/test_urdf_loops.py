@@ -75,6 +75,7 @@ def accelerations(scene: gauss.Scene, start: dict) -> dict[str, float]:
     return {name: found[system.column(name)] for name in start}
 
 
+@pytest.mark.slow
 def test_a_loop_closes_frames_that_do_not_meet_in_the_file(tmp_path):
     scene = loaded(tmp_path, robot(LOOP.format(kind="revolute", one="rod_link", other="rocker_link", x=1)))
     start = {"crank": 0.3, "rod": 0.5, "rocker": 0.2}
@@ -84,6 +85,7 @@ def test_a_loop_closes_frames_that_do_not_meet_in_the_file(tmp_path):
     assert sum(one.n_loop_constraints for one in system.subsystems) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, at", [("revolute", FAR), ("spherical", FAR), ("fixed", NEAR), ("prismatic", FAR)])
 def test_freedoms_of_loops(tmp_path, kind, at):
     loop = LOOP.format(kind=kind, one="rod_link", other="rocker_link", x=1)
@@ -91,6 +93,7 @@ def test_freedoms_of_loops(tmp_path, kind, at):
     assert gauss.mobility(gauss.compile_scene(scene)).freedoms == 1
 
 
+@pytest.mark.slow
 def test_a_weld_that_the_lengths_do_not_allow_is_refused_with_its_residual(tmp_path):
     scene = loaded(tmp_path, robot(LOOP.format(kind="fixed", one="rod_link", other="rocker_link", x=1)))
     with pytest.raises(AssemblyError) as refused:
@@ -248,6 +251,7 @@ def test_files_of_other_tools_are_left_alone(tmp_path, text):
     assert len(loaded(tmp_path, robot(TIPS), text).joints) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "wrong",
     [INERTIAL.format(x=0).replace('iyy="0.1"', 'iyy="1"'), INERTIAL.format(x=0).replace('mass value="1"', 'mass value="0"')],
@@ -278,6 +282,7 @@ WRITTEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", WRITTEN)
 def test_loops_are_written_as_they_are_read(tmp_path, case):
     more, beside = WRITTEN[case]

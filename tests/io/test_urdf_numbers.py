@@ -91,6 +91,7 @@ def test_what_is_no_number_is_refused_with_its_place(tmp_path, text):
             _load(tmp_path, _with(place, lambda old: text))
 
 
+@pytest.mark.slow
 @QUICK
 @given(data=st.data())
 def test_any_text_is_the_number_that_it_says_or_refused_with_its_place(tmp_path, data):

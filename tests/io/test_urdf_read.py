@@ -109,7 +109,7 @@ BAD = {
     "not xml": ("nonsense", "not XML"),
     "no robot": ('<robot name="r"/>', "no <link>.*xacro"),
     "no name": ('<robot><link name="base"/></robot>', "without a name"),
-    "no root": ('<robot name="r"><link name="base"/><link name="arm"/></robot>', "parser refuses"),
+    "two roots": ('<robot name="r"><link name="base"/><link name="arm"/></robot>', "'base', 'arm' are children of no joint"),
     "no joint": ('<robot name="r"><link name="base"/></robot>', "no link moves"),
     "bad inertia": (
         '<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/><inertia ixx="1" iyy="0.1" '
@@ -145,10 +145,25 @@ ARM = """<robot name="r">
 {more}
 </robot>"""
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="{}" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+JOINT = '<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/></joint>'
+CIRCLE = {"one": ("one", "other"), "other": ("other", "one")}  # names of joints and of the links at their ends
 LINES = {
     "inertia": ({"inertial": INERTIAL.format(5)}, r"robot.urdf:3: body 'arm'.*triangle"),
     "moment": ({"inertial": INERTIAL.format(-1e-4)}, r"robot.urdf:3: body 'arm'.*negative principal moment"),
     "mimic": ({"inside": '<mimic joint="k"/>'}, r"robot.urdf:4: joint 'j' mimics 'k'"),
+    "a name twice": ({"more": '<link name="arm"/>'}, r"robot.urdf:7: link 'arm' stands in .*robot.urdf:3 already"),
+    "a joint twice": (
+        {"more": JOINT.format("j", "fixed", "arm", "hand")},
+        r":7: joint 'j' stands in .*:4 already",
+    ),
+    "no name": ({"more": "<link/>"}, r"robot.urdf:7: <link> has no name"),
+    "a type": ({"more": JOINT.format("k", "hinge", "arm", "hand")}, r"robot.urdf:7: joint 'k': .*'hinge'"),
+    "no parent": ({"more": JOINT.format("k", "fixed", "arn", "hand")}, r"robot.urdf:7: joint 'k': .*<parent>.*'arn'.*'arm'"),
+    "a tree": ({"more": JOINT.format("k", "fixed", "base", "arm")}, r"robot.urdf:7: joint 'k': link 'arm' is .* joint 'j'"),
+    "a circle, which the parser drops": (
+        {"more": "".join(f'<link name="{name}"/>{JOINT.format(name, "fixed", *ends)}' for name, ends in CIRCLE.items())},
+        r"robot.urdf:7: links 'one', 'other' hang on one another",
+    ),
 }
 
 
@@ -161,6 +176,7 @@ def test_what_is_refused_is_told_with_its_line(case, tmp_path):
         gauss.load(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rest", [-(2.0**-64), 2.0**-64, 0.0, -1e-17])
 def test_what_rounding_leaves_of_a_point_mass_is_no_inertia(rest, tmp_path):
     path = tmp_path / "robot.urdf"

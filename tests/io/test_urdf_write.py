@@ -94,6 +94,7 @@ def _end(scene, body, settings):
     return gauss.simulate(scene, 0.01, **settings).body(body).com[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("seed", range(3))
 def test_trees_in_pinocchio_and_mujoco(tmp_path, seed):
@@ -148,6 +149,7 @@ def test_couplings_are_mimic_joints(tmp_path):
     assert_alike(scene, again(scene, tmp_path))
 
 
+@pytest.mark.slow
 def test_loads_and_contacts_go_beside(tmp_path):
     scene = two_bodies("universal")
     scene.frame("tip", "b", (0.1, 0.2, 0.3), (0.3, 0.2, 0.1))
@@ -245,6 +247,7 @@ def controlled():
     return scene
 
 
+@pytest.mark.slow
 def test_inputs_act_and_outputs_measure_the_same(tmp_path):
     scene = controlled()
     read = again(scene, tmp_path)
@@ -293,6 +296,7 @@ PARTLY = {  # joints that become loops in the file, and a start of them alone
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
 @pytest.mark.parametrize("kind", PARTLY)
 def test_starts_of_some_joints_leave_the_others_where_they_were(tmp_path, kind, turned):

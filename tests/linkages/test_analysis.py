@@ -141,6 +141,7 @@ def test_flywheel():
     assert found.inertia == pytest.approx(data["flywheel_inertia"], rel=TABLE)
 
 
+@pytest.mark.slow
 def test_flywheel_keeps_the_speed_within_its_fluctuation():
     """Run with the flywheel and the constant mean torque: the speed fluctuates by δ, to first order in δ."""
     delta = 0.02

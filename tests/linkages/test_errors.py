@@ -87,6 +87,7 @@ def test_near_singular_positions_are_flagged_and_singular_ones_refused():
         linkage.cycle([1.0])
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.NearSingularWarning")
 def test_a_class_three_group_that_is_torn():
     linkage = gauss.load_linkage("class_three")

@@ -207,6 +207,7 @@ def test_work_runs_backwards_as_well():
     assert linkages.apart(back[-1], -there[-1]) <= TABLE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 def test_machine_code_and_numpy_are_one(name):
     """The same source as SIMD code: torque and all reactions; resisting and viscous loads with it."""

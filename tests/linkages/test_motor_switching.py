@@ -38,6 +38,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("samples", [np.array([END]), np.linspace(0.0, END, 101)])
 def test_no_torque_is_stepped_over(name, samples):
@@ -49,6 +50,7 @@ def test_no_torque_is_stepped_over(name, samples):
     assert abs(found.speed[-1] - expected) <= RELATIVE * expected
 
 
+@pytest.mark.slow
 def test_a_motor_that_is_called_seldom_is_warned_of_on_every_call():
     for _ in range(2):
         with pytest.warns(SwitchingWarning, match="the law of the motor .* few points"):

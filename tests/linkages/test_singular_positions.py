@@ -57,6 +57,7 @@ def _torque(lengths, angle, read):
         return inertial * SPEED**2 + GRAVITY * mpmath.im(slope(middle)) - MOMENT * slope(turns[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lengths", CHANGE_POINTS)
 def test_change_points_are_right_or_refused(lengths):
     """Whichever way the lengths are read, as doubles or as their decimals, the error is not ten times what is claimed."""
@@ -106,6 +107,7 @@ def test_numbers_that_were_computed_are_taken_as_rounded():
         bar.cycle([1e-5])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", linkages.KINDS)
 def test_twice_the_precision_is_the_same_mechanics(kind):
     """Groups of every kind with loads of every kind, at regular poses: both arithmetics agree to the digits of doubles."""

@@ -88,6 +88,7 @@ def test_a_function_is_found_again(count):
     assert design.errors.max() <= 1e-6
 
 
+@pytest.mark.slow
 def test_more_pairs_have_less_error_than_three_precise_ones():
     """y = x² on [1, 2], over 60° of both links, with three precise pairs at Chebyshev's points."""
     inputs_of, outputs_of = (lambda x: np.radians(40 + 60 * (x - 1.0))), (lambda x: np.radians(90 + 20 * (x**2 - 1.0)))

@@ -77,6 +77,7 @@ def test_motion_ends_in_the_stable_point(name):
         assert (p.slip_loss >= 0).all() and (p.mesh_loss >= 0).all() and 0 < p.efficiency < 1
 
 
+@pytest.mark.slow
 def test_periodic_torques_count_with_their_mean():
     network = _hoist(40.0)
     network.torque("motor", Periodic((-10.0, -20.0, -30.0)))
@@ -141,6 +142,7 @@ def test_chain_of_equal_discs(n):
     assert eigenmodes(network).frequencies == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_free_vibration_has_the_eigenfrequency():
     network = _elastic()
     f = eigenmodes(network).frequencies[1]

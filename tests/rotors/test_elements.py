@@ -54,6 +54,7 @@ def test_laws_by_hand(case):
     assert float(law(0.0, 0.0, speed)) == pytest.approx(torque, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", VALUES)
 def test_laws_are_the_same_when_compiled(case):
     law, speed, _ = VALUES[case]
@@ -83,6 +84,7 @@ CURVES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CURVES)
 @given(x=st.floats(-2.0, 2.0))
 def test_curves_are_odd_and_of_the_sign_of_the_slip(name, x):
@@ -237,6 +239,7 @@ def test_wrong_questions_are_refused():
         motion.speed("moter")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", [float, lambda t: t], ids=["opaque", "traced"])
 def test_a_law_that_breaks_is_reported(when):
     network = _speeds(10.0, 5.0)

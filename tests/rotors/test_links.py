@@ -91,6 +91,7 @@ def test_freewheel_pushes_and_is_overrun():
     assert np.abs(energy.balance).max() <= BALANCE * energy.input[-1]
 
 
+@pytest.mark.slow
 def test_backlash_is_crossed_freely_and_its_sides_never_pull():
     network = Network("backlash")
     network.shaft("out", 0.5)
@@ -111,6 +112,7 @@ def test_backlash_is_crossed_freely_and_its_sides_never_pull():
     assert np.abs(energy.balance).max() <= BALANCE * energy.input[-1]
 
 
+@pytest.mark.slow
 def test_thin_curve_tends_to_the_gear():
     """C → 0 at the same limit: the friction drive becomes rigid, first order in C."""
     speeds = []

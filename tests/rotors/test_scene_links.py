@@ -177,6 +177,7 @@ def test_every_link_drives_a_four_bar(name):
         assert energies.dissipated[-1] > 1e-4 * energies.scale
 
 
+@pytest.mark.slow
 def test_a_freewheel_that_is_overtaken_engages_by_an_impact():
     scene = gauss.Scene("wheels", gravity=(0, 0, 0))
     for name, inertia, rate in (("driver", 2.0, 10.0), ("driven", 3.0, 1.0)):

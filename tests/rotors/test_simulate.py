@@ -82,6 +82,7 @@ def test_reduced_inertia_and_torque_of_the_reference():
         assert J * found.accelerations[2] == pytest.approx(table["Q_pr"][k], rel=1e-11)
 
 
+@pytest.mark.slow
 def test_events_of_the_reference(motions):
     """Reversals of slip, stall and restart at the stated times, and the power turns in both gears at once."""
     chain, data = motions["friction-chain"]
@@ -96,6 +97,7 @@ def test_events_of_the_reference(motions):
     assert not [e for e in motions["parallel"][0].events if e.kind != "switch"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_energy_is_balanced_and_heat_never_falls(motions, name):
     energy = motions[name][0].energy()
@@ -188,6 +190,7 @@ def test_stopped_driver_is_turned_and_brakes_the_output():
     assert found.accelerations == pytest.approx([-full_slip / 0.8, full_slip * (2.0 - 1.0 / 0.98) / 1.5 / 0.4])
 
 
+@pytest.mark.slow
 def test_both_shafts_come_to_rest_under_dry_loads():
     network = two_shafts(curve=CURVE, efficiency=0.98, speeds=(50.0, 80.0))
     network.torque("out", Dry(6.0))
@@ -258,6 +261,7 @@ def test_slip_beyond_the_peak_runs_away(slip, caught):
         assert motion.stuck[-1, 0] and motion.slip("link")[-1] == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_passing_the_peak_is_reported():
     network = two_shafts(1.0, curve=FALLING, speeds=(97.0, 100.0))
     network.torque("out", Dry(50.0))

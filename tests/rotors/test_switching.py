@@ -178,6 +178,7 @@ def test_breaks_tell_of_a_law_that_cannot_be_traced():
         assert motion.speed("a")[-1] == pytest.approx(10.0 / INERTIA, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_a_law_that_cannot_be_traced_is_warned_of_on_every_call():
     network = shaft(lambda t, a, w: np.interp(float(a), [50.0, 50.01], [0.0, 10.0]), 3.0)
     for _ in range(2):
@@ -204,6 +205,7 @@ CHANGING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CHANGING)
 def test_a_law_with_other_values_in_a_second_call_is_no_constant(kind):
     network = shaft(CHANGING[kind](), 3.0)
@@ -212,6 +214,7 @@ def test_a_law_with_other_values_in_a_second_call_is_no_constant(kind):
             simulate(network, 1.0)
 
 
+@pytest.mark.slow
 def test_a_function_of_nothing_is_a_constant():
     with warnings.catch_warnings():
         warnings.simplefilter("error", SwitchingWarning)

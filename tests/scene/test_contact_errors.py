@@ -7,6 +7,8 @@ import gauss
 from gauss.errors import FileError, SceneError, SimulationError, StateError
 from tests.support.contacts import touching, two_loose_bodies
 
+pytestmark = pytest.mark.slow
+
 MISTAKES = {
     "restitution above one": (lambda s: s.stop("S", highest=1.0, restitution=1.5), SceneError, "0 to 1, got 1.5"),
     "no stop": (lambda s: s.stop("S"), SceneError, "lowest=, highest= or both"),
@@ -93,7 +95,6 @@ MISTAKES = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistakes_are_named(mistake):
     make, error, message = MISTAKES[mistake]

@@ -11,7 +11,8 @@ from gauss.errors import SceneError
 from gauss.rotations import from_quaternion
 from gauss.scene.contact_pairs import places
 from gauss.scene.contact_patch import SLOTS, SolidPose, solid_of
-from gauss.scene.solid_pairs import solid_pair
+from gauss.scene.patch_distances import solid_pair
+from gauss.simulation.moreau.unseen_contacts import thickness
 
 SMOOTH = 1e-4  # [m] coal's distance of curved shapes, and depths, with its tolerance of 1e-6
 EXACT = 1e-9  # [m] of other shapes of the size of 1 m
@@ -67,6 +68,7 @@ def separation(one, other, poses, normal) -> float:
     return -sum(ends)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_the_nearest_point_of_a_patch_is_that_of_coal(one, other):
     first, second, rng, seen = shape(one, "A"), shape(other, "B"), np.random.default_rng(2), 0
@@ -160,6 +162,29 @@ def test_degenerate_and_open_meshes_are_refused_by_name(vertices, faces, words):
         scene.mesh("rock", "A", vertices, faces=faces)
     assert words in str(error.value)
     scene.mesh("rock", "A", CORNER, faces=CLOSED)
+
+
+def test_a_mesh_of_triangles_with_corners_of_their_own_is_closed():
+    scene, soup = gauss.Scene("meshes"), [CORNER[k] for face in CLOSED for k in face]
+    scene.body("A", mass=1.0, inertia=(1, 1, 1))
+    mesh = scene.mesh("rock", "A", soup, faces=np.arange(len(soup)).reshape(-1, 3))
+    assert len(mesh.hull[0]) == len(CORNER)
+
+
+def test_many_vertices_are_one_hull_for_all_copies():
+    points = np.random.default_rng(6).standard_normal((8000, 3))
+    points = tuple(map(tuple, points / np.linalg.norm(points, axis=1)[:, None]))
+    scene = gauss.Scene("rocks")
+    scene.body("A", mass=1.0, inertia=(1, 1, 1))
+    rock, copy = (scene.mesh(name, "A", points) for name in ("rock", "copy"))
+    vertices, loops, normals = rock.hull
+    assert copy.hull[0] is vertices
+    assert solid_of(copy) is solid_of(rock)
+    corners = sum(map(len, loops))
+    assert len(vertices) - corners // 2 + len(loops) == 2  # Euler: an edge has two corners that begin at it
+    centres = np.array([vertices[loop].mean(axis=0) for loop in loops])
+    assert (np.einsum("ij,ij->i", centres, normals) > 0.0).all()
+    assert thickness(rock) == pytest.approx(2.0, rel=0.01)
 
 
 def test_iterated_distances_need_time_stepping():

@@ -8,7 +8,7 @@ import gauss
 from gauss.errors import SceneError
 from gauss.rotations import from_quaternion
 from gauss.scene.contact_patch import SLOTS, SolidPose, solid_of
-from gauss.scene.solid_pairs import solid_pair
+from gauss.scene.patch_distances import solid_pair
 from gauss.scene.terrain import Terrain
 from tests.scene.test_contact_shapes import EXACT, MAKE, SMOOTH
 from tests.support.terrain import in_coal
@@ -107,6 +107,7 @@ def test_what_is_deep_in_the_field_is_pushed_up(kind, depth):
     assert all(point.normal @ (0, 0, 1) > 0.99 for point in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sphere", "box"])
 def test_only_cells_under_a_body_are_looked_at(monkeypatch, kind):
     seen, under = [], Terrain.under

@@ -218,6 +218,7 @@ FAILING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FAILING)
 def test_a_law_that_fails_on_the_way_is_named(form):
     law, why = FAILING[form]

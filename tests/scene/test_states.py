@@ -39,6 +39,7 @@ def ends(trajectory):
     return np.array([trajectory.rate("A")[-1], trajectory.rate("m current")[-1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "step", "tolerance"),
     [
@@ -58,6 +59,7 @@ def test_a_motor_with_inductance_has_its_closed_form(integrator, step, tolerance
     np.testing.assert_allclose(ends(trajectory), motor_at(trajectory.t[-1]), rtol=tolerance)
 
 
+@pytest.mark.slow
 def test_an_opaque_law_and_a_traced_one_move_alike():
     opaque = motor(lambda t: VOLTAGE * float(np.format_float_positional(t) != ""))
     np.testing.assert_allclose(ends(gauss.simulate(opaque, SPAN, **TIGHT)), motor_at(SPAN), rtol=ACCURACY)
@@ -74,6 +76,7 @@ def test_batches_and_simulators_have_the_states():
     np.testing.assert_allclose(simulator.state.v, many.v[0, -1], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_linear_model_has_the_states_by_name():
     scene = motor(0.0)
     scene.input("u", {"m current": 1.0 / INDUCTANCE})
@@ -129,6 +132,7 @@ def muscle(scene):
     return rates
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [lugre, muscle])
 def test_actuators_move_as_their_equations(make):
     scene = rotor()
@@ -140,6 +144,7 @@ def test_actuators_move_as_their_equations(make):
     np.testing.assert_allclose(found, exact, rtol=1e-6, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_states_go_with_loops_and_contacts():
     scene = gauss.load("four_bar")
     actuators.low_pass(scene, "slow", lambda t, at: at.rate("A"), 0.1, start=0.5)
@@ -153,6 +158,7 @@ def test_states_go_with_loops_and_contacts():
     assert np.isfinite(gauss.simulate(stopped, SPAN).rate("slow")[-1])
 
 
+@pytest.mark.slow
 def test_a_motor_turns_a_linkage_with_the_power_that_it_takes():
     """∫ (u − R i) i dt is the energy of the winding and of the four-bar: k i q̇ leaves the one and enters the other."""
     scene, fine = gauss.load("four_bar"), np.linspace(0.0, SPAN, 2001)
@@ -227,6 +233,7 @@ def test_oil_between_closed_valves_is_a_spring():
     assert found == pytest.approx(np.sqrt(2.0 * MODULUS * AREA**2 / (VOLUME * RAM)), rel=1e-10)
 
 
+@pytest.mark.slow
 def test_an_unloaded_cylinder_moves_as_the_flow_fills_it():
     """K u √(p / 2) = A v: each edge of the valve takes half of the supply pressure; a little of the oscillation is left."""
     found = gauss.simulate(press(0.5, leakage=2e-12), 1.0, rtol=1e-8, progress=False)

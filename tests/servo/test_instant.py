@@ -48,6 +48,7 @@ def test_the_ideal_reading_is_another_motion():
     assert by_contact.multipliers[-1] == pytest.approx(-by_motor.efforts[0], rel=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["recursion", "kkt", "schur", "nullspace", "pinv", "clarabel", "daqp", "saddle"])
 def test_ideal_servos_go_through_every_backend(backend):
     """Efforts are those of S u = b: the multipliers of a backend need not be right where a body has no inertia."""
@@ -65,6 +66,7 @@ def test_oblique_servos_are_refused_by_a_minimiser():
         servo.solve(held, held.system.state(*PENDULUM), backend="kkt")
 
 
+@pytest.mark.slow
 def test_explain_says_which_way():
     held = Servo(servos.cart_pendulum(), [servos.lean(leaning())], [Motor("motor", "rail")])
     ideal = Servo(servos.cart_pendulum(), [servos.lean(leaning())], [Motor("motor", "pin")])
@@ -105,6 +107,7 @@ def test_routes_agree_on_a_closed_loop(by):
     assert found.efforts == pytest.approx(route.efforts, rel=ROUTES)
 
 
+@pytest.mark.slow
 def test_arm_with_one_motor_is_oblique():
     """Example 5: the tip on a line by the shoulder alone, against the ideal guide of the tip."""
     driven = Servo(servos.arm(), [servos.tip_on_line()], [Motor("shoulder motor", "shoulder")])
@@ -140,6 +143,7 @@ def test_arm_loses_hold_where_the_coupling_vanishes():
         servo.solve(driven, driven.system.state([low, q2]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", [1.0, 10.0, 1e4])
 def test_indeterminate_efforts_are_of_least_weighted_norm(weight):
     """Example 7: a second motor on the rod; S u = b by the least weighted norm, u = R⁻¹Sᵀ(S R⁻¹Sᵀ)⁻¹ b."""
@@ -229,6 +233,7 @@ def test_constraints_of_a_scene_are_held_by_servos():
     assert "tip[1]" in one.held
 
 
+@pytest.mark.slow
 def test_contacts_of_a_scene_and_ideal_relations_are_one():
     """The rolling disk as a constraint of the scene, and as ideal relations beside a scene without it."""
     ideal = servos.rolling_servo()

@@ -9,6 +9,8 @@ from gauss.errors import SimulationError
 from gauss.servo import Cable, Motor, Servo, ServoRelation, Thruster, UnrealisableError
 from tests.support import servos
 
+pytestmark = pytest.mark.slow
+
 START, OUTWARDS, SPEED = np.array([1.2, -0.6]), np.array([2.0, -1.0]) / np.sqrt(5.0), 0.3  # of the tip [m, 1, m/s]
 REACH = 1.8  # of the arm [m]
 LOCATED = 1e-6  # of the time at which the hold is lost by adaptive steps [s]
@@ -22,7 +24,6 @@ def _arm_out_of_reach() -> Servo:
     return Servo(servos.arm(), [ServoRelation("tip", off)], [Motor("hip", "shoulder"), Motor("knee", "elbow")])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"times": np.linspace(0.0, 3.0, 7)}, {"times": [2.9]}, {"integrator": "radau5"}])
 def test_an_arm_drawn_out_of_reach(options):
     """Whatever samples are asked for, the loss of rank is named, not the step that it shortens."""
@@ -35,7 +36,6 @@ def test_an_arm_drawn_out_of_reach(options):
     assert said == pytest.approx((REACH - np.linalg.norm(START)) / SPEED, abs=LOCATED)
 
 
-@pytest.mark.slow
 def test_an_arm_stretched_along_a_relation():
     """The row of that relation vanishes, and its direction is no guide: it is named all the same."""
 
@@ -65,7 +65,6 @@ def test_an_effort_that_turns_round():
     assert caught.value.verdict.outcome == "rank lost"
 
 
-@pytest.mark.slow
 def test_a_cable_that_would_push_is_said_with_the_time():
     held = servos.crane_servo(lambda t: 0.0 * t, lambda t: -3.0 - 2.0 * t**3)
     with pytest.raises(SimulationError, match="t = 0.8175 s: .*'rope'"):

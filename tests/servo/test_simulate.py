@@ -171,6 +171,7 @@ def cable_robot() -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 def test_redundant_cables_stay_taut():
     """Three cables, two relations: the least norm that pulls; the preload of least tension is kept."""
     path = ServoRelation("path", lambda t, m: m.position("load")[::2] - np.array([0.5 * np.cos(t), 1.0 + 0.5 * np.sin(t)]))

@@ -117,6 +117,7 @@ def test_a_load_between_two_places_is_not_stepped_over():
     assert found.motion.rate("x")[-1] == pytest.approx(np.sqrt(4.0 + 2.0 * 50.0 * 0.01 / MASS), rel=EXACT)
 
 
+@pytest.mark.slow
 def test_breaks_tell_of_a_load_that_cannot_be_traced():
     """A pulse of a tenth of a millisecond lies between all samples of an opaque law; with breaks= it acts."""
     law = lambda t: 1e4 * FORCE if BEGIN <= float(t) < BEGIN + 1e-4 else 0.0  # noqa: E731
@@ -148,6 +149,7 @@ def test_a_reference_of_speed_that_jumps_is_refused():
         servo.simulate(Servo(cart(0.0), [relation], [Motor("motor", "y")]), DURATION, progress=False)
 
 
+@pytest.mark.slow
 def test_a_reference_of_accelerations_may_jump():
     relation = ServoRelation(
         "push", lambda t, motion: motion.joint_acceleration("y") - (2.0 if BEGIN < t < END else 0.0), level="acceleration"

@@ -8,6 +8,8 @@ from benchmarks.free_bodies import free_body
 from gauss.dynamics.contact import near_detection
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 
+pytestmark = pytest.mark.slow
+
 SPREAD = 0.5  # half edge of the cloud [m]
 
 

@@ -46,6 +46,7 @@ def same(one, other):
     np.testing.assert_allclose(one, other, rtol=SAME, atol=SAME * max(1.0, np.abs(other).max()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, method", CASES)
 def test_held_inputs(model, method):
     for how in (
@@ -60,6 +61,7 @@ def test_held_inputs(model, method):
             same(getattr(found, part), getattr(expected, part))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, method", CASES)
 def test_simulators_batches_and_rollouts(model, method):
     simulators, batches, rollouts = [], [], []
@@ -86,6 +88,7 @@ def test_simulators_batches_and_rollouts(model, method):
             same(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at, close", [(5.0, SAME), (0.35, 1e-8)])  # a wall out of reach, and one that is hit
 def test_contacts_of_many_operations(at, close):
     motions, held, stepped = [], [], []
@@ -110,6 +113,7 @@ def test_contacts_of_many_operations(at, close):
         np.testing.assert_allclose(one, other, rtol=close, atol=close * max(1.0, np.abs(other).max()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_prepared_motions_and_adaptive_rollouts(model):
     run = {"integrator": "dop853", "rtol": 1e-10, "times": [0.0, 0.07, DURATION]}
@@ -140,6 +144,7 @@ def _ending(last: float) -> gauss.System:
     return gauss.compile_scene(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("failed", [lambda: 1 / 0, lambda: np.nan])
 def test_a_law_that_fails_beside_contacts_of_many_operations_leaves_the_state_before(failed):
     scene = with_boxes(gauss.load("double_pendulum"))
@@ -169,6 +174,7 @@ def test_a_law_that_raises_leaves_a_simulator_as_it_was():
     assert simulator.t == pytest.approx(0.1, rel=SAME)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["rk4", "time_stepping"])
 def test_a_law_that_raises_ends_its_own_motion_of_a_batch(method):
     system, steps = _ending(0.1), 50
@@ -193,6 +199,7 @@ def test_a_start_where_a_law_raises_is_refused():
         simulator.reset(gauss.State(0.0, np.array([0.5, 0.0]), np.zeros(2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [{"integrator": "time_stepping", "step": STEP}, {"integrator": "rk4", "step": STEP}, {}])
 @pytest.mark.parametrize("failed", [lambda t: [][0], lambda t: None, lambda t: "x", lambda t: 1j])
 def test_a_law_that_fails_at_the_start_is_named(failed, method):

@@ -13,6 +13,8 @@ import gauss
 from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError, SwitchingWarning
 
+pytestmark = pytest.mark.slow
+
 BY_PYTHON = Plan("Python loop", "compiled")
 DURATION = 0.4  # s
 RTOL = 1e-9
@@ -69,7 +71,6 @@ def test_motions_are_those_of_the_loop_in_python(name, law):
         assert found.stats.handed_over is None
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.SwitchingWarning")
 @pytest.mark.parametrize("name, options, dynamics", LARGE)
 def test_large_scenes_call_their_laws_in_the_compiled_loop(name, options, dynamics):

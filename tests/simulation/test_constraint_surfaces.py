@@ -11,6 +11,8 @@ from gauss.errors import BalanceWarning, SimulationError, SwitchingWarning
 from gauss.servo import Motor, Servo, ServoRelation
 from gauss.servo import simulate as simulate_servo
 
+pytestmark = pytest.mark.slow
+
 SPEED, AT = 2.0, 1.05  # of the carriage [m/s], and place of the surface [m]
 SLOPE = 0.5  # of the ramp behind the kink
 EVENT = AT / SPEED  # [s]
@@ -206,7 +208,6 @@ UNCUT = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", [{}, {"integrator": "rk4", "step": 0.01}, {"integrator": "time_stepping", "step": 0.01}])
 @pytest.mark.parametrize("name", CUT)
 def test_a_branch_cut_that_the_motion_meets_is_refused(name, method):
@@ -215,14 +216,12 @@ def test_a_branch_cut_that_the_motion_meets_is_refused(name, method):
     assert caught.value.trajectory.q[-1, 0] == pytest.approx(np.pi, abs=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CUT)
 def test_a_branch_cut_is_refused_where_it_is_not_located(name):
     with pytest.raises(SimulationError, match="'bound' jumps by"):
         gauss.Simulator(_two_wheels(*CUT[name]), 0.01)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", UNCUT)
 def test_a_branch_cut_away_from_the_constraint_is_none(name):
     scene = _two_wheels(*UNCUT[name])

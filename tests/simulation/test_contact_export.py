@@ -33,6 +33,7 @@ def instant(request):
     return system, motion.state(len(motion) - 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["clarabel", "scs"])
 def test_solvers_of_cone_programmes_find_the_rates_of_ours(instant, solver):
     """Impulses need not be unique, rates after the step are those of one W r."""
@@ -42,6 +43,7 @@ def test_solvers_of_cone_programmes_find_the_rates_of_ours(instant, solver):
     assert np.abs(problem.W @ (own - other)).max() <= SAME_RATES
 
 
+@pytest.mark.slow
 def test_the_problem_is_that_of_the_step(instant):
     system, state = instant
     stepper = MechanismStepper(system)
@@ -144,6 +146,7 @@ def _with_joint_friction() -> gauss.System:
     return gauss.compile_scene(scene)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_is_refused(what, tmp_path):
     kind, text, call = REFUSED[what]

@@ -6,6 +6,8 @@ import pytest
 import gauss
 from gauss import Plan, math
 
+pytestmark = pytest.mark.slow
+
 STEP, END = 1e-3, 0.5  # [s]
 BALANCE = 2e-3  # of the work: time stepping is of order 1 at impacts
 SAME_MOTION = 1e-4  # rad, m: of two routes that round the moment of an impact differently

@@ -226,6 +226,7 @@ def test_what_a_stop_holds_at_rest_is_left_alone_whatever_its_mass():
                 assert not _told(lambda: gauss.simulate(scene, 1.0, **options))  # noqa: B023
 
 
+@pytest.mark.slow
 def test_a_box_that_landed_by_time_stepping_is_told_only_of_gross_errors():
     """A fall of 1 m by steps of h is off by h g t / 2 / (g t² / 2) = h / t of its energy, t the time that it takes."""
     scene = falling()

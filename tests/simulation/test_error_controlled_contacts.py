@@ -86,6 +86,7 @@ def test_the_tolerance_is_honoured(name, rtol):
     assert whole.stats.steps == len(whole) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-3, 1e-5])
 def test_impacts_are_events_at_their_times(rtol):
     motion = gauss.simulate(_bouncing(), 1.6, integrator="time_stepping", rtol=rtol)
@@ -108,6 +109,7 @@ def test_motions_agree_with_located_events(model, rtol):
     assert np.abs(motion.q - exact.q).max() <= GROWN * rtol
 
 
+@pytest.mark.slow
 def test_steps_over_a_curved_closed_gap_are_of_order_two():
     """A box that tilts over its edge: half as long as the tolerance is a quarter; of order one, a quarter as long."""
     system = gauss.compile_scene(gauss.load("box_on_plane_4"))
@@ -132,6 +134,7 @@ def _block(t: float) -> float:
     return -1.5 * STOPS + (SHARP - 0.5 * SLOPE) * (t - STOPS) ** 2 / 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize(("model", "exact"), [("friction_oscillator", _oscillator), ("block_on_incline", _block)])
 def test_sliding_that_turns_back_within_a_step_is_located(model, exact, rtol):
@@ -197,6 +200,7 @@ def test_a_short_late_force_is_not_stepped_over():
     assert abs(motion.v[-1, 0]) < AT_REST
 
 
+@pytest.mark.slow
 def test_a_force_in_a_narrow_place_is_not_flown_through():
     """A mass at 3 m/s, with a stop far away, gains F w = 0.5 J from a force of 500 N between x = 5 m and 5.001 m."""
     scene = gauss.Scene("narrow", gravity=(0.0, 0.0, 0.0))
@@ -227,6 +231,7 @@ def test_fast_bodies_do_not_pass_through_thin_ones(others):
     assert any(event.kind == "impact" for event in motion.events)
 
 
+@pytest.mark.slow
 def test_verify_covers_the_error_and_contact_forces_are_those_of_rest():
     motion = gauss.simulate(_sliding(1), 1.0, integrator="time_stepping", rtol=1e-4, verify=True)
     true = max(abs(x - _way(t)) for t, x in zip(motion.t, motion.q[:, 0], strict=True))
@@ -250,6 +255,7 @@ def test_what_is_refused(what):
         REFUSED[what](_bouncing())
 
 
+@pytest.mark.slow
 def test_a_law_that_raises_leaves_the_motion_so_far():
     def law(t):
         if t > 0.3:

@@ -80,6 +80,7 @@ def test_the_first_step_is_that_of_the_source(name, shares):
     assert abs(h - expected) <= 1e-10 * expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shares", SHARES)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_error_is_that_of_the_source(name, shares):

@@ -47,6 +47,7 @@ def facing(one: str, other: str):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("one", "other"), [*PAIRS, *SLOW_PAIRS])
 def test_kernels_of_pairs_are_the_gap_functions_of_the_scene(one, other):
     system, rng = gauss.compile_scene(facing(one, other)), np.random.default_rng(3)
@@ -74,6 +75,7 @@ def test_kernels_of_pairs_are_the_gap_functions_of_the_scene(one, other):
     assert seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ball", "capsule", "box"])
 def test_small_scenes_move_as_by_the_machine_code_of_the_scene(kind):
     scene = floor("one body")
@@ -188,6 +190,7 @@ def test_shapes_in_each_other_at_the_start_are_refused(aside):
         moved(scene, STEP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1e-2, 1e-3])
 @pytest.mark.parametrize("turned", [0.0, 1e-6])
 def test_equal_cubes_that_fall_on_each_other_face_to_face_come_to_rest(step, turned):

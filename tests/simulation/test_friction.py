@@ -21,6 +21,7 @@ EXACT = 1e-8  # rates under constant forces, which a step of any length has righ
 STEPPING = {"integrator": "time_stepping"}
 
 
+@pytest.mark.slow
 def test_a_block_slides_up_stops_and_slides_back():
     scene, h = gauss.load("block_on_incline"), 0.01
     trajectory = gauss.simulate(scene, 1.0, step=h, **STEPPING)
@@ -79,6 +80,7 @@ def test_a_ball_rolls_after_sliding_with_five_sevenths_of_its_speed(heading):
     assert np.abs(found.balance).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_bounce_has_its_restitution_and_the_impulse_of_friction():
     """Oblique impact of a ball without spin that slides throughout: Δv_t = μ Δv_n."""
     scene, h = gauss.load("rolling_ball"), 0.01
@@ -192,6 +194,7 @@ def _rod(friction, speed, spin=0.0):
 
 
 # K m = 1 + 3 cos θ (cos θ ± μ sin θ), 1.1 rad: negative beyond μ = 1.334, sliding ahead
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("friction", "speed", "spin", "kind"),
     [
@@ -208,6 +211,7 @@ def test_painleves_paradox_begins_where_theory_says(friction, speed, spin, kind)
     assert [(paradox.gaps, paradox.kind) for paradox in found] == ([] if kind is None else [(("C",), kind)])
 
 
+@pytest.mark.slow
 def test_painleves_rod_is_reported_and_jams():
     with pytest.warns(PainleveWarning, match="t = 0 s: .*'C'"):
         trajectory = gauss.simulate(gauss.load("painleve_rod"), 0.05, step=5e-3, **STEPPING)
@@ -265,6 +269,7 @@ MISTAKES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistakes_are_named(mistake):
     make, error, message = MISTAKES[mistake]

@@ -45,6 +45,7 @@ def from_sample_to_sample(model: str, joint: str, duration: float = DURATION, **
     return np.concatenate([state.q, state.v])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, joint, options", MOTIONS)
 def test_a_held_input_is_a_constant_drive_from_sample_to_sample(model, joint, options):
     scene = with_input(model, joint)
@@ -58,6 +59,7 @@ def test_a_held_input_is_a_constant_drive_from_sample_to_sample(model, joint, op
     assert np.abs(again.q[-1] - motion.q[-1]).max() <= ROUNDING
 
 
+@pytest.mark.slow
 def test_between_events_each_sample_begins_a_motion_of_its_own():
     motion = gauss.simulate(with_input("friction_oscillator", "rail"), 0.1, control=law, rate=RATE)
     expected = from_sample_to_sample("friction_oscillator", "rail", 0.1)
@@ -86,6 +88,7 @@ def test_the_trajectory_knows_its_inputs():
     assert np.abs(np.diff(balance.balance)).max() <= ROUNDING * 100
 
 
+@pytest.mark.slow
 def test_a_law_is_called_once_for_each_sample_and_may_keep_a_state():
     seen = []
 
@@ -135,6 +138,7 @@ def test_inputs_and_outputs_are_kept_in_a_file(tmp_path):
     assert (again.inputs, again.outputs) == (scene.inputs, scene.outputs)
 
 
+@pytest.mark.slow
 def test_outputs_are_derivatives_of_each_other():
     scene = gauss.load("double_pendulum")
     scene.input("u", "B")

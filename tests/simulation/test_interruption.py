@@ -88,6 +88,7 @@ def test_a_motion_is_kept_as_far_as_it_came(name):
     np.testing.assert_allclose(again.q, found.q[: len(times)], atol=1e-6)  # it is the beginning of that motion
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [None, 11])
 @pytest.mark.parametrize("integrator", ["scipy_dop853", "cvode_adams", "dop853"])
 def test_an_interrupted_law_keeps_the_steps_before(integrator, samples):
@@ -109,6 +110,7 @@ def test_an_interrupted_law_keeps_the_steps_before(integrator, samples):
     np.testing.assert_allclose(again.q, found.q, atol=1e-2)  # a hundred times the tolerance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["scipy_dop853", "cvode_bdf", "dop853"])
 def test_an_interruption_before_the_first_sample_leaves_none(integrator):
     scene = gauss.load("pendulum")
@@ -123,6 +125,59 @@ def test_an_interruption_before_the_first_sample_leaves_none(integrator):
     with pytest.raises(KeyboardInterrupt) as caught:
         gauss.simulate(scene, 0.2, integrator=integrator, times=[0.1, 0.2], progress=False)
     assert caught.value.trajectory.q.shape == (0, 1)
+
+
+ROLLED_OUT = {
+    "fixed steps": (lambda: _scene("double_pendulum"), {"steps": 10**7, "step": 1e-3, "every": 1000}),
+    "threads": (lambda: _scene("double_pendulum"), {"steps": 10**7, "step": 1e-3, "every": 1000, "threads": 2}),
+    "adaptive": (lambda: _scene("double_pendulum"), {"integrator": "dop853", "times": np.arange(0.0, LONG, 1.0)}),
+    "time stepping": (
+        lambda: _scene("box_on_plane_4"),
+        {"integrator": "time_stepping", "steps": 10**6, "step": 1e-3, "every": 10},
+    ),
+    "one by one": (_called_law, {"steps": 10**6, "step": 1e-2}),
+}
+MOTIONS = 6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROLLED_OUT)
+def test_a_rollout_is_kept_as_far_as_it_came(name):
+    make, options = ROLLED_OUT[name]
+    system = make()
+    start = system.initial_state()
+    given = system, np.tile(start.q, (MOTIONS, 1)), np.tile(start.v, (MOTIONS, 1))
+    few = {"times": options["times"][:4]} if "times" in options else {"steps": 3 * options.get("every", 1)}
+    short = gauss.rollout(*given, **options | few)
+    found = _interrupted(lambda: gauss.rollout(*given, **options)).rollout
+    np.testing.assert_array_equal(found.q[0, :3], short.q[0, :3])  # it is the beginning of that motion
+    assert set(found.diverged) == set(found.reasons) and found.diverged
+    rows = np.isfinite(found.q).all(axis=2)
+    assert (rows[:, :-1] >= rows[:, 1:]).all() and rows[0].sum() > 4 and not rows[-1].all()  # nothing behind a gap
+    assert len(found.trajectory(0)) == rows[0].sum()
+
+
+EACH = 100  # steps of a call
+STEPPED = {
+    "compiled": lambda: _scene("double_pendulum"),
+    "time stepping": lambda: _scene("box_on_plane_4"),
+    "called": _called_law,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [gauss.Simulator, lambda scene, step: gauss.SimulatorBatch(scene, step, MOTIONS)])
+@pytest.mark.parametrize("name", STEPPED)
+def test_a_simulator_goes_on_after_an_interruption(name, make):
+    many, other = make(STEPPED[name](), 1e-3), make(STEPPED[name](), 1e-3)
+    _interrupted(lambda: [many.step(n=EACH) for _ in iter(int, 1)])
+    done = round(many.t / 1e-3)
+    assert done % EACH == 0  # calls are made as a whole, or not at all
+    many.step(n=EACH)
+    for _ in range(done // EACH + 1):
+        other.step(n=EACH)
+    reached = [one.state.q if isinstance(one, gauss.Simulator) else one.q for one in (many, other)]
+    np.testing.assert_array_equal(*reached)
 
 
 @pytest.mark.slow

@@ -10,6 +10,8 @@ from gauss.servo import Motor, Servo
 from gauss.servo import simulate as simulate_servo
 from tests.support import servos
 
+pytestmark = pytest.mark.slow
+
 
 def _teleports():
     step = lambda t: gm.where(t < 1.0, 1.0, 1.5)  # noqa: E731

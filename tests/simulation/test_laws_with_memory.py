@@ -89,6 +89,7 @@ def test_a_law_with_a_memory_is_said_in_every_call(name):
         assert said(REMEMBERS[name]())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORGETS)
 def test_a_law_that_only_notes_its_calls_is_none(name):
     assert not said(FORGETS[name]())
@@ -140,6 +141,7 @@ def test_a_random_law_is_refused_by_adaptive_steps(name, integrator):
         gauss.simulate(scene, 1.0, integrator=integrator, progress=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RANDOM)
 def test_a_random_law_is_warned_of_by_fixed_steps(name):
     with pytest.warns(SwitchingWarning, match="gives other values when it is called again"):

@@ -60,6 +60,20 @@ def coupled():
     return scene
 
 
+def summed():
+    """Three links whose angles have a constant sum, by a tendon that is given twice, and a belt on one of them."""
+    scene = arm("summed arm")
+    scene.body("tip", mass=0.5, inertia=(0.001, 0.01, 0.01), position=(1.2, 0.0, 0.55))
+    scene.revolute("hinge 2", "link 1", "tip", at=(1.0, 0.0, 0.55), axis=(0, 1, 0))
+    scene.body("wheel", mass=0.2, inertia=(0.001,) * 3)
+    scene.revolute("shaft", "ground", "wheel", axis=(0, 1, 0))
+    angles = {"hinge 0": 0.4, "hinge 1": 0.3, "hinge 2": -0.7}
+    scene.linear_coupling("tendon", angles, constant=0.1)
+    scene.linear_coupling("the same", {joint: -0.3 * factor for joint, factor in angles.items()}, constant=-0.03)
+    scene.couple("belt", "shaft", "hinge 2", 3.0)
+    return scene
+
+
 def four_bar():
     """A four-bar linkage whose coupler carries a ball that meets a wall."""
     scene = mechanisms.four_bar()
@@ -86,7 +100,7 @@ def on_a_spring():
     return scene
 
 
-SCENES = {make.__name__: make for make in (driven, bouncing, coupled, four_bar, on_a_spring)} | {
+SCENES = {make.__name__: make for make in (driven, bouncing, coupled, summed, four_bar, on_a_spring)} | {
     "arm": lambda: arm("arm"),
 }
 
@@ -98,6 +112,7 @@ def moved(scene, duration: float, **options):
     return gauss.simulate(scene, duration, integrator="time_stepping", step=STEP, progress=False, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_mechanisms_move_as_by_the_machine_code_of_the_scene(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -114,6 +129,7 @@ def test_mechanisms_move_as_by_the_machine_code_of_the_scene(name):
     np.testing.assert_allclose(*rubs, atol=1e-6 * pushes[0].max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_machine_code_and_python_take_the_same_steps(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -161,6 +177,7 @@ def on_a_slope(shape: str, friction: float, angle: float):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shape", "friction", "angle", "acceleration"),
     [
@@ -189,6 +206,7 @@ def test_a_leg_that_falls_comes_to_rest_on_its_stops_and_the_floor():
     assert total[-1] < total[0] - 0.1 * energy.scale
 
 
+@pytest.mark.slow
 def test_time_stepping_tells_painleves_paradox():
     scene, radius = gauss.load("painleve_rod"), 1e-3
     scene.shapes["end"] = replace(scene.shapes["end"], radius=radius)
@@ -213,6 +231,7 @@ def test_penetration_at_the_start_is_refused():
         moved(scene, STEP, plan=KERNELS)
 
 
+@pytest.mark.slow
 def test_samples_beside_the_steps_are_those_of_the_written_out_step():
     system, times = gauss.compile_scene(driven()), np.linspace(0.0, 0.1, 27)
     one, other = (moved(system, 0.1, plan=plan, times=times) for plan in (WRITTEN_OUT, KERNELS))

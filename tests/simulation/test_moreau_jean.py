@@ -95,6 +95,7 @@ def test_steps_that_have_to_be_looked_at_are_taken_by_python():
     assert fast.v == pytest.approx(slow.v, abs=SAME)
 
 
+@pytest.mark.slow
 def test_laws_that_are_python_functions_are_called():
     """A force that cannot be traced: machine code calls it, with the same motion as with one that can."""
     ends = []
@@ -137,6 +138,7 @@ def test_small_equations_are_solved_as_numpy_does(rank):
         assert x == pytest.approx(expected, abs=1e-9 * np.linalg.cond(A[:rank, :rank]) * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_steps_without_impacts_are_of_second_order():
     """A double pendulum swings freely, its stop is far away: half the step, a quarter of the error."""
     scene, errors = gauss.load("double_pendulum"), []
@@ -150,6 +152,7 @@ def test_steps_without_impacts_are_of_second_order():
     assert errors[0] < 1e-4
 
 
+@pytest.mark.slow
 def test_a_box_that_is_pulled_moves_as_in_its_closed_form():
     """Constant forces, closed gaps: every step is exact but for rounding."""
     found = gauss.simulate(_pulled_box(4), 0.5, integrator="time_stepping", step=1e-2, times=[0.5], progress=False)

@@ -20,6 +20,7 @@ def test_the_table_has_a_row_with_a_curve_for_every_coordinate(name):
         assert len(row[-1][0][0].get("points").split()) == len(motion)
 
 
+@pytest.mark.slow
 def test_a_motion_plots_itself(tmp_path):
     pytest.importorskip("matplotlib")
     motion = gauss.simulate(gauss.load("pendulum"), 0.2)

@@ -28,6 +28,7 @@ def law(t, q, v):
     return [2.0 * np.sin(9.0 * t) - 0.1 * v[0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [driven, arm])
 @pytest.mark.parametrize("times", [None, np.linspace(0.0, 0.15, 17)])
 def test_inputs_are_held_as_by_the_machine_code_of_the_scene(make, times):
@@ -89,6 +90,7 @@ def ball(restitution: float, friction: float, height: float, speed: float) -> ga
     return scene
 
 
+@pytest.mark.slow
 def test_impacts_are_events_with_the_energy_that_they_lose():
     motion = gauss.simulate(
         ball(0.5, 0.0, 0.2, 0.0), 0.7, integrator="time_stepping", step=STEP, progress=False, plan=KERNELS
@@ -110,6 +112,7 @@ def test_a_sliding_ball_that_cannot_turn_stops_when_friction_has_its_momentum():
     assert motion.events[0].t == pytest.approx(1.0 / (0.4 * 9.81), abs=STEP)
 
 
+@pytest.mark.slow
 def test_overlaps_at_the_start_are_named_and_resolved():
     system = gauss.compile_scene(arm("deep arm", height=0.3))
     run = {"integrator": "time_stepping", "step": STEP, "progress": False, "plan": KERNELS}
@@ -196,6 +199,7 @@ def test_a_batch_refuses_starts_off_its_constraints():
         many.reset(q=[[0.7, -0.35], [0.7, 0.2]], v=np.zeros((2, 2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("squeeze", [9.6, 9.7, 9.82, 12.0])
 def test_a_gripper_holds_up_to_the_limit_of_friction(squeeze):
     simulator = gauss.Simulator(gripper(), STEP)

@@ -78,6 +78,7 @@ def led(speed) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [one, many])
 def test_a_late_jump_of_a_prescribed_speed_is_refused_before_it(motion):
     with pytest.raises(SimulationError, match=r"prescribed velocities of 'led' jump at t = 150.003 s"):

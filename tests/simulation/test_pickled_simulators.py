@@ -51,6 +51,7 @@ def _moved(simulator, n: int):
     return [*state, measured, simulator.t]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 @pytest.mark.parametrize("make", [lambda s: gauss.Simulator(s, STEP), lambda s: gauss.SimulatorBatch(s, STEP, 2)])
 def test_simulators_and_batches_continue(name, make):
@@ -70,6 +71,7 @@ def test_a_batch_keeps_its_marks():
     assert again.reasons == batch.reasons
 
 
+@pytest.mark.slow
 def test_prepared_motions_rollouts_and_solutions():
     for opaque in (False, True):
         system = _cart(opaque)
@@ -85,6 +87,7 @@ def test_prepared_motions_rollouts_and_solutions():
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(solution)).qdd, solution.qdd)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", ["cart_pole_swing_up", "acrobot", "four_bar_press"])
 def test_environments_continue(task):
     gymnasium = pytest.importorskip("gymnasium")

@@ -10,6 +10,7 @@ ROUNDING = 1e-12
 TIMES = np.array([0.0, 0.03, 0.1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "model, options",
     [

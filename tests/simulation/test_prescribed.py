@@ -138,6 +138,7 @@ AT_END = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", AT_END, ids=called)
 @pytest.mark.parametrize("times", [None, np.array([0.5, 1.25, 1.5]), np.array([0.25, 1.25])], ids=["steps", "end", "before"])
 def test_a_jump_at_the_end_is_an_impact(settings, times):
@@ -276,6 +277,7 @@ def test_a_jump_at_the_start_is_an_impact_there():
                 assert balanced(motion) <= BALANCE
 
 
+@pytest.mark.slow
 def test_a_guide_and_a_shift_of_gears_are_impacts():
     """A point that is guided along a kink; a velocity constraint whose ratio jumps loses energy, as a clutch does."""
     scene = gauss.Scene("guided", gravity=(0, 0, 0))
@@ -360,6 +362,7 @@ def test_impulses_are_kept_in_files(tmp_path):
     assert kept["event_impulses"][0] == '{"drive of P": [-1.0]}'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["speed", "displacement"])
 @pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.1}])
 def test_two_prescribed_motions_that_part_at_a_jump_are_refused(key, options):

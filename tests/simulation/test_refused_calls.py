@@ -58,6 +58,7 @@ def refused(call, simulator=None):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bad", NOT_PAIRS.values(), ids=NOT_PAIRS)
 def test_functions_of_a_state(bad):
     for name in OF_Q:
@@ -84,6 +85,7 @@ def test_destinations(out):
     refused(lambda: SYSTEM.mass_matrix(PAIR, out=out))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bad", [v for k, v in NOT_PAIRS.items() if k not in ("a number", "too few")])
 def test_inputs_of_simulators_and_environments(bad):
     simulator, batch = gauss.Simulator(SYSTEM, STEP), gauss.SimulatorBatch(SYSTEM, STEP, 2)

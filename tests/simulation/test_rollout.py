@@ -201,6 +201,7 @@ def test_motions_that_diverge_are_marked_and_the_others_are_not_affected(integra
         assert so_far.t[0] == 0.0 and np.isfinite(so_far.q).all() and so_far.t[-1] < right.t[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", DIVERGING)
 def test_no_motion_that_reaches_the_end_is_an_error(integrator):
     system = gauss.compile_scene(mechanisms.rods(2))

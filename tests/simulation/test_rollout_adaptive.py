@@ -132,6 +132,7 @@ def test_motions_that_are_not_confirmed_are_made_by_simulate():
         assert np.array_equal(many.q[k], alone.q) and np.array_equal(many.v[k], alone.v)
 
 
+@pytest.mark.slow
 def test_starts_off_their_constraints_are_refused():
     system = gauss.compile_scene(gauss.load("gear_pair"))
     with pytest.raises(StateError, match="start number 0 has a constraint residual of .*'mesh' off by 0.5"):

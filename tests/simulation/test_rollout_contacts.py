@@ -20,6 +20,7 @@ def batch(model: str) -> tuple[gauss.System, np.ndarray, np.ndarray]:
     return system, np.tile(start.q, (BATCH, 1)), start.v + rng.uniform(-0.1, 0.1, (BATCH, system.n_v))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", SCENES)
 @pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")
 def test_motions_with_contacts_are_those_of_simulate(model):
@@ -34,6 +35,7 @@ def test_motions_with_contacts_are_those_of_simulate(model):
         assert motion.step == alone.step
 
 
+@pytest.mark.slow
 def test_unsolved_contact_problems_are_those_of_simulate():
     system, q, v = batch("painleve_rod")
     run = {"integrator": "time_stepping", "step": STEP}
@@ -56,6 +58,7 @@ def test_other_integrators_name_time_stepping():
         gauss.rollout(system, q, v, steps=1, step=STEP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, joint, integrator", [("cart_pole", "rail", "rk4"), ("four_bar", "A", "rk4")])
 def test_trajectories_and_outputs_are_those_of_a_simulator(model, joint, integrator):
     scene, rng = gauss.load(model), np.random.default_rng(1)

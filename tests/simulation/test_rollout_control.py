@@ -25,6 +25,7 @@ def batch(model: str):
     return system, np.tile(start.q, (BATCH, 1)), rates, rng.uniform(-30.0, 30.0, (BATCH, 10, 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", SCENES)
 def test_motions_of_a_batch_are_those_of_simulate(model):
     system, q0, v0, control = batch(model)
@@ -55,6 +56,7 @@ def test_a_motion_that_diverges_is_marked_and_the_others_are_not_affected():
     np.testing.assert_array_equal(np.delete(found.q, 3, axis=0), np.delete(right.q, 3, axis=0))
 
 
+@pytest.mark.slow
 def test_sampled_control_swings_a_pole_up():
     place = Path(gauss.__file__).parents[1] / "models" / "examples" / "control" / "mppi.py"
     example = run_path(str(place))

@@ -112,6 +112,7 @@ def _distance(one, two):
     return np.abs(np.concatenate([one.q[-1] - two.q[-1], one.v[-1] - two.v[-1]])).max()
 
 
+@pytest.mark.slow
 def test_order_of_dop853():
     """One step of length h from the same start: its local error falls like h⁹."""
     from gauss.dynamics.engines.certified import CertifiedEngine
@@ -169,6 +170,7 @@ def test_a_rough_guess_is_assembled():
     assert np.abs(position_residual(kinematics(system, state))).max() <= 1e-12
 
 
+@pytest.mark.slow
 def test_constraints_that_cannot_be_met_are_named():
     scene = mechanisms.rods(2)
     scene.couple("half turn", "J2", "J1", ratio=1.0, offset=0.5)
@@ -177,6 +179,7 @@ def test_constraints_that_cannot_be_met_are_named():
         gauss.compile_scene(scene).initial_state()
 
 
+@pytest.mark.slow
 def test_work_of_drives_and_dampers_closes_the_balance():
     scene = mechanisms.rods(2)
     scene.drive("J1", torque=lambda t: 5.0 * np.sin(3 * t))
@@ -250,6 +253,7 @@ def test_a_quaternion_must_be_unit():
         system.state([1, 1, 0, 0, 1, 0, 0, 0])
 
 
+@pytest.mark.slow
 def test_panda_swing_keeps_its_energy():
     """The main job: two seconds of free swing, DOP853 at 1e-10."""
     scene = gauss.load("robot:panda")

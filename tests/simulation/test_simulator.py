@@ -29,6 +29,7 @@ def simulator(model: str, joint: str, integrator: str | None) -> gauss.Simulator
     return gauss.Simulator(scene, STEP, integrator)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, joint, integrator", MOTIONS)
 def test_steps_are_those_of_simulate(model, joint, integrator):
     sim = simulator(model, joint, integrator)
@@ -41,6 +42,7 @@ def test_steps_are_those_of_simulate(model, joint, integrator):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, joint, integrator", MOTIONS)
 def test_a_restored_simulator_continues_bit_for_bit(model, joint, integrator):
     sim = simulator(model, joint, integrator)
@@ -83,6 +85,7 @@ def test_motions_that_diverge_end_with_an_error_in_the_state_before_the_call(n, 
     assert np.isfinite(sim.state.q).all() and sim.t == pytest.approx(n * 10 * STEP)
 
 
+@pytest.mark.slow
 def test_many_steps_in_one_call_are_single_steps():
     one, many = (simulator("cart_pole", "rail", None) for _ in range(2))
     one.step([0.5])
@@ -109,6 +112,7 @@ def test_the_seed_decides_the_start():
     assert np.abs(phi).max() <= ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "u", [[np.nan], [np.inf], [1.0, 2.0], [], "x", None, [[1.0], [2.0]], np.ma.masked_array([1.0], [True])]
 )
@@ -170,6 +174,7 @@ LASTING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHORT)
 def test_features_of_laws_that_are_shorter_than_the_steps_are_warned_of(name):
     for make in (gauss.Simulator, partial(gauss.SimulatorBatch, batch=2)):
@@ -185,6 +190,7 @@ JUMPING = {  # prescribed motions that jump at 100 s [m/s], [m]
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", JUMPING)
 def test_prescribed_motions_that_jump_are_refused(name):
     scene = _pushed(0.0)
@@ -207,6 +213,7 @@ NARROW = {  # a force from x = 1 m to a place [m], start [m] and speed [m/s], an
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NARROW)
 def test_a_place_that_a_step_passes_over_is_warned_of_once_for_each_motion(name):
     far, begin, speed, told = NARROW[name]

@@ -20,6 +20,7 @@ def scene_of(model: str, joint: str | None) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, joint", MOTIONS)
 def test_motions_are_those_of_single_simulators(model, joint):
     scene = scene_of(model, joint)
@@ -36,6 +37,7 @@ def test_motions_are_those_of_single_simulators(model, joint):
         np.testing.assert_allclose(values[2], sim.outputs[name], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model, joint", MOTIONS)
 def test_motions_after_a_restored_snapshot_are_those_before_bit_for_bit(model, joint):
     many = gauss.SimulatorBatch(scene_of(model, joint), STEP, batch=BATCH)
@@ -75,6 +77,7 @@ OF_OTHERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", OF_OTHERS)
 def test_snapshots_of_others_are_refused(other):
     scene = scene_of("cart_pole", "rail")
@@ -82,6 +85,7 @@ def test_snapshots_of_others_are_refused(other):
         gauss.SimulatorBatch(scene, STEP, batch=BATCH).restore(OF_OTHERS[other](scene).snapshot())
 
 
+@pytest.mark.slow
 def test_starts_restarts_and_divergence_leave_the_others_alone():
     scene = scene_of("cart_pole", "rail")
     many, other = (gauss.SimulatorBatch(scene, STEP, batch=BATCH, threads=k) for k in (1, 2))
@@ -100,6 +104,7 @@ def test_starts_restarts_and_divergence_leave_the_others_alone():
     np.testing.assert_array_equal(many.q[1], other.q[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("u", [np.ones(BATCH), np.ones((BATCH, 2)), np.full((BATCH, 1), np.nan)])
 def test_refused_inputs_change_nothing(u):
     many, other = (gauss.SimulatorBatch(scene_of("cart_pole", "rail"), STEP, batch=BATCH) for _ in range(2))
@@ -131,6 +136,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_arguments_are_named_and_change_nothing(case):
     scene = gauss.load("cart_pole")

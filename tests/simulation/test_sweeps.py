@@ -69,6 +69,7 @@ def test_a_function_makes_the_scene_and_numbers_are_measured():
     assert found.highest.values[[0, 2]] == pytest.approx(np.abs(found.q.values[[0, 2]]).max(axis=(1, 2)), abs=0)
 
 
+@pytest.mark.slow
 def test_what_fails_says_why_and_the_others_go_on():
     found = gauss.sweep(gauss.load("four_bar"), {"crank.mass": [-1.0, 1.0], "crank.inertia[2]": [0.016, 9.0]}, 0.05, **FIXED)
     assert found.status.values.tolist() == [[2, 2], [1, 2]]
@@ -91,6 +92,7 @@ def pushed(torque, law):
     return scene
 
 
+@pytest.mark.slow
 def test_laws_of_members_are_their_own():
     scene = partial(pushed, law=lambda torque: lambda t: torque * gauss.math.cos(t))
     found = gauss.sweep(scene, {"torque": [0.0, 1.0, -1.0]}, 0.05, **FIXED)
@@ -153,6 +155,7 @@ def stops(values):
     return scene
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_goes_on_from_its_folder(tmp_path, small_pieces):
     path, masses = tmp_path / "sweep.zarr", {"mass": np.linspace(1.0, 2.0, 8)}
     values = {"until": 1.6, "made": []}
@@ -170,6 +173,7 @@ def test_an_interrupted_sweep_goes_on_from_its_folder(tmp_path, small_pieces):
             gauss.sweep(**given)
 
 
+@pytest.mark.slow
 def test_a_folder_is_read_without_gauss_and_says_what_it_holds(tmp_path):
     path, scene = tmp_path / "sweep.zarr", gauss.load("double_pendulum")
     body = next(iter(scene.bodies))

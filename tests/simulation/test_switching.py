@@ -16,6 +16,8 @@ from gauss import cli
 from gauss import math as gm
 from tests.support.switching import ROOT_PI, STEPS, Counting, bell, between, moved, slider, verdict
 
+pytestmark = pytest.mark.slow
+
 
 def nested(t):
     if t < 5:
@@ -98,7 +100,6 @@ def rhythm() -> float:
     return float(4 * np.trapezoid(np.exp(-((np.sin(np.pi * s / 5) / 0.01) ** 2)), s))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", OF_TIME)
 def test_laws_of_time_are_right_in_every_call(systems, name):
     _, duration, rate, place = OF_TIME[name]
@@ -140,7 +141,6 @@ PROFILES = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", PROFILES)
 def test_profiles_from_the_command_line(tmp_path, name):
     profile, expected = PROFILES[name]

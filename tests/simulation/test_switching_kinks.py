@@ -13,6 +13,8 @@ import gauss
 from gauss import math as gm
 from tests.support.switching import slider
 
+pytestmark = pytest.mark.slow
+
 STARTS = 300
 DURATION = 14.0  # three periods: six kinks in each motion
 STIFFER = 2.0  # angular frequency at x > 0, of x¨ = −x − 3 max(x, 0)

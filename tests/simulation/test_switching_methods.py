@@ -107,6 +107,7 @@ def test_what_is_verified_is_not_stepped_over(pulses):
 # Many motions, and motions in phases.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pulse", "bell"])
 @pytest.mark.parametrize(
     "options", [{"integrator": "dop853", "times": [20.0]}, {"steps": 2000, "step": 0.01, "every": 2000}]
@@ -120,6 +121,7 @@ def test_batches(pulses, kind, options):
         assert found == ("warned" if kind == "bell" and "steps" in options else "right")
 
 
+@pytest.mark.slow
 def test_sweeps():
     """Of masses; each motion is its own."""
     with warnings.catch_warnings():

@@ -70,6 +70,7 @@ def test_a_controller_that_saturates_and_one_with_a_dead_zone():
     )
 
 
+@pytest.mark.slow
 def test_friction_by_the_sign_of_a_rate_ends_in_words():
     for law in (
         lambda t, m: -2.0 * gm.sign(m.rate("x")),
@@ -112,6 +113,7 @@ NARROW = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", NARROW)
 def test_narrow_quotients_are_never_flown_past(shape):
     """The place varies, for samples may lie on the peak by chance; half of v² is the work, by quadrature."""
@@ -125,6 +127,7 @@ def test_narrow_quotients_are_never_flown_past(shape):
         assert motion.v[-1, 0] == pytest.approx(np.sqrt(9.0 + 2.0 * work), rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", NARROW)
 @pytest.mark.parametrize("backend", ["auto", "recursion"])
 def test_fixed_steps_over_a_narrow_peak_are_warned_of(shape, backend):
@@ -138,6 +141,7 @@ def test_fixed_steps_over_a_narrow_peak_are_warned_of(shape, backend):
             assert any(issubclass(each.category, SwitchingWarning) for each in caught) == warned
 
 
+@pytest.mark.slow
 def test_steps_that_resolve_a_peak_are_not_warned_of():
     for shape in NARROW.values():
         scene = slider(lambda t, m, shape=shape: 10.0 * shape((m.coordinate("x") - 3.7) / 0.05), rate=1.0)
@@ -158,6 +162,7 @@ BUMPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.002, 0.02])
 @pytest.mark.parametrize("bump", BUMPS)
 @pytest.mark.parametrize("integrator", ["dop853", "radau5"])
@@ -211,6 +216,7 @@ def _delay(width=0.002, height=0.05):
     return quad(lambda u: width * (np.sqrt(1.0 + 0.5 * slope(u) ** 2) - 1.0), -9.0, 9.0, points=[-1, 0, 1], limit=500)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "taylor"])
 @pytest.mark.parametrize("way", WAYS)
 def test_bumps_are_met_however_a_function_of_the_user_leads(way, integrator):
@@ -220,6 +226,7 @@ def test_bumps_are_met_however_a_function_of_the_user_leads(way, integrator):
     assert motion.q[-1, 0] == pytest.approx(20.0 - _delay(), abs=DELAYS)
 
 
+@pytest.mark.slow
 def test_bumps_are_met_in_sweeps():
     """The delay does not depend on the mass."""
 
@@ -233,6 +240,7 @@ def test_bumps_are_met_in_sweeps():
         assert found.q[:, -1, 0].to_numpy() == pytest.approx(20.0 - _delay(), abs=DELAYS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "taylor"])
 def test_transmissions_with_a_ratio_at_one_place_turn_there(integrator):
     """ẏ = f(x) ẋ: y is the integral of the ratio."""
@@ -242,6 +250,7 @@ def test_transmissions_with_a_ratio_at_one_place_turn_there(integrator):
     assert motion.q[-1, 1] == pytest.approx(0.05 * 0.002 * ROOT_PI, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_bumps_are_met_while_a_gap_of_the_user_is_closed():
     """Energy ½ (1 + f′²/2) ẋ² + P f is kept; the force P holds the slide on the bump."""
     press, width, height = 1e5, 5e-3, 1e-6
@@ -258,6 +267,7 @@ def test_bumps_are_met_while_a_gap_of_the_user_is_closed():
     assert motion.q[-1, 0] == pytest.approx(20.0 - delay, abs=DELAYS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["cvode_bdf", "scipy_lsoda"])
 def test_opaque_laws_of_places_that_other_libraries_pass_over_are_warned_of(integrator):
     system = gauss.compile_scene(beside(lambda t, m: math.exp(-(((float(m.coordinate("x")) - 7.31) / 0.005) ** 2))))

@@ -11,6 +11,8 @@ from gauss.scene.contact_patch import solid_of
 from gauss.scene.patch_distances import axes_of
 from tests.support.terrain import in_coal
 
+pytestmark = pytest.mark.slow
+
 STEP, G, FRICTION, RADIUS = 1e-3, 9.81, 0.4, 0.1
 AS_ON_A_PLANE = 1e-8  # relative: nothing catches on the edges of triangles of one plane
 PENETRATION = 2e-5  # [m] of bodies that hop over edges at 2 m/s: of the order of (G h²), and of the turn within a step
@@ -33,7 +35,6 @@ def flat(scene):
     scene.height_field("land", "ground", np.zeros((11, 31)), (3.0, 1.0), rotation=(0, 0, 0.3))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_a_level_field_is_a_plane(kind):
     ends = []
@@ -48,7 +49,6 @@ def test_a_level_field_is_a_plane(kind):
     assert ends[0].v[-1] == pytest.approx(ends[1].v[-1], abs=AS_ON_A_PLANE / STEP)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True])
 def test_feet_are_balls_at_their_points(turned):
     places, ends = np.array([(0.2, 0.1, -0.2), (0.2, -0.1, -0.2), (-0.2, 0.0, -0.2)]), []
@@ -72,6 +72,7 @@ def test_feet_are_balls_at_their_points(turned):
     assert np.count_nonzero(ends[0][1]) >= 2
 
 
+@pytest.mark.slow
 def test_a_ball_in_a_valley_presses_on_both_sides():
     slope, scene = 0.5, gauss.Scene("valley")
     x = np.linspace(-1, 1, 5)
@@ -86,7 +87,6 @@ def test_a_ball_in_a_valley_presses_on_both_sides():
     assert pressed == pytest.approx([0.5 * G * np.hypot(1.0, slope)] * 2, rel=1e-8)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_bodies_stay_above_hills(kind):
     rng, scene = np.random.default_rng(6), gauss.Scene("hills")

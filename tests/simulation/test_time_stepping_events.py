@@ -31,6 +31,7 @@ def listed(motion: gauss.Trajectory) -> list[tuple]:
     return sorted((event.t, event.kind, event.gaps) for event in motion.events)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_all_routes_find_the_same_events(name):
     make, end, step, kinds = SCENES[name]
@@ -43,6 +44,7 @@ def test_all_routes_find_the_same_events(name):
         assert losses[0] == pytest.approx(losses[1], rel=SAME_LOSS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plan", [WRITTEN_OUT, PYTHON])
 @pytest.mark.parametrize("times", [[0.7], [0.1, 0.20234, 0.4041]], ids=["end", "beside the steps"])
 def test_events_do_not_depend_on_the_samples(plan, times):
@@ -59,6 +61,7 @@ def test_impacts_lose_the_energy_of_their_closed_form():
     assert [event.loss for event in impacts] == pytest.approx(9.81 * 0.2 * 0.75 * 0.25 ** np.arange(2), rel=0.02)
 
 
+@pytest.mark.slow
 def test_opaque_laws_and_held_inputs_have_the_events_of_traced_ones():
     found = {}
     for law in (lambda t: [3.0 * t, 0.0, 0.0], lambda t: [3.0 * float(t), 0.0, 0.0]):

@@ -60,6 +60,7 @@ def test_certified_and_many_motions_take_the_same():
     assert compiled.q[-1] == pytest.approx(certified.q[-1], abs=1e-12) == many.q[1, -1]
 
 
+@pytest.mark.slow
 def test_it_is_kept_with_the_motion_and_verified():
     atol = {"angle": 1e-7}
     motion = gauss.simulate(mechanisms.rods(2), 0.5, rtol=1e-9, atol=atol, verify=True)
@@ -88,6 +89,7 @@ ROUND_OFF_START = 1e-15  # coordinates at rest that are zero but for round-off: 
 ROUND_OFF_REACHED = 1e-9  # of two motions whose steps differ
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["pendulum", "four_bar"])
 @pytest.mark.parametrize("run", ["simulate", "rollout"])
 def test_a_rest_that_is_zero_but_for_round_off_moves_as_from_zero(name, run):
@@ -105,6 +107,7 @@ def test_a_rest_that_is_zero_but_for_round_off_moves_as_from_zero(name, run):
     assert end(zero.q + ROUND_OFF_START) == pytest.approx(end(zero.q), abs=ROUND_OFF_REACHED)
 
 
+@pytest.mark.slow
 def test_a_phase_begins_at_rest_in_every_run_of_a_system():
     scene = gauss.load("four_bar")
     scene.starts.clear()

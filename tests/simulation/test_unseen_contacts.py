@@ -1,6 +1,7 @@
 """Shapes that fixed steps carry through one another: where no step sees their contact, a warning names them."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,21 +20,70 @@ PASSING = 3.3  # of the speed at which a step is as long as both are thick: no s
 STOPPED = 0.0  # m: lowest place of a ball that does not pass
 
 
-def thrown(wall: str, friction: float, speed: float):
-    """Motion of a ball that is thrown at a wall, without gravity."""
+def thrown(wall: str, friction: float, speed: float) -> gauss.Scene:
+    """Ball that is thrown at a wall, without gravity."""
     scene = gauss.Scene("thrown", gravity=(0.0, 0.0, 0.0))
     free_body(scene, "A", 0.1, (0.0, 0.0, 5.0), rate=(0.0, 0.0, -speed, 0.0, 0.0, 0.0))
     scene.sphere("ball", "A", RADIUS)
     WALLS[wall](scene)
     scene.contact("touch", "ball", "wall", friction=friction)
-    return gauss.simulate(scene, 50.0 / speed, integrator="time_stepping", step=STEP, progress=False)
+    return scene
 
 
+def simulated(scene, steps):
+    """Last height of the ball by :func:`gauss.simulate`."""
+    return gauss.simulate(scene, steps * STEP, integrator="time_stepping", step=STEP, progress=False).q[-1][2]
+
+
+def rolled_out(scene, steps):
+    """By a rollout of two motions, of which one is at rest."""
+    system = gauss.compile_scene(scene)
+    start = system.initial_state()
+    rates = np.array([np.zeros(6), start.v])
+    made = gauss.rollout(system, np.array([start.q] * 2), rates, integrator="time_stepping", steps=steps, step=STEP)
+    return made.q[1, -1, 2]
+
+
+def stepped(scene, steps):
+    """By a simulator, step by step."""
+    simulator = gauss.Simulator(scene, STEP)
+    for _ in range(steps):
+        simulator.step()
+    return simulator.state.q[2]
+
+
+def stepped_at_once(scene, steps):
+    """By a simulator in one call."""
+    simulator = gauss.Simulator(scene, STEP)
+    simulator.step(n=steps)
+    return simulator.state.q[2]
+
+
+def stepped_together(scene, steps):
+    """By a batch of simulators."""
+    many = gauss.SimulatorBatch(scene, STEP, 3)
+    many.step(n=steps)
+    return many.q[1, 2]
+
+
+WAYS = [simulated, rolled_out, stepped, stepped_at_once, stepped_together]
+
+
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("wall", WALLS)
-def test_shapes_that_move_by_their_thickness_in_a_step_are_warned_of(wall, friction):
+def test_shapes_that_move_by_their_thickness_in_a_step_are_warned_of(wall, friction, way):
+    speed, steps = PASSING * (THICK + 2 * RADIUS) / STEP, 9
     with pytest.warns(ContactLawWarning, match="'ball' and 'wall'|'wall' and 'ball'"):
-        assert thrown(wall, friction, PASSING * (THICK + 2 * RADIUS) / STEP).q[-1][2] < STOPPED
+        assert way(thrown(wall, friction, speed), steps) < STOPPED
     with warnings.catch_warnings():
         warnings.simplefilter("error", ContactLawWarning)
-        assert thrown(wall, friction, 0.5 * (THICK + 2 * RADIUS) / STEP).q[-1][2] > STOPPED
+        assert way(thrown(wall, friction, 0.15 * speed), 7 * steps) > STOPPED
+
+
+@pytest.mark.parametrize("way", [stepped, stepped_at_once, stepped_together])
+def test_shapes_that_become_fast_are_warned_of(way):
+    fall = PASSING * (THICK + 2 * RADIUS) / STEP**2
+    scene = replace(thrown("box", 0.0, 0.0), gravity=(0.0, 0.0, -fall))
+    with pytest.warns(ContactLawWarning, match="'ball' and 'wall'|'wall' and 'ball'"):
+        assert way(scene, 3) < STOPPED

@@ -76,6 +76,7 @@ SIZES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SIZES)
 def test_no_more_is_modelled_than_a_scene_needs(name):
     parts = gauss.compile_scene(SCENES[name]()).subsystems

@@ -48,6 +48,7 @@ def test_a_system_is_the_same_after_a_journey(name):
         np.testing.assert_array_equal(one.velocity(body), two.velocity(body))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coordinates", ["tree", "maximal"])
 def test_coordinates_are_kept(coordinates):
     system = gauss.compile_scene(gauss.load("spatial_tree"), coordinates)
@@ -65,6 +66,7 @@ def test_machine_code_stays_behind_and_is_made_again():
     np.testing.assert_array_equal(after.q, before.q)
 
 
+@pytest.mark.slow
 def test_a_trajectory_is_the_same_after_a_journey():
     motion = gauss.simulate(gauss.load("four_bar"), 0.1, progress=False)
     other = _again(motion)
@@ -97,6 +99,7 @@ FUNCTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FUNCTIONS)
 def test_functions_of_a_state_are_made_again(kind):
     system = gauss.compile_scene(gauss.load("four_bar"))
@@ -106,6 +109,7 @@ def test_functions_of_a_state_are_made_again(kind):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_simulators_and_prepared_motions_go_on_where_they_were():
     scene = gauss.load("cart_pole")
     scene.input("push", "rail", limits=10.0)

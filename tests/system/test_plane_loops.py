@@ -25,6 +25,7 @@ def assert_exact(scene, freedoms):
     return system
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("root", ["free", "fixed"])
 def test_four_bars_in_space_take_two_rows_each(root):
     system = assert_exact(gauss.load("four_bar_branch", n=2, root=root), 2 + 6 * (root == "free"))
@@ -38,6 +39,7 @@ def test_a_loop_that_leaves_its_plane_keeps_its_rows():
     assert rows(gauss.compile_scene(scene)) == 2 + 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options, count", [({}, 2), ({"belt": True}, 1), ({"depth": 3, "rung": 3}, 2)])
 def test_parallel_chains(options, count):
     options = {"depth": 5, "rung": 2} | options
@@ -46,6 +48,7 @@ def test_parallel_chains(options, count):
     assert rows(system) == count and bool(system.scene.relations) == belt
 
 
+@pytest.mark.slow
 def test_rotors_take_no_rows():
     assert rows(assert_exact(gauss.load("rotor_branch", n=3), 9)) == 0
 
@@ -74,6 +77,7 @@ def hand(tie) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tie",
     [

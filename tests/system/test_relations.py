@@ -226,6 +226,7 @@ def test_a_belt_keeps_the_ratio_of_its_pulleys(crossed):
     )
 
 
+@pytest.mark.slow
 def test_a_cam_lifts_its_follower():
     """A follower on a periodic spline, over two turns: its acceleration and the torque that the cam takes."""
     scene = gauss.Scene("cam", gravity=(0, 0, -9.81))
@@ -281,6 +282,7 @@ def test_a_rolling_disk_keeps_its_energy_and_does_not_slip():
         assert abs(relation.positions(motion)[0]) <= 1e-12
 
 
+@pytest.mark.slow
 def test_a_disk_that_rolls_steadily_in_a_circle():
     """Lean θ from the vertical, precession Ω about it, spin ω about the own axis: all stay constant if
 

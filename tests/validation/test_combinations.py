@@ -183,6 +183,7 @@ def test_what_cannot_move_stays_in_every_method(integrator):
     assert gauss.simulate(welded(), 0.1, integrator=integrator, step=0.05, times=[0.02, 0.1]).t.tolist() == [0.02, 0.1]
 
 
+@pytest.mark.slow
 def test_what_cannot_move_answers_everywhere():
     system = gauss.compile_scene(welded())
     state, none = system.initial_state(), np.zeros(0)

@@ -7,6 +7,8 @@ from scipy.integrate import solve_ivp
 import gauss
 from benchmarks.free_bodies import EDGE, dominoes, free_body, stack
 
+pytestmark = pytest.mark.slow
+
 G = 9.81
 FIRST_ORDER = 3.0  # of errors over steps, relative: time stepping is of first order at impacts
 DRIFT = 1e-9  # [m] of a stack in ten seconds

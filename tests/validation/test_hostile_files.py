@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss.errors import FileError, GaussError
+from tests.support.files import quietly
 
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 WHOLE = {
@@ -140,6 +141,18 @@ def test_hostile_files_are_refused_whatever_the_format(tmp_path, ending, what):
     path.write_bytes(content(ROOTS[ending]))
     with pytest.raises(FileError, match=words):
         gauss.load(path)
+
+
+@pytest.mark.parametrize("depth, opened", [(496, True), (497, False)])
+def test_files_of_mujoco_are_as_deep_as_its_own_parser_takes(tmp_path, depth, opened):
+    path = tmp_path / "model.xml"
+    body = '<body><joint/><geom size="0.1"/></body>'
+    path.write_text(f"<mujoco><worldbody>{'<frame>' * (depth - 1)}{body}{'</frame>' * (depth - 1)}</worldbody></mujoco>")
+    if opened:
+        assert len(quietly(path).bodies) == 1
+    else:
+        with pytest.raises(FileError, match="nested more than"):
+            gauss.load(path)
 
 
 @pytest.mark.parametrize("named", ["/etc/passwd", "file:///etc/passwd", "../../../etc/passwd", "package://../../etc/passwd"])

@@ -301,6 +301,7 @@ def _nan(compulsion):
     return replace(answer, a=answer.a * np.nan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", MALFORMED)
 def test_whatever_a_backend_returns_or_raises_becomes_a_status(cases, kind):
     said, words = MALFORMED[kind]
@@ -386,6 +387,7 @@ def writing(given):
     raise RuntimeError("done")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", [Telling(writing), *(Programmed(Solving(writing), form) for form in FORMS)])
 @pytest.mark.parametrize("scene", ["four_bar", "box_on_plane_4"])
 def test_what_a_backend_writes_to_spoils_nothing(scene, backend):

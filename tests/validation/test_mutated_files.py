@@ -77,6 +77,7 @@ def _changed(root, element, key: str | None, form: str) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
+@pytest.mark.slow
 @SOME
 @given(name=st.sampled_from(ROBOTS), data=st.data())
 def test_numbers_of_robots(tmp_path, name, data):
@@ -97,6 +98,7 @@ def test_numbers_of_robots(tmp_path, name, data):
     _refused(tmp_path, ".urdf", _changed(root, element, key, OTHER[form]), place, root="free", **READ)
 
 
+@pytest.mark.slow
 @SOME
 @given(data=st.data())
 def test_numbers_of_a_model_in_sdformat(tmp_path, data):

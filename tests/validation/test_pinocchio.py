@@ -29,6 +29,8 @@ from gauss.scene import PAIRS
 from gauss.system import random_state
 from tests.support import mechanisms
 
+pytestmark = pytest.mark.slow
+
 STATES = 100
 BACKENDS = ("recursion", "kkt", "schur", "nullspace", "sparse")
 ACCELERATION = 1e-12  # relative: rounding of both sides
@@ -104,7 +106,6 @@ def check_reactions(system, multipliers, forces, moments):
         assert relative(row[:3], moment, SHORT * np.linalg.norm(force)) <= REACTION, joint.name
 
 
-@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robots(name):
@@ -128,14 +129,12 @@ def test_robots_as_pinocchio_reads_them(name):
         assert relative(qdd, articulated_accelerations(now)[order]) <= ACCELERATION
 
 
-@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("size", SIZES)
 def test_random_trees(size):
     check(gauss.compile_scene(random_tree(size, seed=size)), articulated_accelerations)
 
 
-@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="needs an extended precision that this machine lacks")
 @pytest.mark.parametrize("kinds", [("ball", "revolute"), ("free", "revolute"), tuple(PAIRS)], ids="-".join)
@@ -194,7 +193,6 @@ def extended_accelerations(system, state, load) -> np.ndarray:
     return answer[1]
 
 
-@pytest.mark.slow
 @pytest.mark.peer
 @pytest.mark.parametrize("size", [3, 40])
 def test_null_space_and_energies(size):
@@ -257,7 +255,6 @@ def swappable(kind: str, swapped: bool) -> gauss.Scene:
     return scene
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAIRS)
 def test_swapped_joint(kind):
     """Parent and child swapped: the same accelerations of all bodies, the opposite reaction at the swapped joint."""

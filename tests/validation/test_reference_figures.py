@@ -12,6 +12,7 @@ PUBLISHED = 1e-5  # rad/s, of rates of 1000: the crank's angle is published to 1
 ROUNDING = 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, n, until", [("double-pendulum", 2, 3.0), ("chain-10", 10, 0.25)])
 def test_rates_of_hanging_rods(name, n, until):
     """Until the last link of the chain whips, where every digit is lost."""

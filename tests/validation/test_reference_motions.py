@@ -9,6 +9,8 @@ from gauss.bench.atlas.motions import at_equal_slider_crank, before_flat
 from gauss.system import retract
 from tests.support import mechanisms
 
+pytestmark = pytest.mark.slow
+
 DRIFT = 1e-8  # J: with the settings that a user gets without asking; as a rule 3e-10
 BRANCH = 1e-8  # rad: beside the motion in which all cranks stay parallel
 PASSED = 1e-9  # m, rad, and of the largest energy, after twenty passages
@@ -27,7 +29,6 @@ CLOCKS = {
 TIGHT = {"rtol": 1e-15, "atol": 1e-15}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 10])
 def test_ladder_through_flat_configurations(n):
     """10 s through every configuration in which n freedoms meet, on the right branch."""
@@ -38,7 +39,6 @@ def test_ladder_through_flat_configurations(n):
     assert np.abs(gauss.energy(motion).balance).max() <= DRIFT
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("n, count", [(1, 25), (10, 8)])
 def test_ladders_keep_their_energy_from_any_start(n, count):
     """No stage of a step falls near a flat configuration, wherever a motion begins; by chance one in a hundred would."""
@@ -52,7 +52,6 @@ def test_ladders_keep_their_energy_from_any_start(n, count):
     assert max(drifts) <= DRIFT
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["parallelogram", "four_bar", "bricard"])
 def test_linkages_keep_their_energy_from_any_start(name):
     system, rng = gauss.compile_scene(gauss.load(name)), np.random.default_rng(1)
@@ -64,7 +63,6 @@ def test_linkages_keep_their_energy_from_any_start(name):
         assert np.abs(found.balance).max() <= PASSED * found.scale
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "taylor", "rk4"])
 @pytest.mark.parametrize("name", ["slider-crank", "ladder of 2"])
 def test_singular_points_are_passed_for_twenty_seconds(name, integrator):
@@ -88,7 +86,6 @@ def test_singular_points_are_passed_for_twenty_seconds(name, integrator):
     assert np.abs(found.balance).max() <= PASSED * found.scale
 
 
-@pytest.mark.slow
 def test_andrews_squeezer():
     """Start accelerations, the motion to 12 digits, and the end values that were published."""
     data = mechanisms.reference("andrews-squeezer")
@@ -106,7 +103,6 @@ def test_andrews_squeezer():
     assert np.abs(v[-1] - table["v"][-1]).max() <= 1e-8  # rates of 1000 rad/s
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOCKS)
 def test_pendulum_over_many_periods(name):
     """Whittaker, Analytical Dynamics, §44, in 40 digits; g and the times are taken as the doubles that they are."""
@@ -127,7 +123,6 @@ def test_pendulum_over_many_periods(name):
     assert motion.rate("A") == pytest.approx(np.array(rates, float), abs=allowed)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CLOCKS)
 def test_free_body_over_many_periods(name):
     """Jacobi functions, cn, sn, dn, in 40 digits: Landau, Lifshitz, Mechanics, §37."""
@@ -163,7 +158,6 @@ def test_steady_top_over_many_periods(integrator):
     assert np.arccos(motion.body("top").com[:, 2] / p["l"]) == pytest.approx(theta, abs=LONG)
 
 
-@pytest.mark.slow
 def test_redundant_rows_do_not_blunt_the_step_control():
     """Bricard's linkage has a row too many at all times: that is no configuration in which rows fade."""
     system, run = gauss.compile_scene(gauss.load("bricard")), {"times": [2.0], "rtol": 1e-13, "atol": 1e-13}
@@ -177,7 +171,6 @@ def test_slider_of_the_governor_stays_on_its_shaft():
     assert np.abs(place[:, :2]).max() <= 1e-12 < np.abs(place[:, 2] + 0.5).min()  # of the order of centimetres
 
 
-@pytest.mark.slow
 def test_bricard_swings_as_the_library_draws_it():
     """P3 leads from one side of a cube to the other and back in 5 s; half way it is lifted as the hinges allow."""
     t = np.linspace(0.0, 5.1, 2041)

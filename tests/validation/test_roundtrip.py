@@ -56,6 +56,7 @@ def public(request):
     return name, root, scene
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 def test_robots_in_pinocchio(public):
     name, root, scene = public

@@ -193,12 +193,14 @@ def test_a_mass_of_atoms_just_above_a_floor_falls():
     assert motion.events[0].t == pytest.approx(np.sqrt(2 * 9e-10 / 9.81), rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("L", FACTORS)
 def test_starts_inside_of_a_floor_are_refused_by_their_share(L):
     with pytest.raises(GaussError, match="inside of 'floor'"):
         gauss.simulate(_dropped(L, height=-1e-3), 0.1, progress=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "free_body"])
 def test_accelerations_are_the_same_in_any_units(name):
     scene, units = gauss.load(name), Units(1e9, 1e-9, 1e9)

@@ -45,6 +45,7 @@ def _leaning(units: Units) -> servo.Tracking:
     return servo.simulate(held, 0.5 * units.time, times=np.array([0.25, 0.5]) * units.time, progress=False)
 
 
+@pytest.mark.slow
 @few
 @given(units=UNITS)
 def test_a_servo_holds_its_relations_the_same_in_any_units(units):
@@ -115,6 +116,7 @@ def _in_lengths(linkage: Linkage, L: float) -> Linkage:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "slider_crank", "class_three"])
 @pytest.mark.parametrize("L", [1e-9, 1e9])
 def test_linkages_move_the_same_in_any_lengths(name, L):

@@ -6,6 +6,8 @@ import pytest
 import gauss
 from gauss.rotations import from_rpy
 
+pytestmark = pytest.mark.slow
+
 ROUNDING = 1e-9  # relative, of a few steps; forces of joints come from certified multipliers
 AT_REST = 1e-6  # of a contact problem, relative
 STEP, STEPS, G = 1e-3, 40, 9.81

@@ -23,6 +23,7 @@ def motion():
     return gauss.simulate(gauss.load("four_bar"), 0.3, times=np.linspace(0, 0.3, 16))
 
 
+@pytest.mark.slow
 def test_a_film_shows_the_motion(motion, tmp_path):
     with Image.open(export_film(motion, tmp_path / "film.gif", frames=10, size=SIZE)) as film:
         assert film.n_frames == 4 and film.size == SIZE and film.info["duration"] == 100 and film.info["loop"] == 0
@@ -30,6 +31,7 @@ def test_a_film_shows_the_motion(motion, tmp_path):
     assert all(np.abs(one - two).max() > 50 for one, two in zip(pictures, pictures[1:], strict=False))
 
 
+@pytest.mark.slow
 def test_bodies_are_drawn_where_they_are(motion):
     painter = Painter(shown(motion, 10, traces=[]), 640, 480)
     for k in (0, 2):
@@ -85,6 +87,7 @@ def test_a_trace_of_nothing_is_refused(motion, tmp_path):
         export_film(motion, tmp_path / "film.gif", traces=["cranc"])
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_a_page_that_needs_no_server(motion):
     found = page(motion, frames=5)
     shown_there = found._repr_html_()
@@ -116,6 +119,7 @@ OF_A_SCENE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", OF_A_SCENE)
 def test_the_command_line_writes_films(tmp_path, scene):
     from typer.testing import CliRunner

@@ -140,6 +140,7 @@ def test_the_outline_of_a_platform_does_not_cross_itself():
     assert len(lines(points)) == len(points) == 6
 
 
+@pytest.mark.slow
 def test_the_stroboscope_shows_the_last_position_in_full(motions):
     motion = motions["four_bar"]
     axes = view.plot_stroboscope(motion, flashes=5).axes[0]
@@ -159,6 +160,7 @@ def test_a_plane_is_two_axes(motions, plane):
 HERMITE = 1e-6  # rad: h⁴ q⁗ / 384 of the finer one's steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["double_pendulum", "double_pendulum_stops", "heavy_top"])
 def test_differences_between_samples_are_those_of_the_motions(name):
     scene = gauss.load(name)
@@ -174,6 +176,7 @@ def test_differences_between_samples_are_those_of_the_motions(name):
         assert line.get_ydata() == pytest.approx(abs(found - exact[places]), abs=HERMITE)
 
 
+@pytest.mark.slow
 def test_a_comparison_shows_the_difference_from_the_first_motion(tmp_path):
     scene = gauss.load("pendulum")
     one, two = (

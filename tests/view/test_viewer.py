@@ -55,6 +55,7 @@ def test_the_stage_shows_the_motion(viewer):
         assert along == pytest.approx(force / np.linalg.norm(force), abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("others", [0, 1])
 @pytest.mark.parametrize("width, height, right, lower", [(1280, 800, 330, 0), (390, 844, 0, 506)])  # of the controls
@@ -74,6 +75,7 @@ def test_cameras_show_the_motions_beside_the_controls(motion, others, camera, wi
     assert lower - height / 2 < y.min() and y.max() < height / 2
 
 
+@pytest.mark.slow
 def test_the_viewer_is_seen_by_this_machine_only(viewer):
     assert viewer.url.startswith(f"http://{LOOPBACK}:")
     with pytest.raises(FileError, match="is taken"):
@@ -99,6 +101,7 @@ def test_steps_pause_and_move_by_a_picture(viewer):
         assert player.now == player.times[expected] and not player.playing
 
 
+@pytest.mark.slow
 def test_two_motions_stand_side_by_side_at_the_same_time(motion):
     longer = gauss.simulate(gauss.load("double_pendulum"), 0.8)
     with_two = show(motion, beside=longer, port=_free_port())
@@ -143,6 +146,7 @@ def test_sliders_show_angles_within_a_turn_in_steps_of_theirs():
         posed.close()
 
 
+@pytest.mark.slow
 def test_a_spring_pulls_a_point_to_the_pointer():
     scene = gauss.Scene("puck", gravity=(0, 0, 0))
     scene.free("F", "ground", scene.body("puck", mass=2.0, inertia=(0.1, 0.1, 0.1)))
@@ -160,6 +164,7 @@ def test_a_spring_pulls_a_point_to_the_pointer():
         posed.close()
 
 
+@pytest.mark.slow
 def test_a_page_has_curves_cameras_and_layers_beside_the_scene(motion):
     text = page(motion, joints=["C"], dark=True).html
     panel = text[text.index('<aside id="panel" class="dark">') :]
@@ -172,12 +177,14 @@ def test_a_page_has_curves_cameras_and_layers_beside_the_scene(motion):
         assert label in panel
 
 
+@pytest.mark.slow
 def test_curves_of_two_motions_say_which_side_they_are_of(motion):
     both = page(motion, beside=motion).html
     for label in ("coordinates [rad]", "rates [rad/s]", "energies [J]"):
         assert [both.count(f">{label}{side}<") for side in ("", ", left", ", right")] == [0, 1, 1]
 
 
+@pytest.mark.slow
 def test_meshes_of_both_motions_are_drawn(motion):
     from gauss.io.visuals import Visual
 
@@ -192,6 +199,7 @@ def test_meshes_of_both_motions_are_drawn(motion):
         both.close()
 
 
+@pytest.mark.slow
 def test_pictures_between_samples_lie_on_the_motion():
     coarse = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 11))
     fine = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 41))
@@ -235,6 +243,7 @@ def test_terrain_is_drawn_and_lies_above_the_floor():
     assert len(seen) == 2  # the ball is seen against it
 
 
+@pytest.mark.slow
 def test_meshes_of_a_robot_are_in_place():
     from gauss.io.visuals import read_visuals
 
@@ -253,6 +262,7 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path, path, words):
         export_html(gauss.load("pendulum"), tmp_path / path)
 
 
+@pytest.mark.slow
 def test_a_motion_on_disk_is_the_motion(motion, tmp_path):
     again = gauss.load_motion(gauss.save(motion, tmp_path / "motion.nc"))
     for part in ("t", "q", "v", "work"):
@@ -263,6 +273,7 @@ def test_a_motion_on_disk_is_the_motion(motion, tmp_path):
         gauss.load_motion(tmp_path / "text.nc")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 def test_a_browser_plays_the_file_and_does_not_complain(motion, tmp_path):
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser")
@@ -289,6 +300,7 @@ def test_a_browser_plays_the_file_and_does_not_complain(motion, tmp_path):
     assert [url for url in asked if not re.match(r"(file|data|blob):", url)] == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 def test_a_browser_plays_what_the_server_shows(viewer):
     """The button in the browser starts the clock of the server, which moves the time in the browser."""

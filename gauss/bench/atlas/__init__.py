@@ -5,7 +5,8 @@ from gauss.bench.atlas.contacts import CONTACTS
 from gauss.bench.atlas.instants import INSTANTS
 from gauss.bench.atlas.methods import METHODS
 from gauss.bench.atlas.motions import MOTIONS
+from gauss.bench.atlas.switching_constraints import SWITCHED
 
 __all__ = ["CASES", "METHODS"]
 
-CASES: dict[str, FailureCase] = {case.name: case for case in (*INSTANTS, *CONTACTS, *MOTIONS)}
+CASES: dict[str, FailureCase] = {case.name: case for case in (*INSTANTS, *CONTACTS, *MOTIONS, *SWITCHED)}

@@ -8,7 +8,7 @@ from gauss.codegen.kernels.checked_recursion import CorrectedRecursion, Correcti
 from gauss.codegen.kernels.checked_switch import CheckedSwitch
 from gauss.codegen.kernels.column_pivoting import Pivots
 from gauss.codegen.kernels.compiled_loop import CallingLoop, Loop, address
-from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver, Round
+from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
 from gauss.codegen.kernels.energy_record import (
     ENERGY_RECORD,
@@ -28,6 +28,7 @@ from gauss.codegen.kernels.mechanism_loop import CallingSteps, CompiledSteps
 from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
 from gauss.codegen.kernels.near_pairs import NearPairs
 from gauss.codegen.kernels.newton import Newton
+from gauss.codegen.kernels.newton_rounds import Round
 from gauss.codegen.kernels.row_code import RowCode, RowFunction, SingleRowFunction
 from gauss.codegen.kernels.section_code import RecordedSections, SectionCode
 from gauss.codegen.kernels.step_memory import MemoryLayout

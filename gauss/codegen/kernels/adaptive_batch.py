@@ -107,7 +107,7 @@ class AdaptiveBatchLoop(BatchLoop):
         budget : int
             Steps.
         """
-        self._run.call(queue, lanes, motions, grid, out, budget)
+        self._call(queue, (lanes, motions, grid, out), budget)
 
 
 def write_adaptive_batch(writer: Writer, method: Adaptive, written: slice, width: int) -> ir.Function:

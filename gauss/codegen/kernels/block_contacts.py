@@ -20,7 +20,7 @@ from llvmlite import ir
 from gauss.codegen import INTEGER, POINTER, Function, machine
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 from gauss.codegen.kernels.block_lu import INTEGERS, write_order, write_solve
-from gauss.codegen.kernels.contact_solver import LARGEST_RESIDUAL_SUM, Round, table_of
+from gauss.codegen.kernels.newton_rounds import LARGEST_RESIDUAL_SUM, Round, write_rounds
 from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH, TwistRows
 
 SIDE = 3 * WIDTH  # doubles of the rows of one contact for one body: normal, two tangents
@@ -67,43 +67,12 @@ class _BlockContactWriter:
         self.tolerance, self.eps = self.result[0], r.variable(0.0)
 
     def write(self) -> ir.Function:
-        r, laws, f = self.r, self.laws, self.f
+        r = self.r
         self._measure()
-        with r.each(self.m * 3) as i:
-            self.best[i] = f[i]
-        least, done, round_, total = r.variable(np.inf), r.variable(0, INTEGER), r.variable(0, INTEGER), r.variable(0.0)
-        columns = zip(Round._fields, zip(*laws.rounds, strict=True), strict=True)
-        sweeps, regularisation, steps = (table_of(r, name, values) for name, values in columns)
-        with r.loop() as leave_if:
-            leave_if((round_[0] >= len(laws.rounds)) | (done[0] > 0))
-            with r.each(self.m * 3) as i:
-                f[i] = self.best[i]
-            self._accumulate()
-            self.eps[0] = regularisation[round_[0]]
-            with r.each(sweeps[round_[0]]):
-                self._sweep()
-            tries = r.variable(0, INTEGER)
-            with r.loop() as leave_round_if:
-                leave_round_if((tries[0] >= steps[round_[0]]) | (done[0] > 0))
-                residual = self._residuals()
-                with r.when(residual < least[0]):
-                    least[0] = residual
-                    with r.each(self.m * 3) as i:
-                        self.best[i] = f[i]
-                with r.when(least[0] <= self.tolerance):
-                    done[0] = 1
-                with r.when(done[0] < 1):
-                    self._newton()
-                    total[0] = total[0] + 1.0
-                tries[0] = tries[0] + 1
-                with r.when(residual >= LARGEST_RESIDUAL_SUM):
-                    tries[0] = steps[round_[0]]
-            round_[0] = round_[0] + 1
-        with r.each(self.m * 3) as i:
-            f[i] = self.best[i]
-        self._accumulate()
+        least, total, rounds = write_rounds(self, "sparse", self.laws.rounds, self.m * 3, lambda: self.tolerance)
+        self.accumulate()
         self.result[0], self.result[1] = least[0], total[0]
-        self.result[2] = r.as_double(round_[0])
+        self.result[2] = r.as_double(rounds[0])
         return r.done()
 
     def _sides(self, c: Value):
@@ -142,7 +111,7 @@ class _BlockContactWriter:
                 for k, value in enumerate(found):
                     self.T[body * WIDTH + k] = self.T[body * WIDTH + k] + value
 
-    def _accumulate(self):
+    def accumulate(self):
         """Velocities T = M⁻¹ Jᵀ f."""
         r, f = self.r, self.f
         with r.each(self.n * WIDTH) as i:
@@ -169,7 +138,7 @@ class _BlockContactWriter:
     def _rates(self, c: Value) -> list[Value]:
         return self._moved(c, self.T, [self.b[c * 3 + q] for q in range(3)])
 
-    def _sweep(self):
+    def sweep(self):
         """One projected Gauss–Seidel sweep over the contacts."""
         r, f, w = self.r, self.f, self.w
         with r.each(self.m) as c:
@@ -185,7 +154,7 @@ class _BlockContactWriter:
             f[i + 1], f[i + 2] = across
             self._push(c, [self.r.number(0.0), *changes])
 
-    def _residuals(self) -> Value:
+    def residuals(self) -> Value:
         """Residuals of the laws and the elimination of each contact; returns the largest residual, as a velocity."""
         r, f, w, eps = self.r, self.f, self.w, self.eps[0]
         largest, total = r.variable(0.0), r.variable(0.0)
@@ -221,7 +190,7 @@ class _BlockContactWriter:
     def _flushed(self, x: Value) -> Value:
         return self.r.choose(self.r.absolute(x) < LEAST_NUMBER, 0.0, x)
 
-    def _newton(self):
+    def newton(self):
         r, f = self.r, self.f
         self._assemble()
         r.call(self.solve, self.n, self.slot, self.order, self.start, self.listed, self.A, self.x)
@@ -231,7 +200,7 @@ class _BlockContactWriter:
             moved = self._moved(c, self.x, zero)
             for q in range(3):
                 f[c * 3 + q] = self._flushed(f[c * 3 + q] - own[9 + q] - _dot([own[q * 3 + k] for k in range(3)], moved))
-        self._accumulate()
+        self.accumulate()
 
     def _assemble(self):
         """Matrix M + Jᵀ K J and right-hand side −Jᵀ g."""

@@ -53,11 +53,7 @@ class Loop:
         ValueError
             If an array is not a contiguous one of doubles.
         """
-        arrays = point, confirmed, grid, out
-        for array in arrays:
-            if (array.dtype is not FLOAT and array.dtype != FLOAT) or not array.flags.c_contiguous:
-                raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
-        self._run.call(ctypes.byref(control), *map(address, arrays), budget)
+        self._run.call(ctypes.byref(control), *_addresses((point, confirmed, grid, out)), budget)
 
     @property
     def entry(self) -> EntryPoint:
@@ -122,9 +118,26 @@ class BatchLoop(machine.CodeCaller):
         self._bind()
 
     def _bind(self):
-        array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(self.control), *[array] * self.arrays, ctypes.c_int64)
+        signature = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * (1 + self.arrays), ctypes.c_int64)
         self._run = self.code.entry(self.name, signature)
+
+    def _call(self, control: Numbers, arrays: Sequence[np.ndarray], last: int):
+        """Call the loop; arrays go by address: Ctrl-C while ctypes converts them would be another error.
+
+        Raises
+        ------
+        ValueError
+            If an array is not a contiguous one of doubles.
+        """
+        self._run.call(ctypes.byref(control), *_addresses(arrays), last)
+
+
+def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
+    """Addresses of contiguous arrays of doubles."""
+    for array in arrays:
+        if (array.dtype is not FLOAT and array.dtype != FLOAT) or not array.flags.c_contiguous:
+            raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
+    return list(map(address, arrays))
 
 
 def address(array: np.ndarray) -> int:

@@ -8,36 +8,16 @@ come last.
 
 import ctypes
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, Writer, constant_array, machine
-from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
+from gauss.codegen import INTEGER, POINTER, Function, Writer, machine
+from gauss.codegen.kernels.arrays import INTEGERS, Routine, Value, subroutine
+from gauss.codegen.kernels.newton_rounds import LARGEST_RESIDUAL_SUM, Round, write_rounds
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
 
 SMALLEST_DIAGONAL = 1e-300  # lower bound of the largest diagonal entry of W, against a division by zero
-LARGEST_RESIDUAL_SUM = 1e300  # sum of the residuals above which they count as infinite
-
-
-class Round(NamedTuple):
-    """Round of Newton steps.
-
-    Attributes
-    ----------
-    sweeps : int
-        Gauss–Seidel sweeps before it.
-    regularisation : float
-        ε, relative to the diagonal of the Delassus matrix: large values change the forces less by a step, and converge
-        linearly where small ones may cycle.
-    steps : int
-        Newton steps.
-    """
-
-    sweeps: int
-    regularisation: float
-    steps: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +64,6 @@ class ContactSolver:
         return _ContactSolverWriter(self, subroutine(module, "solve_contacts", kinds)).write()
 
 
-def table_of(r: Routine, name: str, values: tuple) -> Array:
-    """Constant table of a module."""
-    return Array(r.b, r.b.gep(constant_array(r.module, name, np.array(values)), [INTEGER(0), INTEGER(0)]))
-
-
 def room_of(rows: int) -> int:
     """Numbers of working memory for a contact problem with so many rows."""
     return 7 * rows + rows * rows + space(rows)
@@ -112,38 +87,13 @@ class _ContactSolverWriter:
         scale = r.variable(0.0)
         with r.each(self.n) as i:
             scale[0] = r.maximum(r.absolute(self.b[i]), scale[0])
-            self.best[i] = self.f[i]
         scale[0] = scale[0] + 1.0
-        least, done, round_ = r.variable(np.inf), r.variable(0, INTEGER), r.variable(0, INTEGER)
-        columns = zip(Round._fields, zip(*laws.rounds, strict=True), strict=True)
-        sweeps, regularisation, steps = (table_of(r, f"dense_{name}", values) for name, values in columns)
-        with r.loop() as leave_if:
-            leave_if((round_[0] >= len(laws.rounds)) | (done[0] > 0))
-            with r.each(self.n) as i:
-                self.f[i] = self.best[i]
-            self.eps[0] = regularisation[round_[0]]
-            with r.each(sweeps[round_[0]]):
-                self._sweep()
-            tries = r.variable(0, INTEGER)
-            with r.loop() as leave_round_if:
-                leave_round_if((tries[0] >= steps[round_[0]]) | (done[0] > 0))
-                residual = self._residuals()
-                with r.when(residual < least[0]):
-                    least[0] = residual
-                    with r.each(self.n) as i:
-                        self.best[i] = self.f[i]
-                with r.when(least[0] <= scale[0] * laws.target):
-                    done[0] = 1
-                with r.when(done[0] < 1):
-                    self._newton()
-                tries[0] = tries[0] + 1
-                with r.when(residual >= LARGEST_RESIDUAL_SUM):
-                    tries[0] = steps[round_[0]]
-            round_[0] = round_[0] + 1
-        with r.each(self.n) as i:
-            self.f[i] = self.best[i]
+        least, *_ = write_rounds(self, "dense", laws.rounds, self.n, lambda: scale[0] * laws.target)
         self.residual[0] = r.choose(least[0] <= scale[0] * laws.accepted, least[0], -1.0)
         return r.done()
+
+    def accumulate(self):
+        """Velocities are found where they are needed."""
 
     def _measure(self):
         """Scale of each row: the diagonal of W, equal for both tangential directions, bounded from below."""
@@ -163,7 +113,7 @@ class _ContactSolverWriter:
         """Velocity of a row under the present forces."""
         return self.b[i] + self.r.sum(self.n, lambda j: self.W[i * self.n + j] * self.f[j])
 
-    def _sweep(self):
+    def sweep(self):
         """One projected Gauss–Seidel sweep over contacts and limited elements."""
         r, f, w = self.r, self.f, self.w
         with r.each(self.normals) as i:
@@ -176,7 +126,7 @@ class _ContactSolverWriter:
             i = self.limited_rows + j
             (f[i],) = r.inline(self.laws.project_limited, f[i] - self._rate(i) / w[i], self.limit[j])
 
-    def _residuals(self) -> Value:
+    def residuals(self) -> Value:
         """Evaluate the residuals of the laws (as forces) and the Jacobian; returns the largest residual, as a velocity."""
         r, f, u, w = self.r, self.f, self.u, self.w
         with r.each(self.n) as i:
@@ -221,7 +171,8 @@ class _ContactSolverWriter:
         for i, slope in zip(rows, forces, strict=True):
             self.slope[i * n + row] = self.slope[i * n + row] + slope
 
-    def _newton(self):
+    def newton(self):
+        """One Newton step."""
         r, step = self.r, self.step
         with r.each(self.n) as i:
             step[i] = -self.error[i]

@@ -97,7 +97,7 @@ class FixedStepBatchLoop(BatchLoop):
         inputs : ndarray, shape (motions, changes, n_u)
             Inputs of each motion, of a loop that has some; those of the last one serve the columns beyond.
         """
-        self._run.call(span, points, worst, out, *inputs, 0)
+        self._call(span, (points, worst, out, *inputs), 0)
 
 
 def write_fixed_step_batch(

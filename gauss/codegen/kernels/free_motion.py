@@ -2,7 +2,7 @@
 
     H = N (Nᵀ M N)⁻¹ Nᵀ = Z Zᵀ,   Z = N C⁻ᵀ
 
-with the Cholesky factor C of Nᵀ M N; N are the rates of independent coordinates, by couplings with one entry in each row.
+with the Cholesky factor C of Nᵀ M N; N are the rates of independent coordinates, given by its entries alone.
 """
 
 from gauss.codegen.kernels.arrays import Array, Value
@@ -61,15 +61,15 @@ class FreeMotion:
             self.at.copy(self.at["results"], self.at["out"].after(n_v), 3)
 
     def _factor(self):
-        """Cholesky factor C of Nᵀ M N, and Z = N C⁻ᵀ; each row of N has one entry."""
+        """Cholesky factor C of Nᵀ M N, and Z = N C⁻ᵀ."""
         r, n = self.r, self.at.n
         value, C, E, Z, M = (self.at[name] for name in ("value", "C", "E", "Z", "flat:M"))
-        k, n_v, column = n["r"], n["n_v"], self.at.table("column")
+        k, n_v, links, row, column = n["r"], n["n_v"], n["links"], self.at.table("row"), self.at.table("column")
         with r.each(k * k) as i:
             C[i], E[i] = 0.0, 0.0
-        with r.each(n_v) as i, r.each(n_v) as j:
+        with r.each(links) as i, r.each(links) as j:
             at = column[i] * k + column[j]
-            C[at] = C[at] + value[i] * value[j] * M[i * n_v + j]
+            C[at] = C[at] + value[i] * value[j] * M[row[i] * n_v + row[j]]
         with r.each(k) as j:
             with r.each(j) as p:
                 C[j * k + j] = C[j * k + j] - C[j * k + p] * C[j * k + p]
@@ -83,8 +83,11 @@ class FreeMotion:
             with r.each(j, i) as p:
                 total[0] = total[0] - E[i * k + p] * C[j * k + p]
             E[i * k + j] = total[0] / C[j * k + j]
-        with r.each(n_v) as i, r.each(k) as j:
-            Z[i * k + j] = value[i] * E[column[i] * k + j]
+        with r.each(n_v * k) as i:
+            Z[i] = 0.0
+        with r.each(links) as i, r.each(k) as j:
+            at = row[i] * k + j
+            Z[at] = Z[at] + value[i] * E[column[i] * k + j]
 
     def _accelerate(self, tau: Array):
         """Accelerations a = Z Zᵀ τ."""

@@ -14,14 +14,23 @@ from gauss.codegen import INTEGER, POINTER, Function, machine
 from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value
 from gauss.codegen.kernels.broad_phase import GridWriter
 
-PART = 17  # own rotation (9), centre (3), sizes (4) of a part in its body, radius of the ball around it
-BALL = 16  # place of this radius
+PART = (
+    18  # own rotation (9), centre (3), sizes (4) of a part in its body, radius of the ball around it, address of its record
+)
+BALL, RECORD = 16, 17  # places of the last two; records are those of :mod:`gauss.codegen.kernels.hull_points`
 MOVED = 31  # pose and velocities (24), sizes (4), centre of mass of the body (3)
 DISTANCE_INPUTS = 33  # rotation, centre and sizes of two shapes, length of the scene
+REACH, RECORDS, PATCH, HULL_INPUTS = (
+    33,
+    34,
+    36,
+    37,
+)  # places behind these, for hulls: two records, address of points; their end
+FAR_AWAY, UNKNOWN = 1e300, -1e300  # distances: of a point that a patch has not; of a pair that is left to the other kernel
 ROW_INPUTS = 2 * MOVED + 4  # columns of two shapes, length of the scene, signs
 ROW = 55  # distance, point, rows of both bodies, biases
 FEATURE = 1 + 2 * MOVED  # address of its rows, places of the columns of both shapes
-KIND = 4  # address of the distances, number of features, first feature, whether overlaps may be missed
+KIND = 5  # address of distances, number of features, the first one, whether overlaps may be missed, other distances or 0
 BODY = 3  # body of a part, whether it is a plane, its kind
 KINDS = 16  # of shapes, at most
 NEAR_INTEGERS = "body", "pair", "law", "grid", "kind", "feature", "found", "count"  # arrays by name, in their order
@@ -130,8 +139,11 @@ class _NearPairsWriter:
                 given[16 * side + i] = column[i]
             for i in range(4):
                 given[16 * side + 12 + i] = column[24 + i]
-        given[32], self.count[3] = self.settings[1], p
+            given[RECORDS + side] = self.own[part * PART + RECORD]
+        given[32], given[REACH], given[PATCH], self.count[3] = self.settings[1], self.settings[0], self.settings[3], p
         self._call(kind[0], given, self.gaps)
+        with r.when((kind[4] > 0) & (self.gaps[0] <= UNKNOWN)):
+            self._call(kind[4], given, self.gaps)
         least, features = r.variable(np.inf), kind[1]
         with r.each(features) as f:
             gap = self.gaps[f]

@@ -36,6 +36,7 @@ def write_equations(module: ir.Module) -> ir.Function:
     r.copy(kept, A, n * n)
     r.copy(given, x, n)
     if_singular = r.variable(0, INTEGER)
+    _hold_idle(r, n, A, x)
     _eliminate(r, n, A, x, if_singular)
     with r.when(if_singular[0] > 0):
         r.copy(A, kept, n * n)
@@ -45,6 +46,20 @@ def write_equations(module: ir.Module) -> ir.Function:
         else:
             _shortest(r, n, A, x, given.after(n))
     return r.done()
+
+
+def _hold_idle(r: Routine, n: Value, A: Array, x: Array):
+    """Give unknowns that no equation has, where their own equation is 0 = 0, the least solution: zero.
+
+    So are forces across the plane of a mechanism that moves in a plane, of which others need no least-norm solution.
+    """
+    with r.each(n) as i, r.when(r.absolute(A[i * n + i]) + r.absolute(x[i]) <= 0.0):
+        size = r.sum(n, lambda j: r.absolute(A[i * n + j]) + r.absolute(A[j * n + i]))
+        with r.when(size <= 0.0):
+            largest = r.variable(1.0)
+            with r.each(n * n) as j:
+                largest[0] = r.maximum(r.absolute(A[j]), largest[0])
+            A[i * n + i] = largest[0]
 
 
 def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):

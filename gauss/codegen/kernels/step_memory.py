@@ -14,12 +14,15 @@ from gauss.codegen.kernels.arrays import Array, Routine, Value
 from gauss.codegen.kernels.contact_solver import room_of
 from gauss.codegen.kernels.near_pairs import INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS
 
-SIZES = ("n_q", "n_v", "r", "bodies", "g", "s", "entries", "flat", "parts", "pairs", "capacity", "loops", "input", "laws")
+SIZES = (
+    *("n_q", "n_v", "r", "links", "bodies", "g", "s", "entries", "flat", "parts", "pairs", "capacity", "loops", "input"),
+    "laws",
+)
 ADDRESSES = (
     *("begin", "forces", "move", "entries"),
     *NEAR_INTEGERS,
     *NEAR_NUMBERS,
-    *("known_found", "known_count", "under", "status", "column"),
+    *("known_found", "known_count", "under", "status", "row", "column"),
     *("modes", "next_modes", "closed", "fresh", "counts"),
 )
 TERMS = ("M", "tau", "power", "bodies", "J", "gap", "rate", "K", "bias")  # of the mechanism, in this order
@@ -48,7 +51,7 @@ def slots(n: dict[str, int]) -> dict[str, int]:
         "fixed": n["flat"],
         "flat": n["flat"],
         "reach": n["bodies"],
-        "value": v,
+        "value": n["links"],
         "C": r * r,
         "E": r * r,
         "Z": v * r,

@@ -48,7 +48,7 @@ class MechanismMemory(CompiledStepMemory):
     Parameters
     ----------
     stepper : MechanismStepper
-        The stepper, of a system without loop joints.
+        The stepper, of a tree, with couplings or without.
     """
 
     def __init__(self, stepper):
@@ -59,6 +59,7 @@ class MechanismMemory(CompiledStepMemory):
             "n_q": smooth.n_q,
             "n_v": smooth.n_v,
             "r": N.shape[1],
+            "links": np.count_nonzero(N),
             "bodies": stepper.n + 1,
             "g": len(stepper.rows.others),
             "s": stepper.rows.limit.size,
@@ -79,8 +80,8 @@ class MechanismMemory(CompiledStepMemory):
 
     def _fill(self, N: np.ndarray):
         stepper, at, table, rows = self.stepper, self.at, self.stepper.table, self.stepper.rows
-        column = np.abs(N).argmax(axis=1)
-        at["value"][:] = N[np.arange(len(N)), column]
+        row, column = np.nonzero(N)
+        at["value"][:] = N[row, column]
         at["fixed"][:] = stepper.kernels.layout.flat
         at["reach"][:] = stepper.reach
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
@@ -93,6 +94,7 @@ class MechanismMemory(CompiledStepMemory):
             "known_count": np.zeros(1, dtype=np.int64),
             "under": np.zeros(6 * room + 2 * n["g"] + n["s"] + 1, dtype=np.int64),
             "status": np.zeros(1, dtype=np.int64),
+            "row": row.astype(np.int64),
             "column": column.astype(np.int64),
         }
         time = stepper.system.scale.time

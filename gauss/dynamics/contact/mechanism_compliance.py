@@ -2,15 +2,19 @@
 
     H = M⁻¹ (1 − Gᵀ (G M⁻¹ Gᵀ)⁺ G M⁻¹),   or H = N (Nᵀ M N)⁻¹ Nᵀ with independent rates, v = N ẏ
 
-Rows of loops G may be redundant, hence the pseudo-inverse. The coordinates of couplings alone are made independent.
+Rows of loops G may be redundant, hence the pseudo-inverse. Coordinates with constant sums alone are made independent.
 """
+
+from typing import cast
 
 import numpy as np
 
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms, is_coupled_tree
+from gauss.scene import LinearCoupling
 from gauss.system import System
 
 REDUNDANT_LOOPS = 1e-10  # eigenvalue of the scaled G M⁻¹ Gᵀ, relative to the largest one: smaller ones are redundant rows
+REPEATED_COUPLING = 1e-12  # of the sum of coefficients: what other couplings leave of one that they imply
 
 
 class Compliance:
@@ -29,12 +33,6 @@ class Compliance:
 
     def __init__(self, smooth: System):
         self.free_columns = _null_space(smooth) if is_coupled_tree(smooth) else None
-
-    @property
-    def is_single(self) -> bool:
-        """Whether each rate is a multiple of one independent rate."""
-        N = self.free_columns
-        return N is not None and bool((np.count_nonzero(N, axis=1) <= 1).all())
 
     def of(self, terms: MechanismTerms) -> tuple[np.ndarray, np.ndarray]:
         """Compliance H (n_v, n_v), and accelerations (n_v,) by the biases of loops."""
@@ -57,14 +55,20 @@ class Compliance:
 
 def _null_space(system: System) -> np.ndarray:
     """Rates (n_v, k) of independent coordinates: v = N ẏ for the couplings of a tree."""
-    ratios = np.eye(system.n_v)
-    dependent = set[int]()
-    for coupling in system.scene.couplings.values():
-        driven, driver = system.column(coupling.driven), system.column(coupling.driver)
-        row = ratios[driven] - coupling.ratio * ratios[driver]
-        if not np.abs(row).max():
+    ratios, dependent = np.eye(system.n_v), set[int]()
+    for terms in _sums(system):
+        columns, factors = [system.column(joint) for joint in terms], np.array([*terms.values()])
+        row = factors @ ratios[columns]
+        if np.abs(row).max() <= REPEATED_COUPLING * np.abs(factors).sum():
             continue
-        pivot = int(np.argmax(np.abs(row) * (np.arange(row.size) == driven) * 2.0 + np.abs(row)))
+        pivot = int(np.argmax(np.abs(row) * (np.arange(row.size) == columns[0]) * 2.0 + np.abs(row)))
         ratios = ratios - np.outer(ratios[:, pivot], row) / row[pivot]
         dependent.add(pivot)
     return ratios[:, [k for k in range(system.n_v) if k not in dependent]]
+
+
+def _sums(system: System) -> list[dict[str, float]]:
+    """Sums of rates that are zero, coefficients by joint."""
+    couplings = [{one.driven: 1.0, one.driver: -one.ratio} for one in system.scene.couplings.values()]
+    relations = [cast(LinearCoupling, relation) for relation in system.scene.relations.values()]
+    return couplings + [dict(zip(one.coupled, one.coefficients, strict=True)) for one in relations]

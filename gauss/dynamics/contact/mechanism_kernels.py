@@ -25,7 +25,7 @@ from gauss.dynamics.mechanism import loop_constraints
 from gauss.dynamics.state_terms import StateTerms
 from gauss.dynamics.store import cached_on_disk
 from gauss.rotations import cross
-from gauss.scene import ClosedGap, Contact
+from gauss.scene import ClosedGap, Contact, LinearCoupling
 from gauss.system import State, System, coordinate_rates, retract, sides
 from gauss.system.relations import place_residuals
 
@@ -206,15 +206,9 @@ class MechanismKernels:
         return gap, rate, jacobian(rate, v), bias
 
     def _loops(self, t, q, v):
-        """Jacobian and bias of loop joints, couplings and relations."""
-        if not self.smooth.has_closures:
-            return np.zeros((0, self.smooth.n_v)), np.zeros(0)
+        """Jacobian and bias of loop joints, couplings and relations; none where coordinates are made independent."""
         if is_coupled_tree(self.smooth):
-            rows = np.zeros((len(self.smooth.scene.couplings), self.smooth.n_v))
-            for row, coupling in zip(rows, self.smooth.scene.couplings.values(), strict=True):
-                row[self.smooth.column(coupling.driven)] = 1.0
-                row[self.smooth.column(coupling.driver)] = -coupling.ratio
-            return rows, np.zeros(len(rows))
+            return np.zeros((0, self.smooth.n_v)), np.zeros(0)
         return loop_constraints(self.smooth, q, v, t)[1:]
 
     def _dependent(self, terms: StateTerms):
@@ -258,9 +252,10 @@ def _body(terms: StateTerms, body: int) -> np.ndarray:
 
 
 def is_coupled_tree(system: System) -> bool:
-    """Whether couplings of joints are the only constraints beside the joints of the tree."""
+    """Whether constant sums of joint coordinates are the only constraints beside the joints of the tree."""
     in_tree = {edge.constraint for edge in system.structure.tree}
-    return not system.relations.placed and len(in_tree) == len(system.joints)
+    linear = all(isinstance(relation, LinearCoupling) for relation in system.scene.relations.values())
+    return linear and len(in_tree) == len(system.joints)
 
 
 def other_gaps(system: System) -> list[ClosedGap]:

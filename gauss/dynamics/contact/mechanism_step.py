@@ -81,7 +81,7 @@ class MechanismStepper:
             "contact_unit": self.rows.contact_unit,
         }
         self.record = ModeRecord(len(self.rows.elements))
-        self.memory = MechanismMemory(self) if self.compliance.is_single else None
+        self.memory = MechanismMemory(self) if self.compliance.free_columns is not None else None
         self.forget()
 
     @property

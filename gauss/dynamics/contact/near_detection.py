@@ -9,7 +9,9 @@ from gauss.codegen.kernels import NearPairs
 from gauss.codegen.kernels.broad_phase import grid_room
 from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, NEAR_INTEGERS, NEAR_NUMBERS, PART, ROW
 from gauss.codegen.kernels.near_pairs import KINDS as MOST_KINDS
+from gauss.codegen.kernels.patch_rows import POINT
 from gauss.dynamics.contact.free_bodies import place_function
+from gauss.dynamics.contact.hull_records import hull_records
 from gauss.dynamics.contact.near_contacts import COLUMNS, NearContacts, Overlap
 from gauss.dynamics.contact.overlaps import START_OVERLAP
 from gauss.dynamics.contact.pair_kernels import SIGNS, PairKernels, pair_kernels
@@ -17,6 +19,7 @@ from gauss.dynamics.contact.patch_kernels import PatchKernels
 from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
 from gauss.scene import Collider, HalfSpace
 from gauss.scene.contact_pairs import RULES
+from gauss.scene.contact_patch import SLOTS
 from gauss.scene.patch_distances import patch_points
 
 FIRST_ROOM = 64  # contacts that there is room for at first
@@ -45,12 +48,16 @@ class NearDetection:
         self.pair = np.column_stack(np.nonzero(np.triu(self.law))) if is_listed else np.zeros((0, 2), dtype=np.int64)
         self.grid = grid_room(0 if is_listed else n)
         self.body = np.column_stack([table.body, table.kind == KINDS.index(HalfSpace), table.kind]).astype(np.int64)
-        self.own = np.concatenate([table.own, table.centre, table.sizes, table.ball[None]]).T.copy()
+        self.records = hull_records(table)
+        addresses = [[0.0 if record is None else record.address for record in self.records]]
+        self.own = np.concatenate([table.own, table.centre, table.sizes, table.ball[None], addresses]).T.copy()
         assert self.own.shape == (n, PART)
         least = table.sizes[:3].min(axis=0)
         self.edges = np.where(least > 0.0, 2.0 * least, np.inf)
         self.moved, self.bodies = np.empty(n * (MOVED + 3)), np.empty((24, bodies))
-        self.deepest, self.near_settings = np.empty(n), np.array([0.0, length, START_OVERLAP * length])
+        self.patch = np.full((SLOTS, POINT), np.nan)
+        self.deepest = np.empty(n)
+        self.near_settings = np.array([0.0, length, START_OVERLAP * length, self.patch.ctypes.data])
         self.kinds: dict[int, PairKernels | PatchKernels] = {}
         self._make_room(FIRST_ROOM)
         self.kind, self.feature = np.zeros((MOST_KINDS**2, KIND), dtype=np.int64), np.zeros((0, FEATURE), dtype=np.int64)
@@ -71,14 +78,15 @@ class NearDetection:
             first, second = divmod(pair, len(parts))
             return shapes[parts[first].shape], shapes[parts[second].shape]
 
-        return PatchKernels(shapes_of, self.count, self.near_settings)
+        return PatchKernels(kinds, shapes_of, self.count, self.near_settings, self.patch)
 
     def connect(self):
         """Take the addresses of the kernels anew: a new motion may run in another tier."""
         features: list[np.ndarray] = []
         signs: list[np.ndarray] = []
         for number, kernels in sorted(self.kinds.items()):
-            self.kind[number] = kernels.distances.address(), len(kernels.features), len(features), kernels.guarded
+            other = 0 if kernels.otherwise is None else kernels.otherwise.address()
+            self.kind[number] = kernels.distances.address(), len(kernels.features), len(features), kernels.guarded, other
             addresses = [rows.address() for rows in kernels.rows]
             assert len(kernels.features) < MOST
             for one in kernels.features:

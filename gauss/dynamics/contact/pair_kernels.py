@@ -209,6 +209,8 @@ class PairKernels:
         along normal and tangents, each with two zeros at its end; biases of these velocities.
     """
 
+    otherwise = None  # other distances, asked for where these have none
+
     def __init__(self, kinds: tuple[type, type]):
         self.features, makers = _features(kinds)
         self.guarded = {*kinds} in ({Box}, {Box, Capsule})

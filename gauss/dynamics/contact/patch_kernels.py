@@ -1,6 +1,7 @@
-"""Patches of contact of two solids, called from machine code in place of the kernels of a pair of shapes.
+"""Patches of contact of two solids, in place of the kernels of a pair of shapes: by machine code, or called from there.
 
 The distances of a pair are asked first; its patch is kept for the rows of its near points, which machine code writes next.
+Patches of convex hulls are found by :mod:`gauss.codegen.kernels.hull_pairs`; other ones, and what that leaves, in Python.
 Biases are zero: a point of a patch moves on both solids, and is found anew in each step.
 """
 
@@ -13,16 +14,16 @@ import numpy as np
 
 from gauss.codegen import Kernel, from_disk, write
 from gauss.codegen.kernel import SIGNATURE
-from gauss.codegen.kernels.near_pairs import DISTANCE_INPUTS
-from gauss.codegen.kernels.patch_rows import POINT, PatchRows
+from gauss.codegen.kernels.hull_pairs import HullDistances
+from gauss.codegen.kernels.near_pairs import DISTANCE_INPUTS, FAR_AWAY
+from gauss.codegen.kernels.patch_rows import PatchRows
+from gauss.dynamics.contact.hull_records import HULLS
 from gauss.dynamics.contact.pair_kernels import Feature
 from gauss.rotations import cross
-from gauss.scene import Collider
+from gauss.scene import Collider, HalfSpace
 from gauss.scene.contact import tangents
-from gauss.scene.contact_patch import SLOTS, SolidPose
-from gauss.scene.solid_pairs import PairOfSolids, solid_pair
-
-FAR = 1e300  # distance of a point that a patch has not [m]
+from gauss.scene.contact_patch import ACROSS, SAME_DEPTH, SLOTS, SolidPose
+from gauss.scene.patch_distances import PairOfSolids, solid_pair
 
 
 class PatchKernels:
@@ -30,27 +31,40 @@ class PatchKernels:
 
     Parameters
     ----------
-    shapes : list of (Collider, Collider)
-        The shapes of each pair of the table.
+    kinds : tuple of type
+        Kinds of the two shapes.
+    shapes : callable
+        Number of a pair of the table → its shapes.
     count : ndarray of int64
         Its last entry is the number of the pair that is asked.
     settings : ndarray
         Its first entry is the reach [m].
+    patch : ndarray, shape (16, 7)
+        Points of the pair that was asked last: distances, places, normals.
     """
 
     guarded = False
 
-    def __init__(self, shapes: Callable[[int], tuple[Collider, Collider]], count: np.ndarray, settings: np.ndarray):
-        self.shapes, self.count, self.settings = shapes, count, settings
+    def __init__(
+        self,
+        kinds: tuple[type, type],
+        shapes: Callable[[int], tuple[Collider, Collider]],
+        count: np.ndarray,
+        settings: np.ndarray,
+        patch: np.ndarray,
+    ):
+        self.shapes, self.count, self.settings, self.patch = shapes, count, settings, patch
         self.pairs: dict[int, PairOfSolids] = {}
-        self.patch = np.full((SLOTS, POINT), np.nan)  # points of the pair that was asked last; NaN: refused by name
         self.features = [Feature(0, signs=(k, self.patch.ctypes.data)) for k in range(SLOTS)]
-        unknown = np.array([-1.0, *[FAR] * (SLOTS - 1)])  # a contact whose row, asked next, is NaN
-        self.distances = _Entry(self._distances, DISTANCE_INPUTS, unknown)
+        unknown = np.array([-1.0, *[FAR_AWAY] * (SLOTS - 1)])  # a contact whose row, asked next, is NaN: refused by name
+        self.distances: Kernel | _Entry = _Entry(self._distances, DISTANCE_INPUTS, unknown)
+        self.otherwise: _Entry | None = None
+        if kinds[0] in HULLS and kinds[1] in (*HULLS, HalfSpace):
+            self.otherwise, self.distances = self.distances, hull_distances(kinds[1] is HalfSpace)
         self.rows = [patch_rows()]
 
     def _distances(self, given: np.ndarray, found: np.ndarray):
-        found[:] = FAR
+        found[:] = FAR_AWAY
         self.patch[0] = np.nan
         number = int(self.count[3])
         if number not in self.pairs:
@@ -64,6 +78,13 @@ class PatchKernels:
         if points:
             self.patch[: len(points)] = [(point.gap, *point.place.tolist(), *point.normal.tolist()) for point in points]
             found[: len(points)] = self.patch[: len(points), 0]
+
+
+@cache
+def hull_distances(on_plane: bool) -> Kernel:
+    """Machine code of the distances of two hulls, or of a hull and a half-space, made once on a machine."""
+    laws = None if on_plane else (ACROSS, SAME_DEPTH)
+    return from_disk((HullDistances, laws), lambda: Kernel(HullDistances(SLOTS, laws), batch=False))
 
 
 @cache

@@ -9,8 +9,8 @@ from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE, project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
+from gauss.dynamics.gear_trains import on_trains
 from gauss.dynamics.load_forces import LoadForces
-from gauss.dynamics.train_coordinates import on_trains
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 

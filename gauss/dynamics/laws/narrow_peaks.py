@@ -1,5 +1,7 @@
 """Narrow peaks of smooth laws within a step: those that error estimates may miss, and those that fixed steps do not resolve.
 
+So are oscillations of laws along a coordinate of which a fixed step passes over a third of a period and more.
+
 Coordinates and rates are enclosed as in :mod:`gauss.dynamics.laws.enclosed_parts`. Few steps are divided: the others have no
 peak by one enclosure of the whole step.
 """
@@ -20,6 +22,7 @@ from gauss.system import State, System
 
 RESOLVED_RISE = 0.5  # of ln |f| within a fixed step: three samples of 1/(1 + u²)³ then give its integral to 2 %
 UNRESOLVED_SHARE = 0.03  # of the variation of the accelerations in a step, by which three samples miss their integral
+RESOLVED_PHASE = 2.0  # of a sine within a fixed step [rad]: three samples give its integral to 1 %; none see many periods
 NEGLIGIBLE_RATE = 1e-6  # relative to the rates: changes that do not count
 SIMPSON = np.array([1.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 1.0]) / 6.0  # weights at the ends of the eight subintervals
 COMPOSITE = np.array([1.0, 4.0, 2.0, 4.0, 2.0, 4.0, 2.0, 4.0, 1.0]) / 24.0
@@ -36,15 +39,15 @@ class NarrowPeaks:
         Symbols of (t, q, v), and of the accelerations.
     products : Products
         The products.
-    exponents : list of Expression
-        Arguments of exponential functions.
+    exponents, phases : list of Expression
+        Arguments of exponential functions, and of sines and cosines.
     slopes : callable
         Expressions → their time derivatives; empty if there are none.
     """
 
-    def __init__(self, system: System, symbols, accelerations, products: Products, exponents: list[Expression], slopes):
+    def __init__(self, system: System, symbols, accelerations, products: Products, exponents: list, phases: list, slopes):
         self.system, self.symbols, self.accelerations = system, symbols, accelerations
-        self.products, self.exponents, self.slopes = products, exponents, slopes
+        self.products, self.exponents, self.phases, self.slopes = products, exponents, phases, slopes
         self.sizes = (1, system.n_q, system.n_v, system.n_v) * 2
 
     @cached_property
@@ -90,16 +93,17 @@ class NarrowPeaks:
         return Kernel(write(lambda *ends: [self._is_flat(*ends)], *self.sizes, name="gentle"), batch=False)
 
     def misses(self, evaluate: Callable[[State], np.ndarray], begin: Point, end: Point) -> bool:
-        """Whether three samples of the accelerations do not resolve them in a step; see :meth:`unresolved`."""
-        ends = [
-            part
-            for point in (begin, end)
-            for part in ([point.state.t], point.state.q, point.state.v, point.rates.acceleration)
-        ]
-        if self.is_flat(np.concatenate(ends))[0] > 0.5:
+        """Whether a fixed step does not resolve the laws; see :meth:`turns` and :meth:`unresolved`."""
+        if self.oscillates(begin, end):
+            return True
+        if self.is_flat(np.concatenate(ends_of(begin, end)))[0] > 0.5:
             return False
         found = missed(self.system, evaluate, begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
         return bool(found > 0.5)
+
+    def oscillates(self, begin: Point, end: Point) -> bool:
+        """Whether a law oscillates along the coordinates faster than a fixed step resolves; see :meth:`turns`."""
+        return bool(self.phases) and bool(self.turning(np.concatenate(ends_of(begin, end)))[0] > 0.5)
 
     def _is_flat(self, *ends) -> Scalar:
         """1 where neither a product nor an exponent rises by more than a fixed step resolves."""
@@ -112,6 +116,36 @@ class NarrowPeaks:
                 rises = math.where(value.high > FLAT, math.where(value.high > value.low + RESOLVED_RISE, 1.0, 0.0), 0.0)
                 flat = math.where(rises > 0.5, 0.0, flat)
         return flat
+
+    def turns(self, *ends) -> Scalar:
+        """1 where a phase advances by more than a fixed step resolves between (t, q, v, q̈) at both ends, else 0."""
+        found: Scalar = 0.0
+        if not self.phases:
+            return found
+        states = [np.concatenate(ends[:4]), np.concatenate(ends[4:])]
+        before, after = (np.array(list(self._phases(state))).reshape(2, -1) for state in states)
+        h = ends[4][0] - ends[0][0]
+        fastest = h * math.maximum(np.abs(before[1]), np.abs(after[1]))
+        for advance in math.maximum(np.abs(after[0] - before[0]), fastest):
+            found = math.where(advance > RESOLVED_PHASE, 1.0, found)
+        return found
+
+    @cached_property
+    def turning(self) -> Kernel:
+        """Machine code of :meth:`turns`."""
+        return Kernel(write(lambda *ends: [self.turns(*ends)], *self.sizes, name="turning"), batch=False)
+
+    @cached_property
+    def _phases(self) -> Function:
+        """(t, q, v, q̈) → phases, and their rates."""
+        symbols = [*self.symbols, *self.accelerations]
+        rates = self.slopes(self.phases) or [0.0] * len(self.phases)
+
+        def values(state):
+            given = {symbol.index: Interval.point(value) for symbol, value in zip(symbols, state, strict=True)}
+            return [value.low for value in enclose([*self.phases, *rates], given)]
+
+        return write(values, len(symbols), name="phases")
 
     def _enclosed(self, asked: list[Expression]) -> tuple[int, Function, Function]:
         """Number of expressions; (t, q, v) → values; ends of each of (t, q, v, q̈) → those of them and of their rates."""
@@ -139,6 +173,11 @@ class NarrowPeaks:
         """Arguments of the methods of :class:`Products`."""
         values, found = self._enclosures(size, at, around, count, *ends)
         return values, *map(list, zip(*found, strict=True)), (ends[4][0] - ends[0][0]) / count
+
+
+def ends_of(begin: Point, end: Point) -> list:
+    """(t, q, v, q̈) at both ends of a step."""
+    return [p for at in (begin, end) for p in ([at.state.t], at.state.q, at.state.v, at.rates.acceleration)]
 
 
 def missed(system: System, evaluate: Callable[[State], np.ndarray], begin: State, first, end: State, last) -> Scalar:

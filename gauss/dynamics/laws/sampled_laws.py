@@ -4,9 +4,13 @@ A law is evaluated at the initial state of the mechanism, so that all changes ar
 sampling interval may be missed; ``breaks=`` gives such times.
 """
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
 from gauss.dynamics.laws.recorded_time import at_time, reads_time
+from gauss.dynamics.laws.step_sampling import LawOfTime
 from gauss.dynamics.laws.switching_times import CLOSE, NO_TIMES, Timetable
 from gauss.scene.stateful_laws import preserved
 
@@ -20,7 +24,7 @@ PARTS = 8  # cells of an interval in which a law changes, next to intervals in w
 
 
 def sampled_times(law, motion, begin: float, end: float, what: str = "a law", uses_time: bool = False) -> Timetable:
-    """Jumps of one law, and ends of the intervals in which it is constant.
+    """Jumps of one law, and ends of the intervals in which it is constant; with the law itself unless it is constant.
 
     Parameters
     ----------
@@ -36,21 +40,41 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law", us
         Whether the law is known to use the time: a constant value is then warned of.
     """
     own, of_motion = (True, False) if motion is None else reads_time(law, motion)
-
-    def values(times) -> np.ndarray:
-        """Values (k, n) at times (k,)."""
-        try:
-            found = [law(t, at_time(motion, t) if of_motion else motion) for t in np.asarray(times).tolist()]
-            return _rows(found)
-        except Exception as error:  # a law may fail in any way at other times
-            raise _NoValueError from error
-
+    values = partial(_values, law, motion, of_motion)
     try:
         with preserved(law):
             count = _count(motion, end - begin) if own or of_motion or uses_time else LEAST_SAMPLES
-            return _located(values, begin, end, what, count, CONSTANT if uses_time else "")
+            found = _located(values, begin, end, what, count, CONSTANT if uses_time else "")
+        return (
+            found
+            if found.limitations or found is NO_TIMES
+            else replace(found, laws=(partial(_values_or_none, law, motion, of_motion),))
+        )
     except _NoValueError:  # the motion reports this failure by name
         return NO_TIMES
+
+
+def law_of_time(law, motion) -> LawOfTime | None:
+    """Opaque law as a function of time at the initial state; None if it does not read the time."""
+    own, of_motion = reads_time(law, motion)
+    return partial(_values_or_none, law, motion, of_motion) if own or of_motion else None
+
+
+def _values(law, motion, of_motion: bool, times) -> np.ndarray:
+    """Values (k, n) at times (k,)."""
+    try:
+        return _rows([law(t, at_time(motion, t) if of_motion else motion) for t in np.asarray(times).tolist()])
+    except Exception as error:  # a law may fail in any way at other times
+        raise _NoValueError from error
+
+
+def _values_or_none(law, motion, of_motion: bool, times: np.ndarray) -> np.ndarray:
+    """Values (k, n) at times (k,); not a number where the law has none."""
+    try:
+        with preserved(law):
+            return _values(law, motion, of_motion, times)
+    except _NoValueError:
+        return np.full((len(times), 1), np.nan)
 
 
 def _rows(values: list) -> np.ndarray:
@@ -100,7 +124,7 @@ def _located(values_at, begin: float, end: float, what: str, count: int, constan
     beside = np.maximum(np.append(change[1:], 0.0), np.insert(change[:-1], 0, 0.0))
     jumps = np.flatnonzero(moves & ((change > JUMP_RATIO * beside) | _isolated(moves)))
     if len(jumps) > MOST_JUMPS:
-        return NO_TIMES
+        return Timetable(NO_TIMES.switches, NO_TIMES.mesh)
     close = CLOSE * max(abs(begin), abs(end))
     switches = [_bisected(values_at, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
     inside = _cells(times, moves)

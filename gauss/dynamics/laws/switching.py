@@ -7,10 +7,10 @@ import numpy as np
 
 from gauss.codegen import Expression
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
+from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
 from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
-from gauss.dynamics.laws.sampled_laws import sampled_times
-from gauss.dynamics.laws.switching_functions import watch_of
+from gauss.dynamics.laws.sampled_laws import law_of_time, sampled_times
+from gauss.dynamics.laws.switching_functions import functions_of
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable, timetable
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_law
 from gauss.integrators import Point
@@ -37,7 +37,7 @@ class Switching(NamedTuple):
     jumps : Jumps
         Possible jumps of prescribed velocities.
     peaks : NarrowPeaks or None
-        Smooth peaks of traced laws that fixed steps may not resolve.
+        Smooth peaks and oscillations of traced laws that fixed steps may not resolve.
     """
 
     times: Timetable = NO_TIMES
@@ -54,9 +54,12 @@ class Switching(NamedTuple):
         """
         if self.watch is None:
             return 1.0, 0.0, 1.0
-        parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
-        share, crossings, place = self.watch(np.concatenate([*parts[0], *parts[1]]))
+        share, crossings, place = self.watch(np.concatenate(ends_of(begin, end)))
         return float(share), float(crossings), float(place)
+
+    def oscillates(self, begin: Point, end: Point) -> bool:
+        """Whether a law oscillates along the coordinates faster than a fixed step resolves."""
+        return self.peaks is not None and self.peaks.oscillates(begin, end)
 
 
 def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
@@ -82,12 +85,10 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(_sampled(bound, laws, motion, begin, end) for bound in laws.called))
     times = times.join(*_limits(system, start, end))
-    watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if needs_poses(bound.load))
-    found = Switching(times, None, called, jumps=jumps)
-    if not watch:
-        return found
-    peaks = watch.narrow if watch.may_be_narrow else None
-    return found._replace(watch=watch.machine_code, conditional=watch.names, peaks=peaks)
+    watch, called = functions_of(system, laws), tuple(bound.load.name for bound in laws.called if needs_poses(bound.load))
+    peaks = watch.narrow if watch is not None and (watch.may_be_narrow or watch.phases) else None
+    found = Switching(times, None, called, jumps=jumps, peaks=peaks)
+    return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
 
 
 def timed_switching(
@@ -114,6 +115,14 @@ def _sampled(bound: BoundLoad, laws: Laws, motion, begin: float, end: float) -> 
     uses_time = laws.fails(bound.load.name) and not needs_poses(bound.load) and not given
     varying = [law for law in bound.laws if not isinstance(law, ConstantLaw)]
     return NO_TIMES.join(*(sampled_times(law, motion, begin, end, what, uses_time) for law in varying))
+
+
+def called_laws(system: System, laws: Laws, start: State) -> Timetable:
+    """Opaque laws of time, of which fixed steps may be too long; no switching time is looked for."""
+    motion = kinematics(system, start) if laws.called else None
+    bound = [law for one in laws.called for law in one.laws if not isinstance(law, ConstantLaw)]
+    found = (law_of_time(law, motion) for law in bound)
+    return Timetable(NO_TIMES.switches, NO_TIMES.mesh, laws=tuple(law for law in found if law is not None))
 
 
 def _given_times(system: System, breaks, begin: float, end: float) -> Timetable:

@@ -18,12 +18,19 @@ from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, forward, reachable, write
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.constraint_functions import residual_functions, watched_functions
-from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
+from gauss.dynamics.laws.enclosed_parts import (
+    PARTS,
+    enclosed_parts,
+    hidden_peaks,
+    largest_size,
+    may_turn,
+    sign_changes,
+    upper_bounds,
+)
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.kink_error import kink_error, kink_factor
-from gauss.dynamics.laws.narrow_peaks import NarrowPeaks
+from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
 from gauss.dynamics.laws.products import Products
-from gauss.dynamics.laws.subinterval_bounds import hidden_peaks, largest_size, may_turn, sign_changes, upper_bounds
 from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
@@ -76,7 +83,7 @@ class SwitchingFunctions:
         self.noise = self._rounding()
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
         self.jumps = [_jumps(x) for x in (*starmap(sub, self.pairs), *self.steps)]
-        self.peaks = [x for x in _exponents(outputs) if x.index not in timed]
+        self.peaks, self.phases = (_arguments(outputs, timed, *ops) for ops in (("exp",), ("sin", "cos")))
         self.products = Products(outputs, timed)
         self.names = _names(laws, {node.index for node in (*nodes, *self.peaks, *self.products.nodes)})
 
@@ -116,6 +123,10 @@ class SwitchingFunctions:
     def may_be_narrow(self) -> bool:
         """Whether laws have smooth peaks that fixed steps may not resolve."""
         return bool(self.peaks or self.products)
+
+    def oscillates(self, begin: Point, end: Point) -> Scalar:
+        """1 where a law oscillates along the coordinates faster than a fixed step resolves, else 0."""
+        return self.narrow.turns(*ends_of(begin, end)) if self.phases else 0.0
 
     def is_between(self, state: State) -> bool:
         """Whether some switching function has a switching value in a state, but for rounding."""
@@ -240,8 +251,9 @@ class SwitchingFunctions:
 
     @cached_property
     def narrow(self) -> NarrowPeaks:
-        """Its products and exponential functions."""
-        return NarrowPeaks(self.system, self._symbols, self._acceleration, self.products, self.peaks, self._slopes)
+        """Its products, exponential functions, sines and cosines."""
+        given = self.products, self.peaks, self.phases, self._slopes
+        return NarrowPeaks(self.system, self._symbols, self._acceleration, *given)
 
     @cached_property
     def _groups(self) -> tuple[list, list, list, list]:
@@ -338,18 +350,27 @@ def onward(share: Scalar, shortest: Scalar) -> Scalar:
     return math.maximum(share, 0.5 * shortest)
 
 
-def _exponents(outputs) -> list[Expression]:
-    """Arguments of exponential functions: a narrow peak is negligible at every stage outside of it."""
-    return list(dict.fromkeys(node.operands[0] for node in reachable(outputs) if node.op == "exp"))
+def _arguments(outputs, timed: set[int], *ops: str) -> list[Expression]:
+    """Arguments of functions, other than those of time.
+
+    A narrow peak of an exponential function is negligible at every stage outside of it.
+    """
+    found = dict.fromkeys(node.operands[0] for node in reachable(outputs) if node.op in ops)
+    return [x for x in found if x.index not in timed]
 
 
-def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:
-    """Switching functions of traced laws and constraints, cached with the system; None where there are none."""
+def functions_of(system: System, laws: Laws) -> SwitchingFunctions | None:
+    """Switching functions, peaks and oscillations of traced laws and constraints, cached with the system."""
     functions = watched_functions(system, laws)
     if not functions.outputs:
         return None
     make = lambda: SwitchingFunctions(system, functions)  # noqa: E731
-    return cached(system, (SwitchingFunctions, laws.key), make) or None
+    return cached(system, (SwitchingFunctions, laws.key), make)
+
+
+def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:
+    """Switching functions of traced laws and constraints, cached with the system; None where there are none."""
+    return functions_of(system, laws) or None
 
 
 def constraint_watch(system: System) -> Kernel | None:

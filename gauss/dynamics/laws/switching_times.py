@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss.codegen import Expression, forward, reachable
 from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.step_sampling import LawOfTime, coarse_steps, laws_of_time
 
 CONDITIONS = ("less", "less_equal", "min", "max", "floor")
 SIGN_ROUNDING = 1e-13  # relative to the terms of a switching function: smaller values have no sign
@@ -42,11 +43,14 @@ class Timetable:
         Ends of cells [s], ascending: steps end at each.
     limitations : tuple of str
         Warnings about features that are not resolved.
+    laws : tuple of callable
+        Laws of time, of which fixed steps may be too long.
     """
 
     switches: np.ndarray
     mesh: np.ndarray
     limitations: tuple[str, ...] = ()
+    laws: tuple[LawOfTime, ...] = ()
 
     def __bool__(self):
         return bool(self.switches.size or self.mesh.size)
@@ -55,15 +59,21 @@ class Timetable:
         """Timetable of several laws together."""
         every = (self, *others)
         switches, mesh = (distinct(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
-        return Timetable(switches, mesh, tuple(dict.fromkeys(text for one in every for text in one.limitations)))
+        said = dict.fromkeys(text for one in every for text in one.limitations)
+        return Timetable(switches, mesh, tuple(said), tuple(law for one in every for law in one.laws))
 
     def unresolved(self, begin: float, end: float, step: float) -> int:
-        """Number of cells of the mesh that fixed steps [s] do not resolve."""
+        """Number of cells of the mesh that fixed steps [s] do not resolve, and of steps in which laws oscillate."""
+        oscillating = sum(coarse_steps(law, begin, end, step, self.switches)[0] for law in self.laws)
         if not self.mesh.size:
-            return 0
+            return oscillating
         every = distinct(np.clip(np.concatenate([[begin, end], self.switches, self.mesh]), begin, end))
         inner = np.isin(every, self.mesh)
-        return int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())
+        return oscillating + int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())
+
+    def first_coarse(self, begin: float, end: float, step: float) -> float:
+        """Time from which fixed steps do not resolve the oscillation of a law [s]; infinite if there is none."""
+        return min((coarse_steps(law, begin, end, step, self.switches)[1] for law in self.laws), default=np.inf)
 
     def stops(self, begin: float, end: float) -> list[tuple[float, float]]:
         """Pairs (end of a step, start of the next one) after ``begin``, ascending; the last is (``end``, ``end``).
@@ -122,7 +132,8 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
     curved = [node for node in nodes if node.op in CURVED and degree[node.index] > STEEPEST]
     edges = np.array([begin, *switches[switches < end], end])
     mesh = _mesh(curved, conditions, clock, edges, limitations, monotone) if curved else np.zeros(0)
-    return Timetable(switches, mesh, tuple(limitations))
+    law = laws_of_time(outputs, nodes, clock) if curved else None
+    return Timetable(switches, mesh, tuple(limitations), () if law is None else (law,))
 
 
 def of_time(outputs, clock: Expression) -> list[Expression]:

@@ -7,7 +7,13 @@ import numpy as np
 from gauss.errors import FileError
 from gauss.scene import Input, Output
 
-FRAMES = {"position": "framepos", "velocity": "framelinvel", "angular_velocity": "frameangvel"}
+FRAMES = {
+    "position": "framepos",
+    "rotation": "framequat",
+    "velocity": "framelinvel",
+    "angular_velocity": "frameangvel",
+}
+JOINTS = {"coordinate": ("jointpos", "ballquat"), "rate": ("jointvel", "ballangvel")}  # of one freedom, of a ball
 OWN = {"gyroscope": "gyro", "accelerometer": "accelerometer"}  # in the axes of the site
 
 
@@ -77,13 +83,25 @@ def _at_joint(document, what: str, joint: str, factor: float, options: dict):
 def _write_output(document, output: Output):
     what, sensors = f"output {output.name!r}", document.section("sensor")
     if output.kind in FRAMES or output.kind in OWN:
-        site = document.site(f"{what} at {output.of}", output.of, output.at)
+        marked = output.of in document.scene.frames and not any(output.at)  # by a site of its own
+        site = output.of if marked else document.site(f"{what} at {output.of}", output.of, output.at)
         if output.kind in OWN:
             document.add(sensors, OWN[output.kind], "sensor", name=output.name, site=site)
         else:
             document.add(sensors, FRAMES[output.kind], "sensor", name=output.name, objtype="site", objname=site)
-    elif output.kind in ("coordinate", "rate"):
-        tag = "jointpos" if output.kind == "coordinate" else "jointvel"
-        document.add(sensors, tag, "sensor", name=output.name, joint=document.coordinate(output.of, what))
+    elif output.kind in JOINTS:
+        of_one, of_ball = JOINTS[output.kind]
+        if document.scene.joints[output.of].kind == "ball":
+            document.add(sensors, of_ball, "sensor", name=output.name, joint=_ball(document, output.of, what))
+        else:
+            document.add(sensors, of_one, "sensor", name=output.name, joint=document.coordinate(output.of, what))
     else:
         raise FileError(f"{what}: MuJoCo has no sensor of it.")
+
+
+def _ball(document, joint: str, what: str) -> str:
+    """Name of a ball joint that has the same coordinates and rates in MuJoCo, which has the axes of the outer body."""
+    step = document.steps(joint, what)[0]
+    if step.gear is None or not np.array_equal(step.gear, np.eye(3)):
+        raise FileError(f"{what}: MuJoCo has other coordinates and rates for joint {joint!r}.")
+    return step.name

@@ -22,6 +22,7 @@ from gauss.io.mjcf.medium import add_medium
 from gauss.io.mjcf.names import SITE, Named
 from gauss.io.mjcf.passive import add_ball_armature, add_compensation, add_passive, with_armature
 from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, WELD, is_closed, left_out, refused
+from gauss.io.mjcf.sensors import add_sensors
 from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
 from gauss.io.mjcf.tendon_path import tendon_path
@@ -43,7 +44,9 @@ def read_mjcf(
     a rotor on the ground that turns with its joint. A fixed tendon pulls its joints; one between two sites is a spring, a
     rope, or a distance, one over several sites and around spheres and cylinders pulls the bodies of all. An activation of an
     actuator is a state of the scene. A key frame called "start", or another that is
-    asked for, is where the scene starts.
+    asked for, is where the scene starts. A sensor is an output, named like it, where outputs have its kind: of positions and
+    speeds of joints (positions count like coordinates), of poses and velocities of points in the world (a ``framequat`` is a
+    rotation matrix), accelerometers and gyroscopes; values do not depend on ``noise``.
 
     Parameters
     ----------
@@ -67,7 +70,7 @@ def read_mjcf(
     Warns
     -----
     NotImportedWarning
-        Of contacts and stops that are not read, of geoms that have no counterpart, of sensors, of key frames that are not
+        Of contacts and stops that are not read, of geoms and sensors that have no counterpart, of key frames that are not
         the start, of equalities and actuators that are switched off.
     """
     path = Path(path)
@@ -86,9 +89,10 @@ def read_mjcf(
         if limits == "stops":
             add_stops(scene, named)
         unlike = add_contacts(scene, named) if contacts else []
+        unmeasured = add_sensors(scene, named)
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
-    left = left_out(named, limits == "stops", contacts, keyframe) + unlike
+    left = left_out(named, limits == "stops", contacts, keyframe) + unlike + unmeasured
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=2)
     return scene

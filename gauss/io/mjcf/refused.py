@@ -121,9 +121,7 @@ def _inactive(named: Named, keyframe: str | int | None) -> list[tuple[str, list[
     inactive = [named.name("equality", i) for i in range(model.neq) if not model.eq_active0[i]]
     standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0).tolist()]
     keys = [named.name("key", i) for i in range(model.nkey) if i != key_of(named, keyframe)]
-    sensors = [named.name("sensor", i) for i in range(model.nsensor)]
     return [
-        ("sensors, which only measure (scene.output does):", sensors),
         ("equalities that are not active:", inactive),
         ("what moves mocap bodies, which stand still:", standing),
         (f"key frames (one called {START!r}, or that keyframe= names, would be the start):", keys),

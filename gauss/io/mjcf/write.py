@@ -29,6 +29,7 @@ from gauss.system.frames import relative
 AT_WORLD = "origin of the world"  # a mark
 WORLD = "world"  # MuJoCo's name of the ground
 TIMESTEP = 1e-3  # s
+DEEPEST_BODY = 496  # bodies inside bodies: the parser of MuJoCo takes 499 elements, of which three are others
 STIFF = {"solref": f"{2 * TIMESTEP:g} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}  # the hardest that MuJoCo takes
 
 
@@ -140,6 +141,7 @@ def to_mjcf(scene: Scene) -> str:
         raise FileError(f"state {next(iter(scene.states))!r}: MuJoCo has no counterpart of states with laws of their own.")
     system = compile_scene(scene)
     tree, cut = spanning_tree(scene)
+    _require_shallow(tree)
     document = MjcfDocument(scene, system, [limb(system, *edge) for edge in tree])
     _write_head(document)
     _write_bodies(document)
@@ -166,6 +168,18 @@ def text(value) -> str:
     if isinstance(value, str):
         return value
     return " ".join(repr(float(number)) for number in np.atleast_1d(value))
+
+
+def _require_shallow(tree: list[tuple[Joint, str, str]]):
+    """Refuse a tree whose bodies MuJoCo's parser would not open: elements are nested as the bodies are."""
+    depths = {GROUND: 0}
+    for _, outer, inner in tree:
+        depths[outer] = depths[inner] + 1
+        if depths[outer] > DEEPEST_BODY:
+            raise FileError(
+                f"body {outer!r}: it hangs on {depths[inner]} bodies, of which MuJoCo's parser takes {DEEPEST_BODY - 1}; "
+                "save the scene as URDF."
+            )
 
 
 def _write_head(document: MjcfDocument):

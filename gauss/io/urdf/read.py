@@ -15,6 +15,7 @@ from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_yo
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.joint_file import joint_file
+from gauss.io.urdf.link_tree import require_tree
 from gauss.io.urdf.numbers import for_parser, value, values
 from gauss.io.urdf.plus import add_loops_and_couplings
 from gauss.io.urdf.unknown import refuse_couplings
@@ -70,6 +71,7 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "phy
     refuse_couplings(source)
     beside = joint_file(source.path)
     source = beside.replaced(source)
+    require_tree(source)
     text = for_parser(source)
     try:
         model = pin.buildModelFromXML(text, *base_of(root))
@@ -98,12 +100,8 @@ def base_of(root: str) -> tuple:
 
 def body_names(model) -> dict[int, str]:
     """Name of the body that each joint of Pinocchio's model moves; joint 0 carries the ground."""
-    links = _links(model)
-    names = {0: GROUND}
-    for index in range(1, model.njoints):
-        carried = [frame for frame in links if frame.parentJoint == index]
-        names[index] = _link_name(carried[0].name if carried else model.names[index])
-    return names
+    first = {frame.parentJoint: frame.name for frame in reversed(_links(model))}  # of the links that a joint carries
+    return {0: GROUND} | {i: _link_name(first.get(i, model.names[i])) for i in range(1, model.njoints)}
 
 
 def _links(model) -> list:

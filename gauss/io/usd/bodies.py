@@ -58,12 +58,13 @@ def add_body(scene: Scene, name: str, prim: Usd.Prim, pose: FramePose, units: St
             "not; write both with MassAPI."
         )
     own, given = units.pose(prim), api.GetCenterOfMassAttr()
-    if not given.HasAuthoredValue() and has_colliders:
+    is_given = given.HasAuthoredValue() and not np.isneginf(given.Get()).all()  # the schema's word for none
+    if not is_given and has_colliders:
         raise FileError(
             f"{prim.GetPath()}: body {name!r}: without physics:centerOfMass it is that of the colliders, whose masses are "
             "not read; write it with MassAPI."
         )
-    com = own.R.T @ (units.point(prim, given.Get()) - own.p) if given.HasAuthoredValue() else np.zeros(3)
+    com = own.R.T @ (units.point(prim, given.Get()) - own.p) if is_given else np.zeros(3)
     moments = checked(prim, moments) * units.mass * units.length**2
     options = {"inertia_axes": matrix(prim, api.GetPrincipalAxesAttr().Get()), "position": pose.p, "rotation": pose.R}
     scene.body(name, mass * units.mass, tuple(moments), tuple(com), **options)

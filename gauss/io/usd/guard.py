@@ -1,5 +1,7 @@
 """Layers of an untrusted USD file, checked before they are composed: none from elsewhere, none too large, not too many."""
 
+import os
+import re
 from pathlib import Path
 
 from gauss.errors import FileError, extra
@@ -10,6 +12,7 @@ with extra("usd"):
 
 LARGEST_LAYER = 200_000_000  # bytes: those of scanned environments hold meshes
 MOST_LAYERS = 1000
+OWN_PLACE = re.compile(r"Error in '.*' at line \d+ in file .* : ")
 
 
 def opened_stage(path: Path, root_folder=None) -> Usd.Stage:
@@ -45,11 +48,19 @@ def _layer(path: Path, layer_path: Path) -> Sdf.Layer:
     try:
         layer = Sdf.Layer.FindOrOpen(str(layer_path))
     except Tf.ErrorException as error:
-        reason = next((line.strip() for line in str(error).splitlines() if line.strip()), "it is no layer of USD")
-        raise FileError(f"{path}: USD refuses layer {layer_path.name!r}: {reason}") from error
+        raise FileError(f"{path}: USD refuses layer {layer_path.name!r}: {_reason(error, layer_path)}") from error
     if layer is None:
         raise FileError(f"{path}: USD cannot read layer {layer_path.name!r}.")
     return layer
+
+
+def _reason(error: Exception, layer_path: Path) -> str:
+    """Message of USD without the places in its own sources: the one that has the line of the layer, if one has."""
+    said = [OWN_PLACE.sub("", line).strip(" \t'") for line in str(error).splitlines()]
+    said = [line.replace(f"{layer_path.parent}{os.sep}", "") for line in said if line]
+    return next(
+        (line for line in said if line.startswith(f"{layer_path.name}:")), said[0] if said else "it is no layer of USD"
+    )
 
 
 def _within(path: Path, layer: Sdf.Layer, name: str, roots: list[Path]) -> Path:

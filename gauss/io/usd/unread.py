@@ -14,7 +14,7 @@ from gauss.io.usd.joints import unread_limits
 from gauss.io.usd.poses import number
 
 with extra("usd"):
-    from pxr import Usd, UsdPhysics
+    from pxr import Usd, UsdGeom, UsdPhysics
 
 READ = ("physics:", "drive:", "limit:", "xformOp")  # namespaces of the attributes of bodies and joints
 HARMLESS = ("primvars:", "userProperties:", "ui:", "material:", "visibility")
@@ -54,6 +54,7 @@ def unread(stage: Usd.Stage, bodies: Iterable[Usd.Prim]) -> list[str]:
     """What is not read and may change the motion, in words."""
     bodies, joints = list(bodies), enabled_joints(stage)
     words = [f"{what} {listed(names)}" for what, names in _of_physics(stage, bodies, joints).items() if names]
+    words += _of_layers(stage)
     foreign: dict[str, list[str]] = {}
     for prim in (*bodies, *joints, *physics_scenes(stage)):
         for name in filter(_is_foreign, map(str, prim.GetAuthoredPropertyNames())):
@@ -75,6 +76,22 @@ def _of_physics(stage: Usd.Stage, bodies: list[Usd.Prim], joints: list[Usd.Prim]
         "sleep at the start of": asleep,
         "forces that break": broken,
     }
+
+
+def _of_layers(stage: Usd.Stage) -> list[str]:
+    """Units and axes of layers that are others than those of the stage, which USD does not convert."""
+    own = {
+        "metersPerUnit": UsdGeom.GetStageMetersPerUnit(stage),
+        "kilogramsPerUnit": UsdPhysics.GetStageKilogramsPerUnit(stage),
+        "upAxis": UsdGeom.GetStageUpAxis(stage),
+    }
+    words = []
+    for layer in stage.GetUsedLayers():
+        given = {name: layer.pseudoRoot.GetInfo(name) for name in own if layer.pseudoRoot.HasInfo(name)}
+        other = [f"{name} {value}, {own[name]} in the stage" for name, value in given.items() if value != own[name]]
+        if other:
+            words.append(f"units of layer {layer.GetDisplayName()!r} ({'; '.join(other)}: its numbers count as the stage's)")
+    return sorted(words)
 
 
 def _moving(prim: Usd.Prim) -> list[str]:

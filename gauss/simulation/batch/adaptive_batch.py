@@ -138,7 +138,10 @@ class AdaptiveBatch:
     def run(
         self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES
     ) -> AdaptiveBatchResult:
-        """Trajectories to the last of the times, with steps up to ``largest`` [s], from one switching time to the next."""
+        """Trajectories to the last of the times, with steps up to ``largest`` [s], from one switching time to the next.
+
+        An interruption has the samples so far (batch, k, n_q + n_v + 3) as its ``samples``, NaN behind them.
+        """
         end, count = switching.last_end(0.0, float(times[-1])), self.starts.shape[1]
         times = np.minimum(times, end)
         begun = int(np.searchsorted(times, 0.0, side="right"))
@@ -161,7 +164,12 @@ class AdaptiveBatch:
             "every": steps_per_check(self.code.evaluations),
         }
         for before, after in switching.stops(0.0, end):
-            self._until(motions, grid, out, settings | {"end": before}, threads)
+            try:
+                self._until(motions, grid, out, settings | {"end": before}, threads)
+            except KeyboardInterrupt as interruption:
+                out[np.arange(len(times)) >= record["sample"][:, None]] = np.nan
+                interruption.samples = out  # type: ignore[attr-defined]
+                raise
             if after > before:
                 self._cross(motions, record["h"], before, after, LEAST_RESTART_STEP * end)
         arrived = motions[0] >= end
@@ -184,11 +192,15 @@ class AdaptiveBatch:
 
         def work(_):
             queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), loop.lanes()
-            while queue.status == LoopStatus.PAUSED and not stopped.is_set():
-                if queue.following >= queue.last:
-                    begin = next(chunks, count)
-                    queue.following, queue.last, queue.more = begin, min(begin + share, count), float(begin < count)
-                loop(queue, lanes, motions, grid, out, BUDGET)
+            try:
+                while queue.status == LoopStatus.PAUSED and not stopped.is_set():
+                    if queue.following >= queue.last:
+                        begin = next(chunks, count)
+                        queue.following, queue.last, queue.more = begin, min(begin + share, count), float(begin < count)
+                    loop(queue, lanes, motions, grid, out, BUDGET)
+            finally:  # motions under way where it is interrupted
+                under_way = np.flatnonzero(lanes[-1] >= 0.0)
+                motions[:, lanes[-1, under_way].astype(int)] = lanes[:-1, under_way]
 
         in_threads(work, range(threads), threads, stopped)
 

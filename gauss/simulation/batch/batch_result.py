@@ -1,6 +1,7 @@
 """Result of a batch of motions: samples of all, single ones as trajectories, outputs of the scene."""
 
 from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Integral
@@ -169,3 +170,29 @@ class Rollout:
 
     def __getstate__(self) -> dict:
         return {name: value for name, value in vars(self).items() if name != "_measured"}
+
+
+@contextmanager
+def kept_on_interruption(make: Callable[..., Rollout]):
+    """Attach a rollout to a KeyboardInterrupt, for a ``with`` statement: of its ``samples`` (batch, k, n_q + n_v …), if any.
+
+    Parameters
+    ----------
+    make : callable
+        (samples, fields) → rollout.
+    """
+    try:
+        yield
+    except KeyboardInterrupt as error:  # stays a KeyboardInterrupt: no handler of errors may swallow it
+        samples, again = vars(error).pop("samples", None), vars(error).pop("again", {})
+        vars(error).pop("trajectory", None)  # of one motion
+        error.rollout = None if samples is None else _interrupted(make, samples, again)  # type: ignore[attr-defined]
+        raise
+
+
+def _interrupted(make: Callable[..., Rollout], samples: np.ndarray, again: dict[int, Trajectory]) -> Rollout:
+    """Rollout up to an interruption."""
+    missing = tuple(map(int, np.flatnonzero(~np.isfinite(samples).all(axis=(1, 2)))))
+    counts = np.zeros((2, len(samples)), dtype=int)
+    marks = {"repeated": (), "diverged": missing, "reasons": dict.fromkeys(missing, "interrupted"), "again": again}
+    return make(samples, steps=counts[0], rejected=counts[1], **marks)

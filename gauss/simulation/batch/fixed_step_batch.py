@@ -96,19 +96,34 @@ class FixedStepBatch:
         self.points[:, chosen] = fresh.points[:, : fresh.size]
 
     def advance(self, done: int, n: int, h: float, threads: int, control: np.ndarray | None = None):
-        """Make n steps of length h [s] after the first ``done``, under inputs (batch, 1, n_u), without samples."""
+        """Make n steps of length h [s] after the first ``done``, under inputs (batch, 1, n_u), without samples.
+
+        An interruption leaves some motions behind; a single step is completed first.
+        """
         given = [] if control is None else [control]
         held = {} if control is None else {"hold": NEVER, "motions": len(control), "changes": 1}
         strips = self.columns // self.loop.width
         share = -(-strips // (CHUNKS_PER_THREAD * threads) if threads > 1 else -strips) * self.loop.width
-        every, none = steps_per_check(self.loop.evaluations), np.zeros((0, 0, 0))
+        every, none, stopped = steps_per_check(self.loop.evaluations), np.zeros((0, 0, 0)), Event()
+        parts, last = range(0, self.columns, share), done + n
 
         def work(begin: int):
-            part = {"begin": begin, "end": min(begin + share, self.columns), "first": done, "last": done + n}
-            span = BatchSpan(columns=self.columns, rows=0, h=h, keep=NEVER, every=every, **held, **part)
-            self.loop(span, self.points, self.worst, none, *given)
+            for first in range(done, last, BUDGET):
+                if stopped.is_set():
+                    return
+                part = {"begin": begin, "end": min(begin + share, self.columns), "first": first}
+                part |= {"last": min(first + BUDGET, last)}
+                span = BatchSpan(columns=self.columns, rows=0, h=h, keep=NEVER, every=every, **held, **part)
+                self.loop(span, self.points, self.worst, none, *given)
 
-        in_threads(work, range(0, self.columns, share), threads, Event())
+        try:
+            in_threads(work, parts, threads, stopped)
+        except BaseException:
+            stopped.clear()
+            for begin in parts if n == 1 else ():
+                if self.points[0, begin] < (done + 0.5) * h:
+                    work(begin)
+            raise
 
     def run(
         self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None, with_work: bool = False
@@ -117,7 +132,8 @@ class FixedStepBatch:
 
         On request the work of drives, of forces on bodies and of dampers (3,) follows a state.
 
-        Rows of ``control`` (batch, rows, n_u) are held for equally many steps.
+        Rows of ``control`` (batch, rows, n_u) are held for equally many steps. An interruption has the samples so far as its
+        ``samples``, NaN behind them.
         """
         given, held = [], {}
         if control is not None:
@@ -128,7 +144,7 @@ class FixedStepBatch:
         rows[:, 0] = self.points[sample].T
         strips = self.columns // self.loop.width
         share = max(1, min(BUDGET // steps, strips // (CHUNKS_PER_THREAD * threads))) * self.loop.width
-        every, stopped = steps_per_check(self.loop.evaluations), Event()
+        every, stopped, made = steps_per_check(self.loop.evaluations), Event(), np.zeros(self.columns, dtype=int)
 
         def work(begin: int):
             end = min(begin + share, self.columns)
@@ -139,8 +155,14 @@ class FixedStepBatch:
                 sizes = {"columns": self.columns, "rows": rows.shape[1], "row": rows.shape[2]}
                 span = BatchSpan(h=h, keep=keep, every=every, **sizes, **held, **part)
                 self.loop(span, self.points, self.worst, rows, *given)
+                made[begin:end] = part["last"]
 
-        in_threads(work, range(0, self.columns, share), threads, stopped)
+        try:
+            in_threads(work, range(0, self.columns, share), threads, stopped)
+        except KeyboardInterrupt as error:
+            rows[np.arange(rows.shape[1]) > made[:, None] // keep] = np.nan
+            error.samples = rows[: self.size]  # type: ignore[attr-defined]
+            raise
         return rows[: self.size]
 
 

@@ -17,7 +17,8 @@ def repeat(
     """Repeat motions by :func:`gauss.simulate` with the settings ``run``, and warn of energy balances.
 
     Samples and imbalances are changed. Returned are why motions cannot continue, whose samples are NaN from there on, and
-    the trajectories of all that have any.
+    the trajectories of all that have any. An interruption has the samples so far as its ``samples``, NaN behind
+    them, and the trajectories as its ``again``.
 
     Warns
     -----
@@ -26,26 +27,39 @@ def repeat(
     """
     failed: dict[int, str] = {}
     trajectories: dict[int, Trajectory] = {}
-    for k in map(int, doubtful):
+    every = list(map(int, doubtful))
+    for place, k in enumerate(every):
         start = State(0.0, *np.split(starts[:, k], [system.n_q]))
         held = {} if control is None else {"control": control[k], "rate": control.shape[1] / duration}
         try:
             with imbalances() as found:
                 again = simulate(system, duration, state=start, progress=False, **run, **held)
         except SimulationError as error:
-            failed[k], again = str(error), error.trajectory
-            samples[k], share[k] = np.nan, 0.0
-            samples[k, run["times"] == 0.0] = starts[:, k]
-            if again is not None and len(again):
-                reached = np.searchsorted(again.t, run["times"]).clip(max=len(again) - 1)
-                rows = np.flatnonzero(again.t[reached] == run["times"])
-                samples[k, rows] = np.concatenate([again.q, again.v], axis=1)[reached[rows]]
-                trajectories[k] = again
+            failed[k], share[k] = str(error), 0.0
+            _keep(samples[k], starts[:, k], run["times"], error.trajectory)
+            if error.trajectory is not None and len(error.trajectory):
+                trajectories[k] = error.trajectory
             continue
+        except KeyboardInterrupt as error:
+            samples[every[place:]], so_far = np.nan, getattr(error, "trajectory", None)
+            _keep(samples[k], starts[:, k], run["times"], so_far)
+            trajectories |= {} if so_far is None else {k: so_far}
+            error.samples, error.again = samples, trajectories  # type: ignore[attr-defined]
+            raise
         samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share
         trajectories[k] = again
     warn_of_many(system, share, lambda k: f"number {k}", run)
     return failed, trajectories
+
+
+def _keep(samples: np.ndarray, start: np.ndarray, times: np.ndarray, so_far: Trajectory | None):
+    """Keep the samples (k, n_q + n_v) of a motion so far; those behind are NaN."""
+    samples[:] = np.nan
+    samples[times == 0.0] = start
+    if so_far is not None and len(so_far):
+        reached = np.searchsorted(so_far.t, times).clip(max=len(so_far) - 1)
+        rows = np.flatnonzero(so_far.t[reached] == times)
+        samples[rows] = np.concatenate([so_far.q, so_far.v], axis=1)[reached[rows]]
 
 
 def tell_of_divergence(system: System, batch: int, reasons: dict[int, str], trajectories: dict[int, Trajectory]):

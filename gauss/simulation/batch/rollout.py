@@ -1,6 +1,7 @@
 """Batch of motions of one system: all steps in machine code, in the lanes of vector registers."""
 
 from collections.abc import Sequence
+from functools import partial
 from numbers import Integral
 
 import numpy as np
@@ -19,7 +20,7 @@ from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
-from gauss.simulation.batch.batch_result import Rollout
+from gauss.simulation.batch.batch_result import Rollout, kept_on_interruption
 from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
@@ -29,6 +30,7 @@ from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
 from gauss.simulation.grid import MOST_STEPS
 from gauss.simulation.held_inputs import real_numbers
+from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts_of_many
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
 from gauss.system import State, System, refuse_changed
@@ -104,6 +106,8 @@ def rollout(
     BalanceWarning
         If the residual of the energy balance of some exceeds a thousandth of their largest energy; it names the worst of
         them.
+    ContactLawWarning
+        If shapes move by more than they are thick within a step: they may pass through each other unseen.
     DivergenceWarning
         If some motions without ``control`` do not reach the end.
 
@@ -115,6 +119,8 @@ def rollout(
         If there is no such device, no driver or no cuda-bindings, or a function has no code for a GPU.
     StateError
         If the initial states have wrong shapes, or violate the constraints.
+    KeyboardInterrupt
+        On Ctrl-C; its ``rollout`` holds what was computed so far, with NaN behind it, or is None.
     """
     require(system, (System,), "rollout")
     refuse_changed(system)
@@ -172,7 +178,9 @@ def _fixed(
     times = _switching(system, starts, steps * step).times
     if times.switches.size:  # steps of a batch cannot end there
         return _singly(system, starts, run, settings, control)
-    samples = batch.run(steps, step, every, threads, control)
+    keep = partial(_result, system, t, control=control, settings=settings)
+    with kept_on_interruption(keep):
+        samples = batch.run(steps, step, every, threads, control)
     finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
     is_right = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
     doubtful = np.flatnonzero((finite & ~is_right) | ~solved)
@@ -180,8 +188,11 @@ def _fixed(
     with np.errstate(invalid="ignore"):
         share = shares(system, batch.energies, starts, samples, steps * step)
     share = np.where(finite & solved, share, 0.0)
-    failed, again = repeat(system, starts, samples, share, doubtful, steps * step, run, control)
+    with kept_on_interruption(keep):
+        failed, again = repeat(system, starts, samples, share, doubtful, steps * step, run, control)
     reasons = failed | _left_all_bounds(samples, t, np.flatnonzero(solved & ~finite))
+    if method.nonsmooth:
+        warn_of_unseen_contacts_of_many(system, t, samples, step)
     if control is None:
         tell_of_divergence(system, batch.size, reasons, again)
     counts = {"steps": np.full(batch.size, steps), "rejected": np.zeros(batch.size, int)}
@@ -233,8 +244,9 @@ def _marks(doubtful, reasons: dict[int, str], again: dict) -> dict:
 
 
 def _result(system: System, t: np.ndarray, samples: np.ndarray, **fields) -> Rollout:
-    """Rollout of samples (batch, k, n_q + n_v)."""
-    q, v = np.split(samples, [system.n_q], axis=2)
+    """Rollout of samples (batch, k, n_q + n_v), behind which may be work (3,)."""
+    q, v, work = np.split(samples, [system.n_q, system.n_q + system.n_v], axis=2)
+    fields |= {"work": work} if work.size else {}
     return Rollout(system=system, t=t, q=q, v=v, **fields)
 
 
@@ -290,16 +302,19 @@ def _adaptive(
     batch = AdaptiveBatch(machine_code(system, method, (allowed.key, device), make), starts, allowed)
     refuse_inconsistent(system, starts, batch.residual)
     switched = _switching(system, starts, t[-1])
-    found = batch.run(t, step, threads, switched.times)
+    keep = partial(_result, system, t, settings=settings)
+    with kept_on_interruption(keep):
+        found = batch.run(t, step, threads, switched.times)
     doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(switched.jumps))
     with np.errstate(invalid="ignore"):  # of motions that are repeated
         share = shares(system, found.energies, starts, found.samples[:, :, : len(starts)], t[-1])
-    failed, again = repeat(system, starts, found.samples[:, :, : len(starts)], share, doubtful, t[-1], run)
+    with kept_on_interruption(partial(keep, work=found.samples[:, :, len(starts) :])):
+        failed, again = repeat(system, starts, found.samples[:, :, : len(starts)], share, doubtful, t[-1], run)
     found.samples[list(failed), :, len(starts) :] = np.nan
     tell_of_divergence(system, starts.shape[1], failed, again)
     counts = {"steps": found.steps, "rejected": found.rejected}
-    marks = _marks(doubtful, failed, again) | {"errors": found.error, "work": found.samples[:, :, len(starts) :]}
-    return _result(system, t, found.samples[:, :, : len(starts)], settings=settings, **counts, **marks)
+    marks = _marks(doubtful, failed, again) | {"errors": found.error}
+    return _result(system, t, found.samples, settings=settings, **counts, **marks)
 
 
 def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
@@ -322,7 +337,8 @@ def _singly(system: System, starts: np.ndarray, run: dict, settings: dict, contr
         states = (State(0.0, *np.split(start, [system.n_q])) for start in starts.T)
         refuse_inconsistent(system, starts, np.array([constraint_residual(system, state) for state in states]))
     samples, share = np.empty((batch, t.size, len(starts))), np.zeros(batch)
-    failed, again = repeat(system, starts, samples, share, np.arange(batch), settings["duration"], run, control)
+    with kept_on_interruption(partial(_result, system, t, control=control, settings=settings)):
+        failed, again = repeat(system, starts, samples, share, np.arange(batch), settings["duration"], run, control)
     if control is None:
         tell_of_divergence(system, batch, failed, again)
     stats = [again[k].stats if k in again else None for k in range(batch)]

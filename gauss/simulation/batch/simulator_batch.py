@@ -28,6 +28,7 @@ from gauss.simulation.batch.machine_code import STEPPED, batch_program, contact_
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import numbers_in_words, real_numbers
 from gauss.simulation.integrators import usual_fixed_step
+from gauss.simulation.moreau.unseen_contacts import MOTIONS, PassingWatch
 from gauss.simulation.passed_switching import StepsAhead
 from gauss.simulation.simulator import Simulator, SimulatorState
 from gauss.simulation.tolerances import check_tolerances, checked_count
@@ -121,6 +122,7 @@ class SimulatorBatch:
         with one_tier():
             self._begin, self._measure = self._compiled(method)
         self._start, self._size = system.initial_state(), checked_count("batch", batch)
+        self._passing = PassingWatch(system, self.step_size)
         self._ahead = StepsAhead(system, Laws(system), self.step_size)
         self._ahead.look(self._start, self._start.t + self.step_size)
         self._u = np.zeros((self._size, 1, len(self.inputs)))
@@ -181,6 +183,7 @@ class SimulatorBatch:
         self._batch, self._steps, self._warned = self._begin(starts), 0, False
         refuse_inconsistent(self.system, starts, self._batch.residual)
         self._u[:] = 0.0
+        self._passing.begin()
         self.diverged, self.unconfirmed = np.zeros((2, self._size), dtype=bool)
         self.reasons: dict[int, str] = {}
 
@@ -234,6 +237,8 @@ class SimulatorBatch:
         SwitchingWarning
             Once between resets, if a law of the state may have switched undetected within a step; every ten thousand
             steps, if a law of time jumps, or has a feature shorter than the step, in the next ones.
+        ContactLawWarning
+            Once between resets, if shapes may pass through each other unseen at the rates where a call begins or ends.
 
         Raises
         ------
@@ -245,22 +250,47 @@ class SimulatorBatch:
             self._set(u)
         if self._steps + n > self._ahead.seen_from(0.0):
             self._ahead.look(self._start, (self._steps + n) * self.step_size)
-        batch, before = self._batch, self._batch.points.copy() if self.system.nonsmooth else None
-        batch.worst[:] = 0.0
-        batch.advance(self._steps, n, self.step_size, self.threads, self._u if self.inputs else None)
-        self._steps += n
+        self._look_for_passing()
+        batch, before = self._batch, self._advance(n)
         if not self._warned and (batch.unseen > 0.0).any():
             warn_of_passages(self.system, batch.unseen, self.integrator)
             self._warned = True
         finite, solved = np.isfinite(batch.reached).all(axis=0), batch.unsolved <= 0.0
         confirmed = (batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)
-        if before is None:
+        if not self.system.nonsmooth:
             self.unconfirmed |= finite & ~confirmed
         else:
             for k in map(int, np.flatnonzero((finite & ~confirmed) | ~solved)):
                 finite[k] = not self.diverged[k] and self._repeated(k, before[:, k], n)
         self.diverged |= ~finite
         self.reasons |= batch.found_reasons()
+        if n > 1:
+            self._look_for_passing()
+
+    def _advance(self, n: int) -> np.ndarray:
+        """Make steps of all motions, or of none; return the points before, empty for single steps of smooth systems."""
+        batch, single = self._batch, n == 1 and not self.system.nonsmooth and not isinstance(self._batch, SimulatorsInTurn)
+        kept, batch.worst[:] = () if single else tuple(map(copy, batch.kept())), 0.0
+        try:
+            batch.advance(self._steps, n, self.step_size, self.threads, self._u if self.inputs else None)
+        except BaseException:  # Ctrl-C, or an opaque law: single steps are completed, others undone
+            if single:
+                self._steps += n
+            else:
+                batch.keep(*kept)
+            raise
+        self._steps += n
+        return kept[0] if kept else np.zeros((0, 0))
+
+    def _look_for_passing(self):
+        """Look for shapes that may pass through each other within a step, where that is due."""
+        if not self._passing.has_pairs or isinstance(self._batch, SimulatorsInTurn):  # which look themselves
+            return
+        rates = np.nan_to_num(self._batch.reached[self.system.n_q :], posinf=0.0, neginf=0.0)
+        square = np.einsum("ij,ij->j", rates, rates)
+        fastest = np.argsort(-square)[:MOTIONS].tolist()
+        states = lambda: ((f"motion {k}, ", State(self.t, self.q[k], self.v[k])) for k in fastest)  # noqa: E731
+        self._passing.examine(float(square.max()), self._steps, states)
 
     def _set(self, u):
         given, shape = real_numbers(u), (self._size, len(self.inputs))

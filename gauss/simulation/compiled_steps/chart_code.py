@@ -12,9 +12,9 @@ import numpy as np
 from gauss import math
 from gauss.codegen import INTEGER, Function, write
 from gauss.codegen.kernels import RowCode, RowFunction
+from gauss.dynamics.gear_trains import followers
 from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.traced_system import Program
-from gauss.dynamics.train_coordinates import followers
 from gauss.integrators import Tolerance
 from gauss.rotations import rotation_vector_lead
 from gauss.system import turned

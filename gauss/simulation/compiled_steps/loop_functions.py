@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import reduce
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Function, NativeFunction, Scalar, write
 from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, CheckedSwitch, Fixed, FixedStepBatchLoop, Loop
+from gauss.dynamics.laws.narrow_peaks import ends_of
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import PartitionedSystem
@@ -145,7 +147,8 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     def stepped(equations, x, h):
         begin = begun(equations, x)
         reached, cost = method.step(equations, begin, h[0])
-        unseen = math.maximum(program.watch.passes(begin, reached), missed(begin, reached))
+        seen = program.watch.passes(begin, reached), program.watch.oscillates(begin, reached), missed(begin, reached)
+        unseen = reduce(math.maximum, seen)
         reached = replace(reached, rates=begin.rates) if program.inputs else reached  # the next step computes its own
         if method.state_size:  # it satisfies the constraints itself, and a projection would spoil its compensated sums
             residual = equations.largest_violation(reached.state)
@@ -180,8 +183,7 @@ def _missed_peaks(program: Program) -> Callable[[Point, Point], Scalar]:
     look = program.watch.narrow.unresolved(lambda state: program.evaluate(state).acceleration, program.order_inputs)
 
     def missed(begin: Point, end: Point) -> Scalar:
-        parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
-        return look(*parts[0], *parts[1])[0]
+        return look(*ends_of(begin, end))[0]
 
     return missed
 

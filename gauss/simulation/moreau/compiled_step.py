@@ -71,7 +71,8 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
             for apart, deepest in zip(touch.apart, stepper.overlaps.deepest.values(), strict=True)
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
-        unseen = program.watch.passes(point, Point(found.state, found.work, rates))
+        reached = Point(found.state, found.work, rates)
+        unseen = math.maximum(program.watch.passes(point, reached), program.watch.oscillates(point, reached))
         return packed, violation, [1.0, 0.0, doubtful + jam + normals + sum(lost), unseen, *losses], hits
 
     def check(x):

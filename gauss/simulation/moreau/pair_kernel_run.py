@@ -117,7 +117,7 @@ class PairKernelRun(PythonRun):
                 begin = self.motion.kept()  # a step with samples inside is a part of its own
                 for row in self.motion.advance(ends[done:stop]):
                     reached = self._point(row, point)
-                    self.unseen += self.switching.share(point, reached)[0] < 1.0
+                    self.unseen += self.switching.share(point, reached)[0] < 1.0 or self.switching.oscillates(point, reached)
                     point, done, self.steps = reached, done + 1, self.steps + 1
                     if point.state.t >= self.end:
                         self.stepper.check(point.state)

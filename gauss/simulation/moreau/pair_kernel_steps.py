@@ -51,6 +51,9 @@ class PairKernelSteps:
         self.program = program(ask.system, ask.laws, memory=self.gaps, inputs=held)
         self.layout, self.key = self.program.layout, (ask.laws.key, held, self.gaps)
         self.inputs = np.zeros(len(self.layout.parameters))
+        row, end, n_v = self.layout.row, 1 + self.layout.n_q, self.layout.n_v
+        self.parts = slice(1, end), slice(end, end + n_v), slice(end, row), slice(row - 3, row)
+        self.kept_parts = slice(row), slice(row, row + n_v + 3), slice(self.layout.size - self.inputs.size, None)
 
     def prepared_steps(self) -> "PairKernelSteps":
         """The steps themselves: they are called as machine code is."""
@@ -75,11 +78,11 @@ class PairKernelSteps:
 
     def call(self, point: np.ndarray, grid: np.ndarray, n: int):
         """Make n steps from a point to the times of a grid."""
-        motion, layout, n_v = self.motion, self.layout, self.layout.n_v
-        row, end = point[: layout.row].copy(), 1 + layout.n_q
-        motion.state, motion.work = State(float(row[0]), row[1:end], row[end : end + n_v]), row[-3:]
+        motion, (q, v, rates, work), (reached, means, inputs) = self.motion, self.parts, self.kept_parts
+        row = point[reached].copy()
+        motion.state, motion.work = State(float(row[0]), row[q], row[v]), row[work]
         motion.events.clear()  # of the steps of this call alone: a motion from Python may have no end
-        motion.hold(point[layout.size - self.inputs.size :])
+        motion.hold(point[inputs])
         try:
             rows = motion.advance(grid[:n, 0])
         except GaussError:
@@ -91,10 +94,10 @@ class PairKernelSteps:
         if not np.isfinite(last).all():
             self.control.status = float(LoopStatus.NOT_FINITE)
             return
-        point[: layout.row] = last
-        point[layout.row : layout.row + n_v + 3] = (last[end:] - row[end:]) / (last[0] - row[0])  # of rates and work
+        point[reached] = last
+        point[means] = (last[rates] - row[rates]) / (last[0] - row[0])  # of rates and work
         if self.gaps:
-            point[layout.row + n_v + 3 :][: self.gaps] = motion.stepper.gap_forces()
+            point[means.stop :][: self.gaps] = motion.stepper.gap_forces()
 
     def repeated(self, point: np.ndarray, t: float) -> np.ndarray:
         """Point after a step to a time [s].

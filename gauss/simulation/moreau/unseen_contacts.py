@@ -1,6 +1,7 @@
 """Steps within which no shape passes through another one unseen: gaps are looked at once a step."""
 
 import warnings
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from gauss.system import State, System
 
 SHARE = 0.25  # of the thickness of two shapes together that they may move in a step
 EXAMINED = 4  # samples of a motion with the largest rates that are examined, and as many others
+MOTIONS = 16  # of a batch, those with the largest rates, that are examined
+GROWTH = 2.0  # of the sum of squares of the rates between two looks at a motion that is stepped
+STEPS_BETWEEN = 1000  # of two looks otherwise: a look takes as long as some ten steps
 
 
 class StepLimit:
@@ -83,21 +87,92 @@ def warn_of_unseen_contacts(trajectory: Trajectory):
     ContactLawWarning
         With the names of two shapes, and a time.
     """
-    limit, step = step_limit(trajectory.system), trajectory.step
-    if not limit.thickness.size or step is None or not trajectory.v.size:
+    system, step = trajectory.system, trajectory.step
+    if step is None or not trajectory.v.size or not step_limit(system).thickness.size:
         return
-    fastest = np.argsort(-np.abs(trajectory.v / trajectory.system.scale.rates).max(axis=1))[:EXAMINED]
+    fastest = np.argsort(-_largest_rates(system, trajectory.v))[:EXAMINED]
     spread = np.linspace(0, len(trajectory.t) - 1, EXAMINED).astype(int)
     for k in sorted({*fastest.tolist(), *spread.tolist()}):
-        if names := limit.passing(trajectory.state(k), step):
-            text = f"in a step of {step:g} s {names[0]!r} and {names[1]!r} move by more than they are thick"
-            warnings.warn(
-                f"{trajectory.system.scene.name!r}: t = {trajectory.t[k]:.6g} s: {text}, and may pass through each other "
-                "unseen; shorten the step, or leave it out for error control by rtol=.",
-                ContactLawWarning,
-                stacklevel=user_level(),
-            )
+        if warn_of_passing(system, trajectory.state(k), step):
             return
+
+
+def warn_of_unseen_contacts_of_many(system: System, t: np.ndarray, samples: np.ndarray, step: float):
+    """Warn as :func:`warn_of_unseen_contacts` of motions (batch, k, n_q + n_v) at times (k,) [s], by their numbers."""
+    q, v = np.split(samples, [system.n_q], axis=2)
+    if not v.size or not step_limit(system).thickness.size:
+        return
+    with np.errstate(invalid="ignore"):
+        rates = np.nan_to_num(_largest_rates(system, v), nan=0.0, posinf=0.0)
+    rows = rates.argmax(axis=1)
+    for k in np.argsort(-rates.max(axis=1))[:MOTIONS].tolist():
+        row = int(rows[k])
+        if warn_of_passing(system, State(float(t[row]), q[k, row], v[k, row]), step, f"motion {k}, "):
+            return
+
+
+def warn_of_passing(system: System, state: State, step: float, which: str = "") -> bool:
+    """Warn of two shapes that may pass through each other within a step [s] from a state; return whether there are any."""
+    names = step_limit(system).passing(state, step)
+    if names:
+        text = f"in a step of {step:g} s {names[0]!r} and {names[1]!r} move by more than they are thick"
+        warnings.warn(
+            f"{system.scene.name!r}: {which}t = {state.t:.6g} s: {text}, and may pass through each other "
+            "unseen; shorten the step, or simulate without it, for error control by rtol=.",
+            ContactLawWarning,
+            stacklevel=user_level(),
+        )
+    return names is not None
+
+
+class PassingWatch:
+    """Looks at the shapes of motions that are stepped: where their rates have grown, and every thousand steps.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    step : float
+        Step [s].
+
+    Attributes
+    ----------
+    has_pairs : bool
+        Whether the system has shapes that could pass through each other.
+    """
+
+    def __init__(self, system: System, step: float):
+        self.system, self.step, self.has_pairs = system, step, bool(system.n_v and step_limit(system).thickness.size)
+        self.begin()
+
+    def begin(self):
+        """Begin a motion, whose first rates are looked at."""
+        self._grown, self._due = -np.inf, 0.0
+
+    def examine(self, square: float, steps: int, states: Callable[[], Iterable[tuple[str, State]]]):
+        """Look at states of motions where that is due, and warn once.
+
+        Parameters
+        ----------
+        square : float
+            Largest sum of squares of the rates.
+        steps : int
+            Steps so far.
+        states : callable
+            () → states of the motions, each after words that say which it is.
+        """
+        if square <= self._grown and steps < self._due:
+            return
+        for which, state in states():
+            if warn_of_passing(self.system, state, self.step, which):
+                self._grown = self._due = np.inf
+                return
+            self._grown, self._due = max(self._grown, GROWTH * float(state.v @ state.v)), steps + STEPS_BETWEEN
+
+
+def _largest_rates(system: System, v: np.ndarray) -> np.ndarray:
+    """Largest rate (...) of rates (..., n_v), relative to the scale of the scene."""
+    return np.abs(v / system.scale.rates).max(axis=-1)
 
 
 def _pairs(scene: Scene) -> list[tuple[Collider, Collider]]:
@@ -110,7 +185,7 @@ def _pairs(scene: Scene) -> list[tuple[Collider, Collider]]:
 def thickness(shape: Collider) -> float:
     """Least extent of a shape [m]."""
     corners = shape.corners - shape.corners.mean(axis=0)
-    extents = np.ptp(corners @ np.linalg.svd(corners, full_matrices=True)[2].T, axis=0)
+    extents = np.ptp(corners @ np.linalg.svd(corners, full_matrices=len(corners) < 3)[2].T, axis=0)
     return 2.0 * shape.radius + float(extents.min())
 
 

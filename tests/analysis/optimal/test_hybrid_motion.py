@@ -50,6 +50,7 @@ def test_a_period_of_bounces_takes_the_least_impulse():
     assert found.cost == pytest.approx(cost(w), rel=EXACT, abs=EXACT)
 
 
+@pytest.mark.slow
 def test_a_mass_leaves_a_stop_when_it_pays():
     """From rest on a stop to rest at a height h, in a free time: u = 2 g (1 − t / T) over T² = 6 h / g after it leaves."""
     height = 0.5
@@ -103,6 +104,7 @@ def steady_speed(half):
     return keeps * np.sqrt(gained / (1.0 - keeps**2))
 
 
+@pytest.mark.slow
 def test_a_wheel_of_spokes_rolls_from_contact_to_contact():
     half, steps = np.pi / SPOKES, 3
     speed = steady_speed(half)
@@ -117,6 +119,7 @@ def test_a_wheel_of_spokes_rolls_from_contact_to_contact():
     assert np.diff([tip[0] for tip in tips]) == pytest.approx([pace] * (steps - 1), rel=SAME)
 
 
+@pytest.mark.slow
 def test_a_speed_between_limits_at_a_contact():
     """Of the speeds at the start that one is found from which the second spoke stands upright at the speed asked for."""
     half, asked = np.pi / SPOKES, 1.2
@@ -151,6 +154,7 @@ def hopper():
     return scene
 
 
+@pytest.mark.slow
 def test_a_hopper_repeats_its_hop():
     """Its period, foot on the floor and in the air, is that of the event-driven simulation of its inputs.
 
@@ -168,6 +172,7 @@ def test_a_hopper_repeats_its_hop():
     assert found.v[0] == pytest.approx([0.0, found.v[-1].sum()], abs=EXACT)
 
 
+@pytest.mark.slow
 def test_a_rocker_is_pressed_onto_a_stop():
     """A four-bar runs against a stop and rests there: its motion is the event-driven simulation of its inputs."""
     scene = gauss.load("four_bar")
@@ -184,6 +189,7 @@ def test_a_rocker_is_pressed_onto_a_stop():
     assert np.abs(found.phases[1].v).max() <= SAME
 
 
+@pytest.mark.slow
 def test_a_knee_locks_at_its_stop():
     """A swinging leg extends until its knee locks: the impact of two coupled joints is that of the simulation."""
     scene = gauss.Scene("leg")
@@ -234,6 +240,7 @@ REFUSED = {  # what is refused, and words of the message
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", REFUSED)
 def test_bad_input_is_refused_by_name(what):
     call, error, words = REFUSED[what]

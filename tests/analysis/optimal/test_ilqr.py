@@ -140,6 +140,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", REFUSED)
 def test_bad_input_is_refused_by_name(what):
     call, error, words = REFUSED[what]

@@ -43,6 +43,7 @@ def sampled(motion):
     return own.simulate(times=np.linspace(motion.t[0], motion.t[-1], 4001), rtol=1e-10, atol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("intervals", [3, 20])
 def test_a_gap_that_is_touched_stays_open(intervals):
     """Two cubics that meet at rest on the floor, at the time of least effort: ∫ (x″ + g)² of each in closed form."""

@@ -103,6 +103,7 @@ def test_least_time_of_a_double_integrator_is_bang_bang():
     np.testing.assert_allclose(motion.law(middle)[:, 0], np.where(middle < 1.0, 1.0, -1.0), atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [2, 4, 6])
 def test_least_effort_of_a_double_integrator(order):
     motion = gauss.optimal_motion(cart(100.0), 0.8, start=REST, end=REST | {"rail": 0.5}, intervals=8, order=order)
@@ -281,6 +282,7 @@ def test_too_few_refinements_are_named():
         gauss.optimal_motion(swing_up(), 2.0, start={"rail": 0.0, "pin": 0.0}, end={"pin": 1.0}, refinements=0, intervals=3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "length, time, mass", [(1e9, 1, 1), (1e-9, 1, 1), (1, 1e9, 1), (1, 1e-9, 1), (1, 1, 1e9), (1, 1, 1e-9)]
 )

@@ -1,4 +1,4 @@
-"""Pictures of the gallery: every matplotlib figure that an example keeps under a name, and the films that it writes."""
+"""The gallery: order of its sections, matplotlib figures that an example keeps under a name, films that it writes."""
 
 import shutil
 from pathlib import Path
@@ -6,6 +6,13 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 DPI = 110
+SECTIONS = ("first", "arms", "loops", "linkages", "rotors", "servo", "contact", "control", "analysis", "solvers", "issues")
+
+
+def of_sections(folder: str) -> int:
+    """Place of a folder of examples among the others."""
+    name = Path(folder).name
+    return SECTIONS.index(name) if name in SECTIONS else len(SECTIONS)
 
 
 def scraped(block, block_vars: dict, gallery_conf: dict) -> str:
