@@ -23,9 +23,11 @@ from gauss.codegen.ir_blocks import (
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.outlined_pieces import lengths, write_pieces
-from gauss.codegen.schedule import Schedule, schedule
+from gauss.codegen.schedule import Schedule, part, schedule
 from gauss.codegen.straight_line import calling, result_rooms, straight_line
 from gauss.codegen.terminal_line import function_written
+
+MOST_OPERATIONS = 6  # for each input: so few are made twice
 
 
 class Writer:
@@ -100,12 +102,28 @@ class Writer:
             self._blocks[key] = write_block(self.module, name, self._scheduled(function), width)
         return self._blocks[key]
 
-    def export(self, function: Function | NativeFunction, name: str):
-        """Write ``name(double* in, double* out)``, one state."""
+    def export(self, function: Function | NativeFunction, name: str, *others: Function | NativeFunction):
+        """Write ``name(double* in, double* out)``, one state; outputs of other functions of the same inputs follow."""
         entry = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER, POINTER]), name=name)
-        b, one = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1)
-        b.call(self.body(function), [entry.args[0], one, entry.args[1], one])
+        b, stride, place = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1), 0
+        for one in (function, *others):
+            b.call(self.body(one), [entry.args[0], stride, b.gep(entry.args[1], [INTEGER(place)]), stride])
+            place += len(one.outputs)
         b.ret_void()
+
+    def divided(self, function: Function, count: int) -> tuple[Function, Function] | None:
+        """The first outputs and the others as functions of their own, each rounded as in the whole.
+
+        None where the others take so many operations that some are worth sharing.
+        """
+        whole = self._scheduled(function)
+        beside = part(whole, whole.outputs[count:])
+        if len(beside.nodes) > MOST_OPERATIONS * len(whole.inputs):
+            return None
+        parts = part(whole, whole.outputs[:count]), beside
+        first, others = (Function(function.name, whole.inputs, one.outputs, function.parameters) for one in parts)
+        self._schedules |= {first: parts[0], others: parts[1]}
+        return first, others
 
     def _scheduled(self, function: Function) -> Schedule:
         """Schedule of the operations, the same for all widths."""

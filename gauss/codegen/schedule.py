@@ -165,3 +165,15 @@ def _terms(root: Expression, within) -> tuple[list, set]:
         signs = (-sign,) if node.op == "neg" else (sign, sign if node.op == "add" else -sign)
         waiting += reversed(list(zip(signs, node.operands, strict=True)))
     return terms, inside
+
+
+def part(whole: Schedule, outputs: list) -> Schedule:
+    """Schedule of some of the outputs: each is computed, and rounded, as in the whole."""
+    known, needed = {node.index: node for node in whole.nodes}, set()
+    waiting = [x.index for x in outputs if isinstance(x, Expression)]
+    while waiting:
+        index = waiting.pop()
+        if index in known and index not in needed:
+            needed.add(index)
+            waiting += [x.index for x in known[index].operands]
+    return Schedule([node for node in whole.nodes if node.index in needed], whole.inputs, outputs)

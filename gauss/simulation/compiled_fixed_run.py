@@ -136,22 +136,25 @@ class CompiledFixedRun(CompiledRun):
 
     def _advance_held(self, pairs: np.ndarray, out: np.ndarray):
         """Run the steps of the grid up to some further samples of the control law, without Python beside the law."""
-        control, count = self.control, len(pairs)
-        arrays = (address(array) for array in (self.point, self.confirmed, pairs, out))
-        given, (point, confirmed, grid, rows) = ctypes.byref(control), arrays
-        first = bisect_right(self.stops, int(control.sample))
+        control, count, point, n_q = self.control, len(pairs), self.point, 1 + self.layout.n_q
+        run, (record, begin, confirmed, grid, rows) = self.loop.entry.call, self.arrays(point, self.confirmed, pairs, out)
+        at, q, v = self.held.at, point[1:n_q], point[n_q : n_q + self.layout.n_v]  # type: ignore[union-attr]  # held here
+        values: Any = point[point.size - len(self.inputs) :].data
+        done, room = int(control.sample), 0
+        first = bisect_right(self.stops, done)
         for until in (*self.stops[first : first + HELD_SAMPLES], count)[:HELD_SAMPLES]:
-            while control.sample < until and max(control.rows, control.notes) < len(out):
-                done = int(control.sample)
-                steps = min(until - done, len(out) - int(max(control.rows, control.notes)))
-                self.loop.entry.call(given, point, confirmed, grid + PAIR_BYTES * done, rows, steps)
-                if control.status != LoopStatus.DONE:
+            while done < until:
+                if room <= 0 and (room := len(out) - int(max(control.rows, control.notes))) <= 0:
+                    control.status = LoopStatus.PAUSED
                     return
-            if control.sample < until:
-                break
+                steps = min(until - done, room)
+                run(record, begin, confirmed, grid.value + PAIR_BYTES * done, rows, steps)
+                if control.status:  # not done
+                    return
+                done, room = done + steps, room - steps
             if until in self.holds:
-                self._hold(self.holds[until])
-        control.status = LoopStatus.PAUSED if control.sample < count else LoopStatus.DONE
+                values[:] = self.inputs = at(self.holds[until], point.item(0), q.copy(), v.copy())
+        control.status = LoopStatus.PAUSED if done < count else LoopStatus.DONE
 
     def _cross(self, pairs: np.ndarray, after: float):
         """Continue on the grid after a switching time at which prescribed velocities jump."""

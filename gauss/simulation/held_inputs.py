@@ -132,7 +132,7 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
         If they are not a finite number for each input.
     """
     if type(value) is np.ndarray and value.dtype is FLOAT and value.shape == (len(names),):
-        if all(map(isfinite, value.tolist())):
+        if isfinite(sum(value.tolist())):
             return value.copy()  # the usual case, quickly
     found = real_numbers(value)
     if found is None or found.size != len(names):
@@ -147,6 +147,8 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
 
 def real_numbers(value) -> np.ndarray | None:
     """Array of numbers; None of anything else."""
+    if np.ma.is_masked(value):
+        return None
     try:
         found = np.asarray(value)
     except (ValueError, RuntimeError):  # ragged; a tensor of torch in a graph of gradients

@@ -26,7 +26,7 @@ from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, random_changes
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_runs import fixed_run
-from gauss.simulation.held_inputs import HeldInputs, checked_inputs
+from gauss.simulation.held_inputs import FLOAT, HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
@@ -42,6 +42,7 @@ FAILURES = {
     LoopStatus.UNCONFIRMED: "the check does not confirm the accelerations",
     LoopStatus.OFF_CONSTRAINTS: "the projection onto the constraints failed",
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
+    LoopStatus.NOT_FINITE: "the motion is not finite",
 }
 STEP_NUMBERS = 6  # in memory for each step of a call
 FEW_STEPS = 16  # so many times are written one by one in less time than as arrays
@@ -151,9 +152,9 @@ class Simulator:
         self._start, self._layout = problem.start, run.layout
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
         self._u, self._before = self._point[run.layout.size - n_u :], self._point.tobytes()
-        self._reached = self._point[1 : 1 + run.layout.n_q + run.layout.n_v]
-        self._rates, self._passing = self._reached[run.layout.n_q :], PassingWatch(self.system, self.step_size)
-        self._still = np.zeros(self._reached.size)
+        self._values: Any = self._u.data
+        rates = self._point[1 + run.layout.n_q :][: run.layout.n_v]
+        self._rates, self._passing = rates, PassingWatch(self.system, self.step_size)
         self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps, self._options = 0.0, 0, (self.step_size, integrator, stabilisation)
@@ -175,6 +176,7 @@ class Simulator:
         """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
         self._given: tuple = self._run.arrays(self._point, self._confirmed, self._grid, self._out)
         self._times = self._grid[:, 0]
+        self._end: Any = self._grid.data.cast("B").cast("d")  # the first number is the end of the first step
 
     def reset(self, state: State | None = None, *, seed: int | None = None, spread: float = 0.05) -> State:
         """Begin anew; inputs are zero until the next step.
@@ -250,7 +252,7 @@ class Simulator:
         self._before = self._point.tobytes()
         if n == 1:
             self._steps += 1
-            self._times[0] = self._begun + self._steps * self.step_size
+            self._end[0] = self._begun + self._steps * self.step_size
         else:
             self._plan_steps(n)
         try:
@@ -262,8 +264,6 @@ class Simulator:
             raise
         if self._run.control.status:
             self._recover(n)
-        if not isfinite(self._reached.dot(self._still)):  # NaN if an entry is not finite
-            self._refuse(self._steps - n, "the motion is not finite")
         if self._switches and self._run.control.unseen:
             self._warn_of_switching()
         if self._passing.has_pairs:
@@ -284,10 +284,13 @@ class Simulator:
             warn_of_undetected(self.system.scene.name, f"before t = {self.t:.6g} s, within a step of {self.step_size:g} s,")
 
     def _set(self, u):
-        given = u if isinstance(u, np.ndarray) and u.dtype == float else _floats(u)
-        if given is None or given.shape != self._u.shape or not all(map(isfinite, given.tolist())):
+        given = u if type(u) is np.ndarray and u.dtype is FLOAT else _floats(u)
+        if given is None or given.shape != self._u.shape or not isfinite(sum(given.tolist())):
             given = checked_inputs(u, self.inputs, self.t)
-        self._u[:] = given
+        try:
+            self._values[:] = given
+        except ValueError:  # where doubles do not begin
+            self._u[:] = given
         if isinstance(self._run, CompiledFixedRun) and self._run.method.starts_from_accelerations:
             # its method state holds the accelerations under the inputs before
             point = self._layout.point(self._point)
@@ -323,6 +326,8 @@ class Simulator:
             if status != LoopStatus.UNSOLVED or not isinstance(self._run, CompiledMoreauRun | PairKernelSteps):
                 self._refuse(before, FAILURES.get(status, status.name))
             self._point[:] = self._run.repeated(self._point, float(ends[reached]))
+            if not np.isfinite(self._point[: self._layout.row]).all():
+                self._refuse(before, FAILURES[LoopStatus.NOT_FINITE])
             rest = ends[reached + 1 :]
             self._steps, self._times[: rest.size] = before + n, rest
             if rest.size:
@@ -404,6 +409,8 @@ def _unchecked(n: int) -> np.ndarray:
 
 
 def _floats(u) -> np.ndarray | None:
+    if np.ma.is_masked(u):
+        return None
     try:
         return np.asarray(u, dtype=float)
     except (TypeError, ValueError, RuntimeError):  # the last of torch

@@ -41,14 +41,23 @@ def test_the_end_is_returned_without_times():
     assert q[0] == gauss.simulate(gauss.load("pendulum"), 0.1, times=[0.1]).q[0]
 
 
+def test_initial_states_are_numbers_of_any_kind():
+    motion = gauss.prepare(gauss.load("pendulum"), 0.1)
+    expected = motion(np.array([1.0]), np.zeros(1))[0].copy()
+    unaligned = np.frombuffer(b"\0" + np.array([1.0]).tobytes(), dtype=float, offset=1)
+    for q in ([1], (1.0,), unaligned, np.array([1.0], dtype=">f8"), np.array([1]), np.ones(3)[::-3]):
+        assert np.array_equal(motion(q, [0])[0], expected)
+
+
 def test_motions_that_cannot_be_prepared_are_refused():
     scene = gauss.load("pendulum")
     with pytest.raises(SimulationError, match="fixed steps"):
         gauss.prepare(scene, 0.1, integrator="rk4", step=1e-2)
     with pytest.raises(SimulationError, match="events"):
         gauss.prepare(gauss.load("friction_oscillator"), 0.1)
-    with pytest.raises(StateError, match="1 coordinates"):
-        gauss.prepare(scene, 0.1)([1.0, 2.0], [0.0])
+    for q in ([1.0, 2.0], 1.0, ["1"], [1.0 + 1.0j], np.ma.masked_array([1.0], [True]), [None]):
+        with pytest.raises(StateError, match="1 coordinates"):
+            gauss.prepare(scene, 0.1)(q, [0.0])
     with pytest.raises(StateError, match="finite"):
         gauss.prepare(scene, 0.1)([np.nan], [0.0])
     joint = next(iter(scene.joints))

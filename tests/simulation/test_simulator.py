@@ -1,5 +1,6 @@
 """The simulator: its steps are those of simulate, bit for bit; snapshots, outputs, refusals."""
 
+import ctypes
 import warnings
 from functools import partial
 
@@ -112,7 +113,9 @@ def test_the_seed_decides_the_start():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("u", [[np.nan], [np.inf], [1.0, 2.0], [], "x", None, [[1.0], [2.0]]])
+@pytest.mark.parametrize(
+    "u", [[np.nan], [np.inf], [1.0, 2.0], [], "x", None, [[1.0], [2.0]], np.ma.masked_array([1.0], [True])]
+)
 def test_refused_inputs_change_nothing(u):
     sim, other = simulator("cart_pole", "rail", None), simulator("cart_pole", "rail", None)
     sim.step([1.0]), other.step([1.0])
@@ -120,6 +123,17 @@ def test_refused_inputs_change_nothing(u):
         sim.step([u] if u is None else u)
     sim.step(), other.step()
     assert np.array_equal(sim.state.q, other.state.q)
+
+
+UNALIGNED = np.frombuffer(b"\0" + np.array([1.0]).tobytes(), dtype=float, offset=1)
+FROM_CTYPES = np.ctypeslib.as_array((ctypes.c_double * 1)(1.0))
+
+
+@pytest.mark.parametrize("u", [1.0, (1,), [True], UNALIGNED, FROM_CTYPES, np.array([1.0], dtype=">f8"), np.ones(3)[::-3]])
+def test_inputs_are_numbers_of_any_kind(u):
+    sim, other = simulator("cart_pole", "rail", None), simulator("cart_pole", "rail", None)
+    sim.step(u), other.step([1.0])
+    assert np.array_equal(sim.state.v, other.state.v)
 
 
 def test_inputs_that_a_scene_does_not_declare_are_refused():

@@ -22,7 +22,7 @@ class Due(IntEnum):
     STEP = 0  # step
     SAMPLE = 1  # step and write a sample
     OFF_GRID_SAMPLE = 2  # write the sample of a step, but continue from the point before
-    UNCHECKED = 3  # step, without a check where the call ends
+    UNCHECKED = 3  # step, without a check where the call ends but that it is finite
 
 
 @dataclass(frozen=True)
@@ -111,9 +111,14 @@ def _write(code: LoopCode, method: Fixed):
         i = b.add(i, INTEGER(1))
         kind = b.load(code.at(pair, 1))
         goes_on = b.fcmp_ordered("!=", kind, code.number(Due.OFF_GRID_SAMPLE))
-        is_end = b.and_(b.icmp_signed("==", i, code.budget), b.fcmp_ordered("!=", kind, code.number(Due.UNCHECKED)))
-        due = b.and_(goes_on, b.or_(is_end, code.is_multiple("steps", "every")))
+        is_end, unchecked = b.icmp_signed("==", i, code.budget), b.fcmp_ordered("==", kind, code.number(Due.UNCHECKED))
+        due = b.and_(goes_on, b.or_(b.and_(is_end, b.not_(unchecked)), code.is_multiple("steps", "every")))
         b.store(code.number(0.0), error)
+        with b.if_then(b.and_(is_end, unchecked)), code.each(method.row) as k:
+            none = b.fmul(b.load(b.gep(reached, [k])), code.number(0.0))  # NaN if an entry is not finite
+            b.store(b.fadd(b.load(error), none), error)
+        code.set("status", LoopStatus.NOT_FINITE)
+        leave_if(b.fcmp_unordered("!=", b.load(error), code.number(0.0)))
         with b.if_then(due):
             code.check(method.check, reached, error)
         code.set("status", LoopStatus.UNCONFIRMED)

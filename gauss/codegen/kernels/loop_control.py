@@ -16,6 +16,7 @@ class LoopStatus(IntEnum):
     UNCONFIRMED = 3  # the check did not confirm the accelerations of a state
     OFF_CONSTRAINTS = 4  # projection failed after a fixed step
     UNSOLVED = 5  # the equations of an implicit step were not solved
+    NOT_FINITE = 6  # a number of the state is not finite
 
 
 class Numbers(ctypes.Structure):

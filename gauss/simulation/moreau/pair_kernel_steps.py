@@ -91,6 +91,9 @@ class PairKernelSteps:
         self.control.status = float(LoopStatus.DONE if len(rows) == n else LoopStatus.UNSOLVED)
         row = rows[-2] if len(rows) > 1 else row
         last = rows[-1]
+        if not np.isfinite(last).all():
+            self.control.status = float(LoopStatus.NOT_FINITE)
+            return
         point[reached] = last
         point[means] = (last[rates] - row[rates]) / (last[0] - row[0])  # of rates and work
         if self.gaps:
