@@ -6,7 +6,7 @@ The import is ``gauss``; the distribution has another name, for ``gauss`` on the
 import re
 from warnings import warn
 
-VERSION = "0.2.1"
+VERSION = "0.2.2"
 REMOVAL = "0.3.0"  # in which the former names of this version go: they work for one minor version
 DISTRIBUTION = "gauss-dynamics"
 REQUIREMENT = re.compile(r"[\w.-]+")  # name of the distribution in a line of requirements

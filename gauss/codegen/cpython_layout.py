@@ -29,18 +29,14 @@ TABLE_ENTRIES = (
     "new_tuple",
     "set_item",
     "new_array",
-    "kept",
 )  # names of the entries of the address table
-COUNT_OFFSET, TYPE_OFFSET = 0, 8  # offsets in PyObject of the low 32 bits of ob_refcnt, and of ob_type
-# offsets of the fields of PyArrayObject
-ARRAY_OFFSETS = {"data": 16, "nd": 24, "dimensions": 32, "descr": 56, "flags": 64, "weakrefs": 72}
-CONTIGUOUS, OWNS, ALIGNED, CAN_BE_WRITTEN, WARNS = 0x0001, 0x0004, 0x0100, 0x0400, 1 << 31  # numpy's flags of an array
+TYPE_OFFSET = 8  # offset of ob_type in PyObject
+ARRAY_OFFSETS = {"data": 16, "nd": 24, "dimensions": 32, "descr": 56, "flags": 64}  # offsets of the fields of PyArrayObject
+CONTIGUOUS, ALIGNED, CAN_BE_WRITTEN, WARNS = 0x0001, 0x0100, 0x0400, 1 << 31  # numpy's flags of an array
 READABLE_FLAGS = (CONTIGUOUS | ALIGNED,) * 2  # mask, and value required under it
 WRITEABLE_FLAGS = (CONTIGUOUS | ALIGNED | CAN_BE_WRITTEN | WARNS, CONTIGUOUS | ALIGNED | CAN_BE_WRITTEN)
-OWN_FLAGS = WRITEABLE_FLAGS[0] | OWNS, WRITEABLE_FLAGS[1] | OWNS
 NPY_DOUBLE = 12  # numpy's type number of double
 TYPE_WORD_OFFSET = 24  # offset, in PyArray_Descr, of 8 bytes: kind, character, byte order, a flag of numpy 1, type number
-KEPT = 2  # arrays of a result that are kept: in x = f(…) the last one is still x when the next one is made
 PYARRAY_NEW = 93  # index of PyArray_New in numpy's C-API table
 NUMPY_ABI = (0x01000009, 0x02000000)  # of numpy 1 and 2
 FASTCALL, KEYWORDS = 0x0080, 0x0002  # calling convention: METH_FASTCALL, METH_KEYWORDS
@@ -54,15 +50,11 @@ class PinnedObjects:
     ----------
     fallback, over_limit : callable
         Called for arguments that the machine code does not accept, and for results above their limits.
-    kept : int
-        Address of a tuple of arrays that serve again. It belongs to the owner of the function alone: no other tuple can be
-        written to.
     """
 
-    def __init__(self, fallback, over_limit, kept: int):
+    def __init__(self, fallback, over_limit):
         self.pinned: dict[str, object] = {"ndarray": np.ndarray, "float": float, "none": None}
         self.pinned |= {"out": sys.intern("out"), "fallback": fallback, "over_limit": over_limit}
-        self.kept = kept
 
     def addresses(self) -> ctypes.Array:
         """Address table, in the order of ``TABLE_ENTRIES``."""
@@ -79,7 +71,7 @@ class PinnedObjects:
         found = {name: id(pinned) for name, pinned in self.pinned.items()}
         for name, function in functions.items():
             found[name] = _address_of(getattr(ctypes.pythonapi, function))
-        found |= {"new_array": _numpy_table()[PYARRAY_NEW], "kept": self.kept}
+        found["new_array"] = _numpy_table()[PYARRAY_NEW]
         return (ctypes.c_int64 * len(TABLE_ENTRIES))(*(found[name] for name in TABLE_ENTRIES))
 
 
@@ -96,8 +88,6 @@ def is_known() -> bool:
         return False
     return (
         version in NUMPY_ABI
-        and np.ndarray.__weakrefoffset__ == ARRAY_OFFSETS["weakrefs"]
-        and _counts_references(np.arange(3.0))
         and all(_is_as_expected(array) for array in _examples())
         and all(_has_type_word(dtype) for dtype in _example_types())
     )
@@ -156,14 +146,6 @@ def _examples() -> list[np.ndarray]:
 def _example_types() -> list[np.dtype]:
     copied = pickle.loads(pickle.dumps(np.dtype(float)))
     return [np.dtype(float), copied, np.dtype(np.float32), np.dtype(float).newbyteorder(), np.dtype(complex), np.dtype(int)]
-
-
-def _counts_references(array: np.ndarray) -> bool:
-    """Whether an object has the number of references to it at ``COUNT_OFFSET``."""
-    count = lambda: ctypes.c_uint32.from_address(id(array) + COUNT_OFFSET).value  # noqa: E731
-    before = count()
-    more = [array] * 5
-    return count() == before + len(more)
 
 
 def _has_type_word(dtype: np.dtype) -> bool:

@@ -45,7 +45,6 @@ class _FastcallOwner(NamedTuple):
     fallback: PythonWrapper  # its function holds the machine code
     definition: tuple[bytes, ...]
     entry: "_PythonEntry"
-    kept: tuple[None, ...]  # the last arrays of results, put there by the machine code
 
     def __reduce__(self):
         make, arguments = self.fallback.__reduce__()
@@ -124,19 +123,17 @@ def fastcall(
     Returns
     -------
     callable
-        Returns ``out``, or arrays that nothing else refers to. It raises :class:`gauss.errors.StateError` if an argument
-        does not fit.
+        Returns ``out``, or new arrays. It raises :class:`gauss.errors.StateError` if an argument does not fit.
     """
     code, outputs = entry
     fallback = PythonWrapper(_CtypesCall(code, outputs), interface, outputs, over_limit, name, doc, batch)
     if not cpython_layout.is_known():
         return fallback
-    kept = (None,) * (cpython_layout.KEPT * len(fallback.shapes))
-    called = _PythonEntry(cpython_layout.PinnedObjects(fallback, over_limit, id(kept)))
+    called = _PythonEntry(cpython_layout.PinnedObjects(fallback, over_limit))
     address = called.filled(code.first_address)
     definition = cpython_layout.method_definition(name, address, f"{name}{interface.signature()}\n--\n\n{doc}")
     called.definition = definition[0]
-    found = cpython_layout.new_builtin(_FastcallOwner(fallback, definition, called, kept))
+    found = cpython_layout.new_builtin(_FastcallOwner(fallback, definition, called))
     code.add_user(called)
     return found
 

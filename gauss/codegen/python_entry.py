@@ -1,11 +1,6 @@
-"""Machine code that Python calls: it reads arrays, runs a function on their numbers, and returns arrays of its results.
-
-An array of results that nothing refers to any more serves again: to make an array and to free it costs 0.07 to 0.1 µs, as
-much as many functions.
-"""
+"""Machine code that Python calls: it reads arrays, runs a function on their numbers, and returns arrays of its results."""
 
 from collections.abc import Callable
-from functools import partial
 from itertools import accumulate
 from math import prod
 
@@ -159,30 +154,18 @@ class EntryWriter:
 
     def _data(self, thing, shape: Shape, flags: tuple[int, int]):
         """Data of an argument, required to be an array of doubles; flags: mask, and value required under it."""
-        for condition in self._array_conditions(thing, shape, flags):
-            self._require(condition())
-        return self._field(thing, cpython_layout.ARRAY_OFFSETS["data"], DOUBLE.as_pointer())
-
-    def _array_conditions(self, thing, shape: Shape, flags: tuple[int, int]) -> list[Callable]:
-        """Conditions, each evaluated where those before hold: an array of doubles of a shape, with these flags."""
         b, at = self.b, cpython_layout.ARRAY_OFFSETS
-
-        def is_double():
-            word = self._field(self._field(thing, at["descr"], OBJECT), cpython_layout.TYPE_WORD_OFFSET, INTEGER)
-            return b.icmp_signed("==", word, INTEGER(cpython_layout.type_word(np.dtype(float))))
-
-        def has_length(k: int, size: int):
+        self._require(self._is(thing, "ndarray"))
+        word = self._field(self._field(thing, at["descr"], OBJECT), cpython_layout.TYPE_WORD_OFFSET, INTEGER)
+        self._require(b.icmp_signed("==", word, INTEGER(cpython_layout.type_word(np.dtype(float)))))
+        self._require(b.icmp_signed("==", self._field(thing, at["nd"], FLAG), FLAG(len(shape))))
+        for k, size in enumerate(shape):
             length = b.load(b.gep(self._field(thing, at["dimensions"], INTEGER.as_pointer()), [INTEGER(k)]))
-            return b.icmp_signed("==", length, INTEGER(size))
-
+            self._require(b.icmp_signed("==", length, INTEGER(size)))
         looked_at, needed = flags
-        return [
-            lambda: self._is(thing, "ndarray"),
-            is_double,
-            lambda: b.icmp_signed("==", self._field(thing, at["nd"], FLAG), FLAG(len(shape))),
-            *(partial(has_length, k, size) for k, size in enumerate(shape)),
-            lambda: b.icmp_unsigned("==", b.and_(self._field(thing, at["flags"], FLAG), FLAG(looked_at)), FLAG(needed)),
-        ]
+        found = b.and_(self._field(thing, at["flags"], FLAG), FLAG(looked_at))
+        self._require(b.icmp_unsigned("==", found, FLAG(needed)))
+        return self._field(thing, at["data"], DOUBLE.as_pointer())
 
     def _number(self, given, total, target):
         """Store the optional number, the argument after ``out``."""
@@ -234,55 +217,9 @@ class EntryWriter:
             made = b.call(self._pinned("new_float", ir.FunctionType(OBJECT, [DOUBLE]).as_pointer()), [b.load(number)])
             self._end_if_null(made)
             return made
-        array = self._array(k)
+        array = self._made(self.shapes[k])
         put(k, self._field(array, cpython_layout.ARRAY_OFFSETS["data"], DOUBLE.as_pointer()))
         return array
-
-    def _array(self, k: int):
-        """Array for result k, with a reference for the caller: a kept one that nothing else refers to, or a new one."""
-        b, shape, places = self.b, self.shapes[k], range(cpython_layout.KEPT * k, cpython_layout.KEPT * (k + 1))
-        done, found = self.entry.append_basic_block("has_array"), []
-        for place in places:
-            array, after = self._kept(place), self.entry.append_basic_block("not_kept")
-            for condition in self._serves_again(array, shape):
-                on = self.entry.append_basic_block("on")
-                b.cbranch(condition(), on, after)
-                b.position_at_end(on)
-            self._incref(array)
-            found.append((array, b.block))
-            b.branch(done)
-            b.position_at_end(after)
-        array = self._made(shape)
-        with b.if_then(self._has_one_owner(self._pinned("kept", OBJECT))):  # else nothing can be put there
-            for place in reversed(places):
-                one = self._kept(place - 1) if place > places.start else array
-                self._incref(one)
-                keep = self._pinned("set_item", ir.FunctionType(FLAG, [OBJECT, INTEGER, OBJECT]).as_pointer())
-                b.call(keep, [self._pinned("kept", OBJECT), INTEGER(place), one])  # which takes the reference
-        found.append((array, b.block))
-        b.branch(done)
-        b.position_at_end(done)
-        merged = b.phi(OBJECT)
-        for one in found:
-            merged.add_incoming(*one)
-        return merged
-
-    def _kept(self, place: int):
-        """Kept array, or none yet; a borrowed reference."""
-        item = self._pinned("tuple_item", ir.FunctionType(OBJECT, [OBJECT, INTEGER]).as_pointer())
-        return self.b.call(item, [self._pinned("kept", OBJECT), INTEGER(place)])
-
-    def _has_one_owner(self, thing):
-        return self.b.icmp_signed("==", self._field(thing, cpython_layout.COUNT_OFFSET, FLAG), FLAG(1))
-
-    def _serves_again(self, array, shape: Shape) -> list[Callable]:
-        """Conditions, one after the other: nothing else refers to a kept array, even weakly; no caller changed its form."""
-        b, at = self.b, cpython_layout.ARRAY_OFFSETS
-        return [
-            lambda: self._has_one_owner(array),
-            *self._array_conditions(array, shape, cpython_layout.OWN_FLAGS),
-            lambda: b.icmp_unsigned("==", self._field(array, at["weakrefs"], OBJECT), ir.Constant(OBJECT, None)),
-        ]
 
     def _made(self, shape: Shape):
         """New array."""

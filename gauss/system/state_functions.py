@@ -1,8 +1,7 @@
 """Functions of a state, on a system: mass matrix, forces, frames, Jacobians, momentum, energies; one state or a batch.
 
 Each is called with arrays of coordinates q (…, n_q) and rates v (…, n_v): numpy's, of any strides, or those of other
-libraries on the CPU, whose memory is shared (DLPack). Results are new arrays, or ``out``; the array of one state serves
-again once nothing refers to it, so that ``resize`` in place needs ``refcheck=False``. Machine code is made by the first
+libraries on the CPU, whose memory is shared (DLPack). Results are new arrays, or ``out``. Machine code is made by the first
 call. A function that is kept, ``f = system.mass_matrix``, is called by Python without an intermediate.
 
 | | gauss | Pinocchio | MuJoCo |
