@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.codegen import Kernel, write
-from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.dynamics.acceleration_derivatives import LoadedMechanism, off_constraints
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, on_boundary
 from gauss.dynamics.laws.law_kinks import kinked_laws
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.dynamics.rules import Question
@@ -72,7 +73,9 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     require(system, (System,), "derivatives")
     require(state, (State,), "derivatives: state")
     changes = AccelerationChanges(system, state, load)
-    return Derivatives(*np.split(changes.along(np.eye(3 * system.n_v)), 3, axis=1))
+    found = Derivatives(*np.split(changes.along(np.eye(3 * system.n_v)), 3, axis=1))
+    changes.refuse_few_digits(found.load)
+    return found
 
 
 class AccelerationChanges:
@@ -136,6 +139,28 @@ class AccelerationChanges:
                 f"scene {system.scene.name!r}: the accelerations have no finite derivatives in this state."
             )
         return found
+
+    def refuse_few_digits(self, response: np.ndarray):
+        """Raise a SimulationError if responses (n_v, n_v) to generalised forces leave the loop constraints by round-off."""
+        system, state = self.system, self.state
+        if not (system.n_v and system.closes):
+            return
+        off = cached_on_disk(system, (_off_constraints,), lambda: _off_constraints(system))
+        push = response @ (1.0 / system.scale.coordinates)
+        if off(np.concatenate([[state.t], state.q, push]))[0] > 0.0:
+            raise SimulationError(
+                f"scene {system.scene.name!r}: the derivatives of its accelerations have too few digits in this state: "
+                "masses of one loop differ by too many orders; give the lightest bodies no mass, or more."
+            )
+
+
+def _off_constraints(system: System) -> Kernel:
+    """(t, q, accelerations under forces alone) → by how much these leave the loop constraints."""
+
+    def off(t, q, response):
+        return [off_constraints(Mechanism(system, q, np.zeros(system.n_v), t[0]), response)]
+
+    return Kernel(write(off, 1, system.n_q, system.n_v, name="off"), batch=False)
 
 
 def _of_mode(system: System, state: State, load) -> System:
