@@ -8,7 +8,6 @@ those of trees without forces on bodies by composite bodies, with half of the op
 
 import numpy as np
 
-from gauss import math
 from gauss.codegen import LDLT, Scalar, as_number, forward, write
 from gauss.dynamics.composite_bodies import CompositeBodies
 from gauss.dynamics.mechanism import Mechanism, inverse_dynamics
@@ -17,8 +16,6 @@ from gauss.dynamics.rnea import KinematicTree
 from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import SimulationError
 from gauss.system import State, System, coordinate_rates, whole
-
-FEW_DIGITS = 1e-6  # share of its terms by which a constraint may be left by the response to a force
 
 
 class LoadedMechanism:
@@ -74,7 +71,7 @@ class LoadedMechanism:
 def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of the accelerations by displacements along the rates, rates and generalised forces, each (n_v, n_v).
 
-    Not numbers where a loop that cannot move has another pose than in the scene, or where round-off leaves few digits.
+    Not numbers where a loop that cannot move has another pose than in the scene.
     """
     n, loaded = system.n_v, LoadedMechanism(system, loads, t, q, v, load)
     unit, zero = np.eye(n), np.zeros(n)
@@ -98,27 +95,12 @@ def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tu
     table = write(changes, 1, q.size, n, n, n, m, name="changes").inlined([t], q, v, load, rates, multipliers)
     motion, violation, following = np.split(table, np.cumsum([2 * n * n, 2 * n * m]))
     X = _mirrored(np.array([loaded.mechanism.response(e, np.zeros(m))[0] for e in unit]).T)
-    if m:
-        X = math.where(off_constraints(loaded.mechanism, X @ (1.0 / system.scale.coordinates)) > 0.0, np.nan, X)
     slopes = X @ motion.reshape(n, 2 * n) + following.reshape(n, 2 * n)
     if m:
         Y = np.array([loaded.mechanism.response(zero, e)[0] for e in np.eye(m)]).T
         slopes = slopes + Y @ violation.reshape(m, 2 * n)
     by_q, by_v, by_load = (refused_in_other_pose(system, q, part) for part in (slopes[:, :n], slopes[:, n:], X))
     return by_q, by_v, by_load
-
-
-def off_constraints(mechanism: Mechanism, response: np.ndarray) -> Scalar:
-    """Most by which accelerations (n_v,) under forces alone leave a loop constraint, numbers or symbols; positive: too far.
-
-    Exact ones do not. Where bodies of a loop differ in mass by many orders, M⁻¹ is large along the lightest, K M⁻¹ Kᵀ loses
-    the digits of the others, and derivatives are about as wrong as the constraints are left.
-    """
-    found: Scalar = 0.0
-    for unit in np.eye(mechanism.scale.size):
-        row = mechanism.reaction(unit)
-        found = math.maximum(found, np.abs(row @ response) - FEW_DIGITS * (np.abs(row) @ np.abs(response)))
-    return found
 
 
 def inverse_dynamics_derivatives(system: System, loads, t: Scalar, q, v, acceleration) -> tuple[np.ndarray, np.ndarray]:

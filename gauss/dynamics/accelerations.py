@@ -87,7 +87,8 @@ class Accelerations:
         if self.compiled is None:
             return _certified(self.system, state, load)
         load = checked_load(self.system, load)
-        if self.loads is not None:
+        fits = (np.shape(state.q), np.shape(state.v)) == ((self.system.n_q,), (self.system.n_v,))
+        if self.loads is not None and fits:  # else the machine code says what does not
             load = load + self.loads(state)[0]
         return self.compiled(state.q, state.v, load, None, state.t)
 

@@ -166,8 +166,7 @@ class StateFunctions:
         """Compiled function ``f(q, v, load, out=None, t=0.0)``: derivatives of the accelerations, three (…, n_v, n_v).
 
         By displacements along the rates, by rates and by generalised forces, under the loads of the scene as they are now;
-        with loops along the constraints. NaN where bodies of one loop differ in mass by so many orders that few digits are
-        left; :func:`gauss.derivatives` says so.
+        with loops along the constraints.
         """
         return self.function("acceleration_derivatives")
 

@@ -227,7 +227,7 @@ def test_what_there_is_survives_a_failure():
     [
         ({"integrator": "rk5"}, "rk4"),
         ({"integrator": "rk4"}, "fixed step"),
-        ({"integrator": "rk4", "step": 1e-12}, "1e.12 steps, at most"),
+        ({"integrator": "rk4", "step": 1e-12}, "1e.12 samples"),
         ({"duration": -1.0}, "duration"),
         ({"rtol": 0.0}, "rtol"),
         ({"times": [0.5, 0.2]}, "increasing"),
