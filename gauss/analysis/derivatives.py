@@ -59,8 +59,8 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
         Three matrices. With loops, changes of coordinates and rates are along the constraints. With joint friction and
         limited drives they are those of the contact mode of this state: slipping elements are loads of constant sign,
         sticking ones are constraints, and changes of rates are along these. Where loop constraints are redundant, sums along
-        the constraints have eight digits; those of :func:`gauss.linearise` have all. Where bodies of one loop differ in mass by
-        many orders, digits are lost, and not checked here: a coupler of 1e-6 of its mass leaves seven, one of 1e-9 none;
+        the constraints have eight digits; those of :func:`gauss.linearise` have all. Where bodies of one loop differ in mass
+        by many orders, digits are lost, and not checked here: a coupler of 1e-6 of its mass leaves seven, one of 1e-9 none;
         :func:`gauss.linearise` refuses such states.
 
     Raises

@@ -142,7 +142,8 @@ AFFINE = {
     "larger": gm.maximum,
     "gate": lambda x, y: gm.where(x < y, x, 1.0 - y),
     "absolute": lambda x, y: gm.abs(x - 4.0),
-    "square": lambda x, y: x * x,  # not affine, nor is what follows
+    "product": lambda x, y: x * y,  # affine where one is constant
+    "quotient": lambda x, y: x / (gm.abs(y) + 1.0),
 }
 
 

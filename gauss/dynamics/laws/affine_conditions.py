@@ -4,7 +4,7 @@ All of them take a time that grows with their number; bisection (:mod:`gauss.dyn
 condition in every cell.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
@@ -89,28 +89,40 @@ def _pieces(conditions: Sequence[Expression], clock: Expression, begin: float) -
 
 def _combined(node: Expression, x: list[Pieces]) -> Pieces:
     """Pieces of the result of an operation; none where they are not affine."""
-    match node.op:
-        case "constant":
-            return ((float(node.value), 0.0),)
-        case "neg":
-            return tuple((-a, -da) for a, da in x[0])
-        case "add" | "sub":
-            sign = 1.0 if node.op == "add" else -1.0
-            pairs = product(*x)
-            return tuple(dict.fromkeys((a + sign * b, da + sign * db) for (a, da), (b, db) in pairs))
-        case "mul" if all(x):
-            scale, other = (x[0], x[1]) if not any(da for _, da in x[0]) else (x[1], x[0])
-            return _scaled(other, [a for a, da in scale if not da])
-        case "div" if all(x):
-            return _scaled(x[0], [1.0 / a for a, da in x[1] if not da and a])
-        case "min" | "max":
-            return tuple(dict.fromkeys([*x[0], *x[1]])) if all(x) else ()
-        case "select":
-            return tuple(dict.fromkeys([*x[1], *x[2]])) if all(x[1:]) else ()
-        case _:
-            return ()
+    if node.op == "constant":
+        return ((float(node.value), 0.0),)
+    x = x[1:] if node.op == "select" else x  # its condition is one of those asked for
+    return OPERATIONS[node.op](*x) if node.op in OPERATIONS and all(x) else ()
 
 
-def _scaled(pieces: Pieces, factors: list[float]) -> Pieces:
-    """Pieces times each of some factors."""
-    return tuple(dict.fromkeys((a * factor, da * factor) for a, da in pieces for factor in factors))
+def _sum(x: Pieces, y: Pieces) -> Pieces:
+    return tuple(dict.fromkeys((a + b, da + db) for (a, da), (b, db) in product(x, y)))
+
+
+def _product(x: Pieces, y: Pieces) -> Pieces:
+    """Pieces of one that is constant in all pieces, times the other."""
+    if any(da for _, da in x):
+        x, y = y, x
+    factors = [a for a, da in x if not da]
+    return tuple(dict.fromkeys((a * b, a * db) for a in factors for b, db in y)) if len(factors) == len(x) else ()
+
+
+def _inverse(x: Pieces) -> Pieces:
+    return tuple((1.0 / a, 0.0) for a, _ in x) if all(a and not da for a, da in x) else ()
+
+
+def _either(x: Pieces, y: Pieces) -> Pieces:
+    return tuple(dict.fromkeys((*x, *y)))
+
+
+MINUS = ((-1.0, 0.0),)
+OPERATIONS: dict[str, Callable[..., Pieces]] = {
+    "neg": lambda x: _product(MINUS, x),
+    "add": _sum,
+    "sub": lambda x, y: _sum(x, _product(MINUS, y)),
+    "mul": _product,
+    "div": lambda x, y: _product(_inverse(y), x),
+    "min": _either,
+    "max": _either,
+    "select": _either,
+}
