@@ -87,10 +87,12 @@ class Accelerations:
         if self.compiled is None:
             return _certified(self.system, state, load)
         load = checked_load(self.system, load)
-        fits = (np.shape(state.q), np.shape(state.v)) == ((self.system.n_q,), (self.system.n_v,))
-        if self.loads is not None and fits:  # else the machine code says what does not
+        if self.loads is not None and self._fits(state):  # else the machine code says what does not
             load = load + self.loads(state)[0]
         return self.compiled(state.q, state.v, load, None, state.t)
+
+    def _fits(self, state: State) -> bool:
+        return (np.shape(state.q), np.shape(state.v)) == ((self.system.n_q,), (self.system.n_v,))
 
 
 def forward_dynamics(system: System) -> Callable:
