@@ -13,14 +13,12 @@ from gauss.codegen import Scalar, forward, write
 from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.given_link_frames import GivenLinkFrames, with_moved_joint
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
-from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.kinematics import AXES, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_residual
 from gauss.dynamics.parameters import changed
 from gauss.dynamics.traced_system import applied_loads
 from gauss.system import BoundLoad, State, System, coordinate_rates, whole
-
-AXES = np.eye(3)  # of the frame that a place is given in
 
 
 def inverse_dynamics_by_place(
