@@ -11,8 +11,8 @@ import numpy as np
 
 from gauss.backends.closure import outside_rows
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.recursion import TreeFactor
 from gauss.backends.solution import Answer
+from gauss.backends.tree_factor import TreeFactor
 
 
 class Coordinates:

@@ -14,7 +14,8 @@ from gauss.backends.clarabel_ import Clarabel
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.osqp_ import OSQP
 from gauss.backends.piqp_ import PIQP
-from gauss.backends.programme import FORMS, attempt, read
+from gauss.backends.programme import FORMS
+from gauss.backends.programmed import attempt, read
 from gauss.bench import compiled
 from gauss.bench.contestants import ready
 from gauss.bench.levels import settings

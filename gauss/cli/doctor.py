@@ -7,7 +7,9 @@ import typer
 
 
 def doctor(
-    cache: Annotated[bool, typer.Option("--cache", help="The cache of machine code alone: folder, numbers, sizes.")] = False,
+    cache: Annotated[
+        bool, typer.Option("--cache", help="Report the cache of machine code only: folder, numbers, sizes.")
+    ] = False,
     empty: Annotated[bool, typer.Option("--empty", help="With --cache: remove its files first.")] = False,
 ):
     """Look at the installation: processor, machine code, its cache, solvers, packages; exit code 1 if gauss cannot run."""
