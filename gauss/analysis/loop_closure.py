@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.analysis.tangents import RANK_TOLERANCE, Tangents, row_lengths
+from gauss.analysis.tangents import Tangents
 from gauss.codegen import Kernel, write
 from gauss.dynamics.assembly_search import RESIDUAL_TOLERANCE
 from gauss.dynamics.mechanism import loop_residual
+from gauss.dynamics.null_space import RANK_TOLERANCE, row_lengths
 from gauss.dynamics.projection import position_residual_of, project_positions, project_rates, relative
 from gauss.dynamics.store import cached
 from gauss.system import State, System, retract, whole

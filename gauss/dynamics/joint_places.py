@@ -53,6 +53,28 @@ def accelerations_by_place(
     own, forces, _ = applied_loads(system, loads, state)
     mechanism = Mechanism(system, q, v, t, (whole(system),))
     rates, multipliers = mechanism.motion(own + load, forces)
+    found = place_changes(system, loads, state, load, parameter, rates, multipliers, following)
+    return np.array([mechanism.response(motion, violation)[0] + after for motion, violation, after in found]).T
+
+
+def place_changes(
+    system: System, loads: Sequence[BoundLoad], state: State, load, parameter: str, rates, multipliers, following=None
+) -> list[list[np.ndarray]]:
+    """Changes by the place of a joint, at fixed accelerations and multipliers of the loops of the whole system.
+
+    Parameters
+    ----------
+    system, loads, state, load, parameter, following
+        As of :func:`accelerations_by_place`.
+    rates, multipliers : ndarray, shape (n_v,), (m,)
+        Accelerations and multipliers.
+
+    Returns
+    -------
+    list of list of ndarray
+        For each axis the change of the residual of the equations of motion (n_v,), of the loop constraints (m,), and of
+        dependent accelerations (n_v,).
+    """
     n, m = system.n_v, multipliers.size
 
     def parts(t: Scalar, q, v, place, load, rates, multipliers):
@@ -62,10 +84,9 @@ def accelerations_by_place(
         motion, violation = moved.residual(rates, multipliers, own + load, forces)
         return np.concatenate([motion, violation, moved.dependent_accelerations(rates)])
 
-    moving = np.zeros((3, q.size + n)) if following is None else following
+    moving = np.zeros((3, state.q.size + n)) if following is None else following
     columns = _along_axes(parts, state, moving, load, rates, multipliers)
-    split = (np.split(column, [n, n + m]) for column in columns)
-    return np.array([mechanism.response(motion, violation)[0] + after for motion, violation, after in split]).T
+    return [np.split(column, [n, n + m]) for column in columns]
 
 
 def following_place(terms: ConstrainedTerms, parameter: str) -> np.ndarray:

@@ -7,7 +7,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -26,10 +26,11 @@ from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, random_changes
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_runs import fixed_run
-from gauss.simulation.held_inputs import FLOAT, HeldInputs, checked_inputs
+from gauss.simulation.held_inputs import FLOAT, HeldInputs, as_floats, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
+from gauss.simulation.simulator_state import SimulatorState
 from gauss.simulation.step_ends import StepEnds
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.step_watch import StepWatch
@@ -46,37 +47,15 @@ STEPS = {("compiled loop", code) for code in ("embedded loops", "compiled", "cal
 STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
 
 
-class SimulatorState(NamedTuple):
-    """State of a simulator, opaque.
-
-    Attributes
-    ----------
-    point, control : bytes
-        Point of the motion and record of its loop.
-    begun : float
-        Time of the state that the motion began from [s].
-    steps : int
-        Steps since then.
-    contacts : object
-        Contacts that the next step starts from, where the point does not hold them.
-    of : tuple
-        Step and methods of the simulator; any where empty.
-    """
-
-    point: bytes
-    control: bytes
-    begun: float
-    steps: int
-    contacts: Any = None
-    of: tuple = ()
-
-
 class Simulator:
     """Motion of a scene in fixed steps, one call after the other.
 
-    Steps do not end where laws switch: a warning names the first feature of a law of time that is shorter than the steps, or
-    the first jump, and laws of the state that may have switched undetected; prescribed velocities must not jump.
-    Opaque laws are called by the machine code of the steps; nothing is known of them between its calls.
+    Steps do not end where laws switch: warnings name the first feature of a law of time that is shorter than the steps, the
+    first jump, and laws of the state that may have switched undetected; prescribed velocities must not jump. A jump of a law
+    makes the step around it of order 1; at the end of a step it does so with methods that evaluate the law there ("rk4",
+    "verlet", "generalised_alpha"), and does no harm with others ("gauss4", "variational_midpoint", "energy_momentum").
+    Values that change from step to step are best given as inputs, which are held within each step.
+    Opaque laws are called by the machine code of the steps; nothing is known of them between its calls but at ``breaks``.
 
     Parameters
     ----------
@@ -138,7 +117,7 @@ class Simulator:
             if (plan.driver, plan.dynamics) not in STEPS:
                 why = "; ".join(map(str, plan.rejected)) or "nothing in it can move"
                 raise SimulationError(f"steps of {whole.name!r} are not compiled: {why}.")
-            self._watch = StepWatch(self.system, problem.laws, problem.start, self.step_size)
+            self._watch = StepWatch(self.system, problem.laws, problem.start, self.step_size, method)
             problem = problem._replace(switching=Switching())
             run: CompiledFixedRun | PairKernelSteps
             run = PairKernelSteps(problem) if plan.dynamics == "pair kernels" else fixed_run(problem, plan.dynamics)
@@ -164,6 +143,11 @@ class Simulator:
     def program(self) -> Program:
         """Functions of the smooth system."""
         return self._run.program
+
+    @property
+    def warned_of(self) -> set[str]:
+        """What was warned of laws of time."""
+        return self._watch.warned_of
 
     def _bind(self):
         """Keep the addresses of the arrays of the loop."""
@@ -226,8 +210,8 @@ class Simulator:
         Warns
         -----
         SwitchingWarning
-            Once for each motion, if a law of the state may have switched undetected within a step; every ten thousand
-            steps, if a law of time jumps, or has a feature shorter than the step, in the next ones.
+            Once for each motion, if a law of the state may have switched undetected within a step; once for all motions, if
+            a law of time jumps, and if it has a feature shorter than the step, in the next ten thousand steps.
         ContactLawWarning
             Once for each motion, if shapes may pass through each other unseen at the rates where a call begins or ends.
 
@@ -266,7 +250,7 @@ class Simulator:
         self._watch.look(self._rates, self._steps, lambda: self.state)
 
     def _set(self, u):
-        given = u if type(u) is np.ndarray and u.dtype is FLOAT else _floats(u)
+        given = u if type(u) is np.ndarray and u.dtype is FLOAT else as_floats(u)
         if given is None or given.shape != self._u.shape or not isfinite(sum(given.tolist())):
             given = checked_inputs(u, self.inputs, self.t)
         try:
@@ -348,7 +332,8 @@ class Simulator:
     def snapshot(self) -> SimulatorState:
         """Present state of the simulator, to the last bit; of the same scene and step, any simulator can restore it."""
         point, run = self._point.tobytes(), self._run
-        return SimulatorState(point, bytes(run.control), self._begun, self._steps, run.kept(), self._options)
+        control, kept, watched = bytes(run.control), run.kept(), self._watch.kept()
+        return SimulatorState(point, control, self._begun, self._steps, kept, self._options, watched)
 
     def restore(self, snapshot: SimulatorState):
         """Continue from a snapshot.
@@ -365,7 +350,7 @@ class Simulator:
         self._point[:] = point
         ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
         self._begun, self._steps = snapshot.begun, snapshot.steps
-        self._watch.go_on(self._begun)
+        self._watch.go_on(self._begun, snapshot.watched)
         self._run.take(snapshot.contacts)
 
 
@@ -374,12 +359,3 @@ def _again(given: tuple, snapshot: SimulatorState) -> Simulator:
     simulator = Simulator(*given)
     simulator.restore(snapshot)
     return simulator
-
-
-def _floats(u) -> np.ndarray | None:
-    if np.ma.is_masked(u):
-        return None
-    try:
-        return np.asarray(u, dtype=float)
-    except (TypeError, ValueError, RuntimeError):  # the last of torch
-        return None

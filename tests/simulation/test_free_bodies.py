@@ -59,7 +59,7 @@ def test_kernels_of_pairs_are_the_gap_functions_of_the_scene(one, other):
             q[k + 3 : k + 7] /= np.linalg.norm(q[k + 3 : k + 7])
         motion = kinematics(system, State(0.0, q, v))
         found, across = gaps(motion), slips(motion)
-        begun = stepper._begin(motion.state, 0.0, 0.0)
+        begun = stepper.begin(motion.state, 0.0, 0.0)
         near, _ = stepper.detection.find(begun.bodies, 10.0)
         places = stepper.table.gap_places(near.key)
         missing = np.setdiff1d(np.arange(found.width.size), places)
@@ -156,7 +156,7 @@ def test_near_contacts_are_all_that_are_nearer():
     scene.contacts_all()
     system = gauss.compile_scene(scene)
     stepper = FreeBodyStepper(system)
-    bodies = stepper._begin(system.initial_state(), 0.0, 0.0).bodies
+    bodies = stepper.begin(system.initial_state(), 0.0, 0.0).bodies
     every = stepper.detection.find(bodies, 10.0)[0]
     for reach in (0.0, 0.05, 0.2):
         near = stepper.detection.find(bodies, reach)[0]
