@@ -18,11 +18,6 @@ from gauss.backends.tree_factor import TreeFactor
 class Coordinates:
     """The form F3 of a compulsion.
 
-    Parameters
-    ----------
-    compulsion : Compulsion
-        The full form.
-
     Attributes
     ----------
     M : ndarray, shape (f, f)

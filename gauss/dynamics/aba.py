@@ -91,13 +91,7 @@ class FreeElimination:
 
 
 class ArticulatedBody:
-    """Forward dynamics of an open tree in one state: M q̈ + h = τ.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The tree.
-    """
+    """Forward dynamics of an open tree in one state: M q̈ + h = τ."""
 
     def __init__(self, tree: KinematicTree):
         self.tree = tree
