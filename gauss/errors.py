@@ -205,6 +205,21 @@ def extra(name: str = ""):
         raise MissingPackageError(f"{package} is not installed: {remedy} ({source}).", name=package) from error
 
 
+@contextmanager
+def writing(path):
+    """Writing of a file or folder, for a ``with`` statement.
+
+    Raises
+    ------
+    FileError
+        If it cannot be written; the message says why.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+
+
 @cache
 def _errstate() -> type:
     import numpy as np  # messages of the command line need none of it

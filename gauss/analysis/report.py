@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gauss.errors import ArgumentError, extra
+from gauss.errors import ArgumentError, extra, writing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,6 +35,8 @@ def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figu
     ------
     ArgumentError
         If the path does not end with .html, or its folder does not exist.
+    FileError
+        If the file cannot be written.
     """
     if not isinstance(path, str | Path) or Path(path).suffix != ".html":
         raise ArgumentError(f"report: expected a path that ends with .html, got {path!r}.")
@@ -47,7 +49,8 @@ def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figu
         parts += [f"<h2>{escape(caption)}</h2>", "<svg" + drawn.getvalue().partition("<svg")[2]]
     head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{STYLE}</style>'
     found = Path(path)
-    found.write_text(f"<!doctype html><html><head>{head}</head><body>{''.join(parts)}</body></html>\n", encoding="utf-8")
+    with writing(path):
+        found.write_text(f"<!doctype html><html><head>{head}</head><body>{''.join(parts)}</body></html>\n", encoding="utf-8")
     return found
 
 

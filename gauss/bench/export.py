@@ -11,7 +11,7 @@ from gauss.backends.programme import FORMS, Programme
 from gauss.bench.problems import MechanismProblem
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble
-from gauss.errors import FileError, did_you_mean
+from gauss.errors import FileError, did_you_mean, writing
 from gauss.simulation import simulate
 
 TEST_SET = '''"""Quadratic programmes of mechanisms as a test set of qpbenchmark.
@@ -96,7 +96,8 @@ def export(problems: Iterable[MechanismProblem], folder: Path, kind: str, form: 
         raise FileError(f"no format {kind!r} of problems. {did_you_mean(kind, writers)}")
     if form not in FORMS:
         raise FileError(f"no form {form!r} of problems. {did_you_mean(form, FORMS)}")
-    folder.mkdir(parents=True, exist_ok=True)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     paths: list[Path] = []
     for problem in problems:
         path = folder / f"{file_name(problem.name)}.{'mat' if kind == 'mat' else 'npz'}"

@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 
 from gauss.docs import generated, notebooks, reference
-from gauss.errors import FileError, extra
+from gauss.errors import FileError, extra, writing
 
 HERE = Path(__file__).parent
 PACKAGES = ("furo", "joblib", "myst_parser", "sphinx_copybutton", "sphinx_design", "sphinx_gallery", "gymnasium")
@@ -46,10 +46,8 @@ def build(output: Path, program, gallery: bool = True, strict: bool = False) -> 
             import_module(package)
         sphinx = import_module("sphinx.cmd.build")
     work = output / ".build"
-    try:
+    with writing(output):
         collect(work / "pages", program)
-    except OSError as error:
-        raise FileError(f"{output}: cannot be written: {error.strerror}.") from error
     command = ["-b", "html", "-q", "-j", str(min(2, os.cpu_count() or 1)), "-c", str(HERE), "-d", str(work / "doctrees")]
     command += ["-D", f"plot_gallery={int(gallery)}"] + (["-W", "--keep-going"] if strict else [])
     with warnings.catch_warnings():

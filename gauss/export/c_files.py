@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
-from gauss.errors import require
+from gauss.errors import require, writing
 from gauss.export.c_code import PRELUDE, CBody
 from gauss.export.exported_function import ExportedFunction, exported_functions, identifier
 from gauss.scene import Scene
@@ -38,12 +38,19 @@ class CCode:
     source: str
 
     def save(self, folder) -> tuple[Path, Path]:
-        """Write header and source to a folder, and return their paths."""
+        """Write header and source to a folder, and return their paths.
+
+        Raises
+        ------
+        FileError
+            If the folder cannot be written to.
+        """
         folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
         paths = folder / f"{self.name}.h", folder / f"{self.name}.c"
-        for path, text in zip(paths, (self.header, self.source), strict=True):
-            path.write_text(text, encoding="utf-8")
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            for path, text in zip(paths, (self.header, self.source), strict=True):
+                path.write_text(text, encoding="utf-8")
         return paths
 
 

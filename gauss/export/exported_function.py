@@ -24,7 +24,7 @@ from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
 from gauss.dynamics.state_functions import traced_function
 from gauss.dynamics.term_table import TERMS
-from gauss.errors import ArgumentError, SimulationError, did_you_mean, require
+from gauss.errors import ArgumentError, SimulationError, did_you_mean, require, writing
 from gauss.scene import Scene
 from gauss.system import System, refuse_changed
 
@@ -135,11 +135,14 @@ def folder_of(folder) -> Path:
     ------
     ArgumentError
         If it is no path.
+    FileError
+        If it cannot be made.
     """
     if not isinstance(folder, str | PathLike):
         raise ArgumentError(f"export: folder: expected a path, got {folder!r:.80}.")
     found = Path(folder)
-    found.mkdir(parents=True, exist_ok=True)
+    with writing(found):
+        found.mkdir(parents=True, exist_ok=True)
     return found
 
 

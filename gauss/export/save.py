@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from gauss.errors import ArgumentError, did_you_mean, require
+from gauss.errors import ArgumentError, did_you_mean, require, writing
 from gauss.export.exported_function import exported_functions, folder_of, identifier
 from gauss.scene import Scene
 from gauss.system import System
@@ -44,6 +44,8 @@ def save_as(
     ------
     ArgumentError
         If there is no such language or function, or the language has no tunable parameters.
+    FileError
+        If the folder cannot be written to.
     MissingPackageError
         If the language needs a package that is not installed.
     SimulationError
@@ -85,8 +87,9 @@ def _save_casadi(system, folder: Path, names, name: str) -> list[Path]:
 
 def _save_text(make: Callable[..., str], suffix: str) -> Callable:
     def save(system, folder: Path, names, name: str) -> list[Path]:
-        path = folder / f"{name}{suffix}"
-        path.write_text(make(system, names), encoding="utf-8")
+        path, text = folder / f"{name}{suffix}", make(system, names)
+        with writing(path):
+            path.write_text(text, encoding="utf-8")
         return [path]
 
     return save

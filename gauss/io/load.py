@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from gauss.codegen import gc_pause
-from gauss.errors import ArgumentError, FileError, SceneError, StateError, did_you_mean, extra, require
+from gauss.errors import ArgumentError, FileError, SceneError, StateError, did_you_mean, extra, require, writing
 from gauss.io.catalog import families, servo_files, shipped
 from gauss.scene import Scene
 from gauss.scene.toml import from_tables, tables, write_toml
@@ -135,9 +135,8 @@ def save(thing, path) -> Path:
         raise ArgumentError(f"save: expected a Scene, a motion or another result, got a {type(thing).__name__}.")
     write = writer(path, kind)
     try:
-        return write(thing, path)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+        with writing(path):
+            return write(thing, path)
     except UnicodeEncodeError as error:
         raise FileError(f"{path}: no file can hold {error.object[error.start]!r}, which is in a name.") from error
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gauss.errors import FileError
+from gauss.errors import FileError, writing
 from gauss.io.joined_names import joined
 from gauss.simulation import Trajectory
 
@@ -55,13 +55,10 @@ def write_csv(columns: dict[str, np.ndarray], path: Path) -> Path:
     path = Path(path)
     if path.suffix.lower() != ".csv":
         raise FileError(f"{path}: a table is written as .csv.")
-    try:
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(columns)
-            writer.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+    with writing(path), open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
     return path
 
 

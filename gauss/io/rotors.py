@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gauss.errors import FileError, SceneError
+from gauss.errors import FileError, SceneError, writing
 from gauss.io.catalog import network_files
 from gauss.rotors import (
     FrictionClutch,
@@ -104,10 +104,8 @@ def save_rotors(network: Network, path) -> Path:
     path, text = Path(path), toml_text(network)
     if path.suffix.lower() != ".toml":
         raise FileError(f"{path}: a rotor network is written as .toml.")
-    try:
+    with writing(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
     return path
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from gauss.errors import FileError
+from gauss.errors import FileError, writing
 
 FORMATS = (".png", ".svg", ".pdf")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#7F7F7F")  # Okabe and Ito
@@ -41,10 +41,8 @@ def saved(figure: Figure, path, dpi: int = DPI) -> Figure:
         If the file cannot be written.
     """
     if path is not None:
-        try:
+        with writing(path):
             figure.savefig(path, dpi=dpi)
-        except OSError as error:
-            raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
     return figure
 
 

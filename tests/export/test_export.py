@@ -8,7 +8,7 @@ import pytest
 import gauss
 from gauss import export
 from gauss.analysis.tangents import Tangents
-from gauss.errors import ArgumentError, SimulationError
+from gauss.errors import ArgumentError, FileError, SimulationError
 
 ROUND_OFF = 1e-14  # relative to the largest entry, or 1, also of derivatives by other rules; 1.9e-15 is seen
 COMPILER = shutil.which("cc")
@@ -230,6 +230,13 @@ def test_files_of_a_language(language, tmp_path):
     assert paths and all(path.stat().st_size for path in paths)
     with pytest.raises(ArgumentError, match="casadi"):
         export.save_as(gauss.load("pendulum"), "casady", tmp_path)
+
+
+@pytest.mark.parametrize("language", ["c", "jax", "latex", "fmu"])
+def test_folders_that_cannot_be_written_are_named(tmp_path, language):
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError, match="file"):
+        export.save_as(gauss.load("pendulum"), language, tmp_path / "file" / "folder")
 
 
 def with_opaque_law():

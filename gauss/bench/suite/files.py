@@ -19,7 +19,7 @@ from gauss.bench.suite import fclib, qps
 from gauss.bench.suite.catalogue import CLASSES, VERSION
 from gauss.bench.suite.doubled import zeros
 from gauss.bench.suite.instance import SuiteInstance, SuiteReference
-from gauss.errors import FileError, did_you_mean
+from gauss.errors import FileError, did_you_mean, writing
 from gauss.io.checked_arrays import require_sparse
 from gauss.linkages.doubled import Doubled
 
@@ -96,7 +96,8 @@ def export_suite(instances: Iterable[SuiteInstance], folder: Path, kind: str) ->
     if kind not in writers:
         raise FileError(f"no format {kind!r} of the suite. {did_you_mean(kind, writers)}")
     ending = {"qpbenchmark": "npz", "fclib": "hdf5", "qps": "mps"}.get(kind, kind)
-    folder.mkdir(parents=True, exist_ok=True)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     paths, entries = [], []
     for instance in instances:
         if (kind == "qps" and instance.cones) or (kind == "fclib" and not instance.friction.size):

@@ -13,7 +13,7 @@ from pathlib import Path
 import rich
 import viser
 
-from gauss.errors import FileError
+from gauss.errors import FileError, writing
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 from gauss.view.viewer.panel import with_panel
@@ -248,10 +248,8 @@ def export_html(thing: Scene | Trajectory, path, **options) -> Path:
     if path.suffix.lower() != ".html":
         raise FileError(f"{path}: a viewer is written as .html.")
     text = page(thing, **options).html
-    try:
+    with writing(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
     return path
 
 
