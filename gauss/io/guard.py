@@ -70,6 +70,8 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = (), loose_c
         source = _parsed(path, content, loose_comments)
     except expat.ExpatError as error:
         raise FileError(f"{path}: not XML: {error}.") from error
+    except FileError:
+        raise
     except (LookupError, ValueError) as error:  # of the encoding that the file names
         raise FileError(f"{path}: cannot be decoded: {error}; write it in UTF-8.") from error
     if source.root.tag not in roots:

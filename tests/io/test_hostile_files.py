@@ -202,6 +202,14 @@ def test_hostile_files_are_refused_with_their_place(name, tmp_path):
         gauss.load(tmp_path / file)
 
 
+@pytest.mark.parametrize("name", ["entities", "elements without end", "attributes without end"])
+def test_what_the_guard_finds_is_no_matter_of_encoding(name, tmp_path):
+    file, content, *_ = HOSTILE[name]
+    (tmp_path / file).write_text(content)
+    with pytest.raises(FileError, match=f"^{tmp_path}/{file}:1: "):
+        gauss.load(tmp_path / file)
+
+
 def test_models_that_are_attached_are_read(tmp_path):
     (tmp_path / "s.xml").write_text(mjcf(BODY))
     (tmp_path / "m.xml").write_text(attaching("s.xml", 3))
