@@ -25,7 +25,7 @@ from gauss.dynamics.rigid_loops import is_in_other_pose, refuse_other_pose, rigi
 from gauss.dynamics.state_terms import REFERENCES, StateTerms
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.term_table import TERMS, Term, traced_loads
-from gauss.dynamics.traced_system import FINITE, off_unit
+from gauss.dynamics.traced_system import FINITE, absolute_sum, off_unit
 from gauss.errors import ArgumentError, StateError, did_you_mean
 from gauss.system import State, System, refuse_changed, whole
 
@@ -315,7 +315,7 @@ def error_measures(terms: StateTerms, given, of_loops: bool) -> list:
     pose than in the scene.
     """
     system, unit = terms.system, terms.system.scale.coordinates
-    residual, total = off_unit(system, terms.q), sum(np.abs(part).sum() for part in given)
+    residual, total = off_unit(system, terms.q), absolute_sum(*given)
     if of_loops and rigid_joints(system):
         residual = residual + math.where(is_in_other_pose(system, terms.q), np.inf, 0.0)
     if not isinstance(terms, ConstrainedTerms):

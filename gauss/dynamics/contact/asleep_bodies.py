@@ -44,7 +44,7 @@ def stepper_of_awake(whole: FreeBodyStepper, asleep: np.ndarray, state: State) -
     made.table.body, made.table.law = column[whole.table.body], whole.table.law.copy()
     stands = np.flatnonzero(made.table.body >= made.n)
     made.table.law[np.ix_(stands, stands)] = 0
-    made.detection = NearDetection(made.table, column.size, whole.system.scale.length)
+    made.detection = NearDetection(made.table, column.size, whole.system.scale.length, whole.detection.code)
     made.record, made.graph = ModeRecord(len(made.elements)), None
     made.memory = first_memory(made, block_contact_laws(), made.settings)
     made.forget()

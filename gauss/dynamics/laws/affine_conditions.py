@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from gauss.codegen import Expression, reachable
+from gauss.codegen import Expression, numbers_of, reachable
 from gauss.dynamics.laws.intervals import Interval, enclose
 
 MOST_PIECES = 4  # of a function: a clipped one has three
@@ -72,8 +72,11 @@ def _roots(condition: Expression, pieces: dict[int, Pieces]) -> list[float] | No
 
 def _differs(condition: Expression, clock: Expression, t: float, apart: float) -> bool:
     """Whether a condition differs just before and just after a time [s]."""
-    value = enclose([condition], {clock.index: Interval.point(np.array([t - apart, t + apart]))})[0].low
-    return bool(np.ptp(value))
+    try:
+        value = numbers_of([condition], [clock])
+        return value([t - apart])[0] != value([t + apart])[0]
+    except (ArithmeticError, TypeError, ValueError):  # calls, and operations that have no value there
+        return bool(np.ptp(enclose([condition], {clock.index: Interval.point(np.array([t - apart, t + apart]))})[0].low))
 
 
 def _pieces(conditions: Sequence[Expression], clock: Expression, begin: float) -> dict[int, Pieces]:

@@ -140,12 +140,17 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
 
 def of_time(outputs, clock: Expression) -> list[Expression]:
     """Nodes of expressions that depend on the time alone, operands first."""
-    alone: dict[int, bool] = {}
+    return timed_nodes(reachable(outputs), clock)
+
+
+def timed_nodes(nodes: list[Expression], clock: Expression) -> list[Expression]:
+    """Those of some nodes, operands first, that depend on the time alone."""
+    alone: set[int] = {clock.index}
     found = []
-    for node in reachable(outputs):
-        operands = [alone.get(x.index, False) for x in node.operands if not x.is_constant]
-        alone[node.index] = node is clock or (bool(operands) and all(operands) and node.op not in ("call", "item"))
-        if alone[node.index] and node is not clock:
+    for node in nodes:
+        operands = [x.index in alone for x in node.operands if not x.is_constant]
+        if operands and all(operands) and node.op not in ("call", "item"):
+            alone.add(node.index)
             found.append(node)
     return found
 
