@@ -90,12 +90,12 @@ def of_file(folder: Path, path: Path) -> FileRecord:
 
 def opened(folder: Path, path: Path) -> tuple:
     """Status, no reasons, deviation of accelerations and whether loops are closed, of a file that opens."""
-    if path.suffix == ".urdf":
+    if path.suffix.lower() == ".urdf":
         return _opened_urdf(path)
     scene = gauss.load(path, root_folder=folder)
     if all(joint.kind == "fixed" for joint in scene.joints.values()):
         return ("nothing moves",)
-    if path.suffix != ".xml":
+    if path.suffix.lower() != ".xml":
         return ("opened",)
     has_loops = bool(scene.relations or scene.couplings) or len(scene.joints) > len(scene.bodies)
     try:
@@ -127,9 +127,9 @@ def without_server(path: Path) -> str:
 
 def excluded(path: Path) -> str:
     """Why a MJCF file is counted apart; empty where it is not."""
-    if path.suffix == ".urdf":
+    if path.suffix.lower() == ".urdf":
         return REFUSED_BY_REFERENCE if is_refused_by_parser(path) else ""
-    if path.suffix != ".xml":
+    if path.suffix.lower() != ".xml":
         return ""
     text = path.read_text(errors="replace")
     if re.search(r"<(flex|flexcomp|plugin|extension)\b", text):
