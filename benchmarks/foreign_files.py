@@ -12,8 +12,9 @@ Pinocchio's parser of URDF, itself refuses, that hold flexible bodies or plugins
 apart, as are SDFormat files with models on a server. URDF files get a floating base where nothing else moves, and their
 inertias are taken as given where they break the triangle inequality: both are counted, too. Accelerations are compared at
 random states and controls, without contacts, limits and friction. One file differs by its own design: MuJoCo drops the
-terms of M between branches of a tree that a heavy tendon joins; gauss keeps them. Many files of sdformat are tests of
-what a reader is to refuse.
+terms of M between branches of a tree that a heavy tendon joins; gauss keeps them. The largest deviation of trees, of two
+files of a dodecahedron, is MuJoCo's, which takes a centre of mass 2e-9 m beside the origin of a body for it. Many files of
+sdformat are tests of what a reader is to refuse.
 """
 
 import argparse
