@@ -12,8 +12,9 @@ Pinocchio's parser of URDF, itself refuses, that hold flexible bodies or plugins
 apart, as are SDFormat files with models on a server. URDF files get a floating base where nothing else moves, and their
 inertias are taken as given where they break the triangle inequality: both are counted, too. Accelerations are compared at
 random states and controls, without contacts, limits and friction. One file differs by its own design: MuJoCo drops the
-terms of M between branches of a tree that a heavy tendon joins; gauss keeps them. Many files of sdformat are tests of
-what a reader is to refuse.
+terms of M between branches of a tree that a heavy tendon joins; gauss keeps them. The largest deviation of trees, of two
+files of a dodecahedron, is MuJoCo's, which takes a centre of mass 2e-9 m beside the origin of a body for it. Many files of
+sdformat are tests of what a reader is to refuse.
 """
 
 import argparse
@@ -90,12 +91,12 @@ def of_file(folder: Path, path: Path) -> FileRecord:
 
 def opened(folder: Path, path: Path) -> tuple:
     """Status, no reasons, deviation of accelerations and whether loops are closed, of a file that opens."""
-    if path.suffix == ".urdf":
+    if path.suffix.lower() == ".urdf":
         return _opened_urdf(path)
     scene = gauss.load(path, root_folder=folder)
     if all(joint.kind == "fixed" for joint in scene.joints.values()):
         return ("nothing moves",)
-    if path.suffix != ".xml":
+    if path.suffix.lower() != ".xml":
         return ("opened",)
     has_loops = bool(scene.relations or scene.couplings) or len(scene.joints) > len(scene.bodies)
     try:
@@ -127,9 +128,9 @@ def without_server(path: Path) -> str:
 
 def excluded(path: Path) -> str:
     """Why a MJCF file is counted apart; empty where it is not."""
-    if path.suffix == ".urdf":
+    if path.suffix.lower() == ".urdf":
         return REFUSED_BY_REFERENCE if is_refused_by_parser(path) else ""
-    if path.suffix != ".xml":
+    if path.suffix.lower() != ".xml":
         return ""
     text = path.read_text(errors="replace")
     if re.search(r"<(flex|flexcomp|plugin|extension)\b", text):

@@ -40,7 +40,7 @@ class Scope:
                 name = element.get("name", "")
                 against = "is reserved" if name in (MODEL, WORLD) else "is missing" if not name else ""
                 if name in self.elements:
-                    against = f"is taken by <{self.elements[name].tag}> ({source.place(self.elements[name])})"
+                    against = f"is taken by <{self.elements[name].tag}> at {source.place(self.elements[name])}"
                 if against:
                     what = f"the name {name!r} of <{element.tag}>"
                     raise FileError(f"{source.place(element)}: {what} {against}; give another.")
