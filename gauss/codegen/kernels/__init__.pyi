@@ -23,6 +23,7 @@ from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed, Notes
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.codegen.kernels.free_body_step import CompiledFreeBodyStep, FreeBodyFunctions
+from gauss.codegen.kernels.free_motion import STIFF_DAMPING, implicit_inertia
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
 from gauss.codegen.kernels.mechanism_loop import CallingSteps, CompiledSteps
 from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions
@@ -64,6 +65,7 @@ __all__ = [
     "FixedStepBatchLoop",
     "RecordedCalls",
     "RecordedSections",
+    "STIFF_DAMPING",
     "SectionCode",
     "NearPairs",
     "CompiledMechanismStep",
@@ -95,6 +97,7 @@ __all__ = [
     "ExplicitTrial",
     "Vector",
     "WORST_RECORD",
+    "implicit_inertia",
     "initial_energy_record",
     "recorded_energies",
     "stride",

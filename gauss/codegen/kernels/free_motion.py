@@ -5,8 +5,21 @@
 with the Cholesky factor C of Nᵀ M N; N are the rates of independent coordinates, given by its entries alone.
 """
 
+from gauss.codegen import INTEGER
 from gauss.codegen.kernels.arrays import Array, Value
 from gauss.codegen.kernels.step_memory import StepMemory
+
+# Sum of h d over the inertias that single forces meet, above which damping of joints is implicit. It bounds the largest rate
+# of decay times the step: explicit steps diverge beyond 2, and overshoot beyond 1.
+STIFF_DAMPING = 1.0
+
+
+def implicit_inertia(inertia, damped, maximum):
+    """Inertia max(M + ½ h d, h d) of a coordinate in a step of length h with damping d, from M and h d.
+
+    See :mod:`gauss.dynamics.contact.implicit_damping`.
+    """
+    return maximum(inertia + damped * 0.5, damped)
 
 
 class FreeMotion:
@@ -37,9 +50,10 @@ class FreeMotion:
         entries = self.at.table("entries")
         with r.each(n["entries"]) as i:
             self.at["flat"][entries[i]] = self.at["out"][i]
-        self._factor()
+        self._factor_with_damping()
         self._accelerate(self.at["flat:tau"])
         self.at.copy(self.at["results"], self.at["flat:power"], 3)
+        self._without_damping_at(self.at["v"])
         with r.each(n_v) as i:
             self.at["total"][i] = self.at["v"][i] + s["h"] * self.at["a"][i]
 
@@ -57,8 +71,51 @@ class FreeMotion:
             with r.each(n_v) as i:
                 given[n_q + 1 + i] = self.at["v"][i] + s["share"] * s["h"] * self.at["a"][i]
             self.at.call("forces", given, self.at["out"])
+            ahead, damping = given.after(n_q + 1), self.at["damping"]
+            with r.when(self.at["stiff"][0] > 0.0), r.each(n_v) as i:
+                self.at["out"][i] = self.at["out"][i] + damping[i] * (ahead[i] - self.at["v"][i])
             self._accelerate(self.at["out"])
             self.at.copy(self.at["results"], self.at["out"].after(n_v), 3)
+            self._without_damping_at(ahead)
+
+    def _factor_with_damping(self):
+        """Factors of the inertias; where damping of joints is stiff, with what makes it implicit."""
+        r, k, again, stiff = self.r, self.at.n["r"], self.r.variable(1, INTEGER), self.at["stiff"]
+        stiff[0] = 0.0
+        with r.loop() as leave_if:
+            leave_if(again[0] < 1)
+            again[0] = 0
+            self._factor()
+            with r.when(stiff[0] < 1.0):
+                total = r.variable(0.0)
+                with r.each(self.at.n["n_v"]) as i, r.when(self.at["damping"][i] > 0.0):
+                    row = self.at["Z"].after(i * k)
+                    total[0] = total[0] + self.at["damping"][i] * self.at.dot(row, row, k)
+                with r.when(total[0] * self.at.settings["h"] > STIFF_DAMPING):
+                    stiff[0], again[0] = 1.0, 1
+                    self._add_damping()
+
+    def _add_damping(self):
+        """Add what makes damping of joints implicit to their inertias."""
+        r, n_v, M = self.r, self.at.n["n_v"], self.at["flat:M"]
+        with r.each(n_v) as i, r.when(self.at["damping"][i] > 0.0):
+            own = M[i * n_v + i]
+            whole = implicit_inertia(own, self.at["damping"][i] * self.at.settings["h"], r.maximum)
+            self.at["implicit"][i] = whole - own
+            M[i * n_v + i] = whole
+
+    def _without_damping_at(self, v: Array):
+        """Leave stiff damping at some rates out of the dissipation."""
+        r, results, damping = self.r, self.at["results"], self.at["damping"]
+        with r.when(self.at["stiff"][0] > 0.0), r.each(self.at.n["n_v"]) as i:
+            results[2] = results[2] - damping[i] * v[i] * v[i]
+
+    def add_damping_over(self, middle: Array):
+        """Add the dissipation of stiff damping over a step with mean rates ``middle``."""
+        r, at, results, damping = self.r, self.at, self.at["results"], self.at["damping"]
+        with r.when(at["stiff"][0] > 0.0), r.each(at.n["n_v"]) as i:
+            force = damping[i] * at["v"][i] + at["implicit"][i] * (at["a"][i] + at["added"][i])
+            results[2] = results[2] + force * middle[i]
 
     def _factor(self):
         """Cholesky factor C of Nᵀ M N, and Z = N C⁻ᵀ."""

@@ -113,6 +113,7 @@ class _StepWriter:
                 share = self.at["lossy"][i - (m * 3 + g)]
                 lossy[0], other[0] = lossy[0] + work * share, other[0] + work * (share * -1.0 + 1.0)
         results[0], results[2] = results[0] + other[0], results[2] - lossy[0]
+        self.free.add_damping_over(self.at["total"])
         results[3], results[4] = self.at["residual"][0], 0.0
         self.sliding.examine(m)
         fits = self.free.speed(self.at["end_v"]) <= s["margin"] * speed

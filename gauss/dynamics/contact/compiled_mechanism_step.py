@@ -83,7 +83,7 @@ class MechanismMemory(CompiledStepMemory):
         row, column = np.nonzero(N)
         at["value"][:] = N[row, column]
         at["fixed"][:] = stepper.kernels.layout.flat
-        at["reach"][:] = stepper.reach
+        at["reach"][:], at["damping"][:] = stepper.reach, stepper.damping.d
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
         at["other_restitution"][:], at["other_unit"][:] = rows.other_restitution, rows.other_unit
         at["set_unit"][:], at["limit"][:], at["lossy"][:] = rows.set_unit, rows.limit, rows.lossy

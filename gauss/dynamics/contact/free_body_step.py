@@ -40,11 +40,10 @@ ROUNDS = (
     Round(100, 1e-2, 30),
     Round(0, 1e-5, 10),
     # Redundant contacts between which forces move far at small residuals: much regularisation stands still, little cycles.
-    Round(0, 1e-5, 60),
-    Round(0, 3e-6, 60),
-    Round(0, 1e-4, 60),
-    Round(0, 1e-3, 60),
-    Round(0, 1e-5, 60),
+    Round(0, 1e-5, 30),
+    Round(0, 3e-6, 40),
+    Round(0, 1e-3, 20),
+    Round(0, 1e-5, 30),
 )
 UNSOLVED = 1e-3  # error of the laws, relative: beyond it the convex relaxation is solved
 REACH_MARGIN = 1.5  # of the distance that bodies approach within a step by their speeds before contact

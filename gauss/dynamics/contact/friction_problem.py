@@ -4,7 +4,7 @@
 
 with impulses r, per contact in the frame of its normal and two tangents (De Saxcé, Feng 1991; Acary, Brogliato, Numerical
 Methods for Nonsmooth Dynamical Systems, 2008, 3.7). The rates u are those after the step, less the least that gaps may have;
-W is the Delassus operator, which does not depend on the step.
+W is the Delassus operator, which does not depend on the step but by stiff damping of joints.
 """
 
 from collections.abc import Callable

@@ -21,6 +21,7 @@ from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.free_body_step import ATTEMPTS, REACH_MARGIN
 from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
+from gauss.dynamics.contact.implicit_damping import ImplicitDamping
 from gauss.dynamics.contact.mechanism_compliance import Compliance
 from gauss.dynamics.contact.mechanism_kernels import mechanism_kernels
 from gauss.dynamics.contact.mechanism_rows import MechanismRows, StepRows
@@ -75,6 +76,7 @@ class MechanismStepper:
         code = NearPairs(compiled_mechanism_step().code) if is_compiled else near_pairs()
         self.detection = NearDetection(self.table, self.n + 1, system.scale.length, code)
         self.shares = (0.0,) if self.smooth.closes or self.rows.restitution.any() else (MIDPOINT, 0.0)
+        self.damping = ImplicitDamping(self.smooth)
         self.acceleration_error = 0.0
         self.constants = {
             "margin": REACH_MARGIN,
@@ -215,6 +217,8 @@ class MechanismStepper:
         lossy[work.size - self.rows.lossy.size :] = self.rows.lossy
         driven = work[~lossy].sum() + self._prescribed_power(rows, begun, acceleration, middle, force)
         power = begun.power + np.array([driven, 0.0, -work[lossy].sum()])
+        if begun.implicit is not None:
+            power = power + self.damping.power_over(state.v, begun.implicit, acceleration, h)
         contacts, others = self.rows.split(rows, near, force * rows.unit)
         order = np.argsort(near.key)
         self.known = KnownForces(near.key[order], contacts[order], others, share)
@@ -254,10 +258,15 @@ class MechanismStepper:
         q = kernels.move(np.concatenate([state.q, (share * h) * state.v])) if share else state.q
         terms = kernels.terms(t, q, state.v, self.inputs)
         H, offset = self.compliance.of(terms)
-        acceleration, power = H @ terms.tau + offset, terms.power
+        power, implicit = terms.power, None
+        if self.damping.is_stiff(H, h):
+            implicit, power = self.damping.added(terms, h), power - self.damping.power_at(state.v)
+            terms = terms._replace(M=terms.M + np.diag(implicit))
+            H, offset = self.compliance.of(terms)
+        acceleration = H @ terms.tau + offset
         if not np.isfinite(acceleration).all():
             raise SimulationError(f"t = {t:.6g} s: accelerations are not finite; a law or a very fast motion makes them so.")
-        return FreeStep(q, terms, H, offset, acceleration, power)
+        return FreeStep(q, terms, H, offset, acceleration, power, implicit)
 
     def _at_later_rates(
         self, begun: FreeStep, state: State, rows: StepRows, near: NearContacts, h: float, share: float
@@ -268,8 +277,12 @@ class MechanismStepper:
         acceleration, t = begun.acceleration, state.t + share * h
         if self.known.share:
             acceleration = acceleration + begun.H @ (rows.K.T @ self.rows.start(near, rows, self.known))
-        ahead = self.kernels.forces(np.concatenate([[t], begun.q, state.v + (share * h) * acceleration, self.inputs]))
-        return begun._replace(acceleration=begun.H @ ahead[:-3] + begun.offset, power=ahead[-3:])
+        v = state.v + (share * h) * acceleration
+        found = self.kernels.forces(np.concatenate([[t], begun.q, v, self.inputs]))
+        forces, power = found[:-3], found[-3:]
+        if begun.implicit is not None:
+            forces, power = forces + self.damping.d * (v - state.v), power - self.damping.power_at(v)
+        return begun._replace(acceleration=begun.H @ forces + begun.offset, power=power)
 
     def _speed(self, begun: FreeStep, v: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""

@@ -46,7 +46,10 @@ class MechanismStep(NamedTuple):
 
 
 class FreeStep(NamedTuple):
-    """Terms after the share of a step, compliance H, accelerations without forces, with loads, and power of these."""
+    """Terms after the share of a step, compliance H, accelerations without forces, with loads, and power of these.
+
+    Where damping of joints is implicit, ``implicit`` (n_v,) are the inertias that it adds, and the power leaves it out.
+    """
 
     q: np.ndarray
     terms: MechanismTerms
@@ -54,6 +57,7 @@ class FreeStep(NamedTuple):
     offset: np.ndarray
     acceleration: np.ndarray
     power: np.ndarray
+    implicit: np.ndarray | None
 
 
 class OpenStep(NamedTuple):
