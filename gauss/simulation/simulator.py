@@ -31,7 +31,7 @@ from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
-from gauss.simulation.moreau.unseen_contacts import PassingWatch
+from gauss.simulation.moreau.unseen_contacts import FIRST, PassingWatch
 from gauss.simulation.passed_switching import StepsAhead
 from gauss.simulation.simulator_state import SimulatorState
 from gauss.simulation.step_limits import steps_per_check
@@ -254,8 +254,9 @@ class Simulator:
             self._passing.examine(self._rates.dot(self._rates), self._steps, lambda: [("", self.state)])
 
     def _look_soon(self):
-        """Let the next step look at the shapes, if there are any, and for switching where none was looked for."""
-        self._seen = 0.0 if self._passing.has_pairs else self._ahead.seen_from(self._begun)
+        """Let the next step look at the shapes of a motion that begins, and for switching where none was looked for."""
+        begins = self._passing.has_pairs and self._passing.due == FIRST
+        self._seen = 0.0 if begins else self._ahead.seen_from(self._begun)
 
     def _look_ahead(self):
         """Look at the shapes, and for switching of laws of time in steps that are to be made, and beyond them."""
