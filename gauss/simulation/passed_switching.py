@@ -167,8 +167,10 @@ class StepsAhead:
         """Number of steps from a time [s] in which switching has been looked for."""
         if not self.is_timed:
             return math.inf
-        known = self.begin <= t <= self.end and _ends_of_steps(np.array([t]), self.begin, self.step).all()
-        return (self.end - t) / self.step if known else 0.0
+        if not self.begin <= t <= self.end:
+            return 0.0
+        beside = abs(math.remainder(t - self.begin, self.step))  # as _ends_of_steps, of one time
+        return (self.end - t) / self.step if beside <= APART * max(abs(self.begin), abs(t)) else 0.0
 
     def look(self, start: State, end: float):
         """Look for switching from a state up to a time [s] at least; as :func:`examine_steps`."""

@@ -61,9 +61,10 @@ class StepWatch:
         return self._passing.due, self._warned
 
     def go_on(self, t: float, kept: tuple):
-        """Go on with a motion that began at a time [s], with what was kept of it; its next step looks at the shapes."""
+        """Go on with a motion that began at a time [s], with what was kept of it; shapes are looked at before its first step."""
         self._passing.due, self._warned = kept
-        self.seen = 0.0 if self.has_pairs else self._ahead.seen_from(t)
+        begins = self.has_pairs and self._passing.due == FIRST
+        self.seen = 0.0 if begins else self._ahead.seen_from(t)
 
     def look(self, rates: np.ndarray, steps: int, state: Callable[[], State]):
         """Look at the shapes of a state () → State after some steps, where its rates (n_v,) or the steps make that due."""

@@ -133,6 +133,15 @@ def test_all_switching_times_are_found(places, waves):
     assert all(np.abs(expected - place).min() < close for place in found)
 
 
+@pytest.mark.parametrize("rows", [1, 2, 300])
+def test_the_rows_of_a_table_are_its_switching_times(rows):
+    graph = Graph()
+    t, places = graph.symbol("t"), np.cumsum(np.random.default_rng(rows).uniform(0.5, 1.5, rows + 1))
+    law = gm.interp(2.0 * t - 1.0, places, np.random.default_rng(0).normal(size=rows + 1))
+    found = timetable([law], t, 0.0, places[-1]).switches
+    np.testing.assert_allclose(found, 0.5 * (places + 1.0), rtol=1e-14)  # of a division and a sum
+
+
 AFFINE = {
     "ramp": lambda x, y: 2.0 * x - 3.0,
     "sum": lambda x, y: x + y,

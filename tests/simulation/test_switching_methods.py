@@ -104,6 +104,27 @@ def test_what_is_verified_is_not_stepped_over(pulses):
     assert motion.stats.global_error[1] < 1e-9
 
 
+ROWS = np.linspace(0.0, 10.0, 41)
+VALUES = np.sin(3.0 * ROWS)
+SHARE, SMOOTH = 0.1, 1e-12  # least share of an error that is claimed; error [m/s] of steps that end at kinks
+WAYS = {  # a table that numpy reads, and whether steps end at its rows
+    "kinks": ({}, False),
+    "breaks": ({"breaks": ROWS[1:-1].tolist()}, True),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("way", WAYS)
+def test_verification_tells_of_kinks_of_opaque_laws(way, rtol):
+    given, known = WAYS[way]
+    scene = slider(lambda t: float(np.interp(float(t), ROWS, VALUES)), **given)
+    motion = gauss.simulate(scene, 10.0, rtol=rtol, verify=True, progress=False)
+    error = abs(motion.v[-1, 0] - np.trapezoid(VALUES, ROWS))
+    assert (error < SMOOTH) == known
+    assert motion.stats.global_error[1] > SHARE * error
+
+
 # Many motions, and motions in phases.
 
 
