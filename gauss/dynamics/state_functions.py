@@ -14,7 +14,7 @@ from gauss import math
 from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
-from gauss.dynamics.constraint_leak import LARGEST_LEAK, constraint_leak
+from gauss.dynamics.constraint_leak import LARGEST_LEAK, constraint_leak, may_leak
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.mobility import mobility
@@ -205,7 +205,7 @@ def _function(system: System, requests, columns) -> TracedFunction:
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
     of_loops = any(TERMS[one.name].of_loops for one in requests)
-    leaks = of_loops and columns is None and system.closes
+    leaks = of_loops and columns is None and may_leak(system)
     limits = (*error_limits(columns), *((LARGEST_LEAK,) if leaks else ()))
     interface = Interface(sizes, "t", limits, _shapes(system, requests, columns))
 
