@@ -61,9 +61,9 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
         Three matrices. With loops, changes of coordinates and rates are along the constraints. With joint friction and
         limited drives they are those of the contact mode of this state: slipping elements are loads of constant sign,
         sticking ones are constraints, and changes of rates are along these. Where loop constraints are redundant, sums
-        along the constraints have eight digits; those of :func:`gauss.linearise` have all. Where bodies of one loop differ in
-        mass or inertia by more than a thousand, digits are checked in each state; where the elimination loses them, the null
-        space of the constraints gives the derivatives, in milliseconds, with eight digits or more.
+        along the constraints have eight digits; those of :func:`gauss.linearise` have all. Where bodies of one loop
+        differ in mass or inertia by more than a thousand, digits are checked in each state; where the elimination loses
+        them, the null space of the constraints gives the derivatives, in milliseconds, with eight digits or more.
 
     Raises
     ------
