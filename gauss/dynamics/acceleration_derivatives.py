@@ -8,11 +8,15 @@ those of trees without forces on bodies by composite bodies, with half of the op
 
 import numpy as np
 
+from gauss import math
 from gauss.codegen import LDLT, Scalar, as_number, forward, write
 from gauss.dynamics.composite_bodies import CompositeBodies
-from gauss.dynamics.mechanism import Mechanism, inverse_dynamics
+from gauss.dynamics.constraint_leak import LARGEST_LEAK, REFUSED_LEAK, constraint_leak, may_leak, refused_where_leaking
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale
+from gauss.dynamics.mechanism import Mechanism, inverse_dynamics, loop_constraint_scales
 from gauss.dynamics.rigid_loops import refused_in_other_pose
 from gauss.dynamics.rnea import KinematicTree
+from gauss.dynamics.traced_refinement import refined_motion
 from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import SimulationError
 from gauss.system import State, System, coordinate_rates, whole
@@ -44,6 +48,26 @@ class LoadedMechanism:
         """Accelerations (n_v,) and multipliers (m,); not numbers where a loop that cannot move has another pose."""
         rates, multipliers = self.mechanism.motion(self.effort, self.forces)
         return refused_in_other_pose(self.system, self.q, rates), multipliers
+
+    def accelerations(self, pattern: System | None = None) -> np.ndarray:
+        """Accelerations (n_v,) alone, as of :meth:`motion`; refined where bodies of loops are unlike, else not numbers.
+
+        Parameters
+        ----------
+        pattern : System, optional
+            A system of numbers, where those of this one are symbols.
+        """
+        found, pattern = self.motion()[0], pattern or self.system
+        if not may_leak(pattern):
+            return found
+        state = State(self.mechanism.t, self.q, self.v)
+        refined = refined_motion(self.system, state, self.effort, self.forces)[0]
+        size = acceleration_scale(pattern) + np.abs(refined.rates / pattern.scale.coordinates).sum()
+        off = np.abs(refined.residual / loop_constraint_scales(pattern)).sum()
+        leak = constraint_leak(pattern, self.mechanism)
+        other = math.where(leak <= REFUSED_LEAK, found, np.nan)
+        other = math.where(off <= ACCELERATION_TOLERANCE * size, refined.rates, other)
+        return math.where(leak <= LARGEST_LEAK, found, other)
 
     def residual(self, rates, multipliers) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Residuals of the equations of motion (n_v,) and of the loop constraints (m,), and all accelerations (n_v,)."""
@@ -77,7 +101,7 @@ class LoadedMechanism:
 def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of the accelerations by displacements along the rates, rates and generalised forces, each (n_v, n_v).
 
-    Not numbers where a loop that cannot move has another pose than in the scene.
+    Not numbers where a loop that cannot move has another pose than in the scene, and where elimination loses digits.
     """
     n, loaded = system.n_v, LoadedMechanism(system, loads, t, q, v, load)
     unit, zero = np.eye(n), np.zeros(n)
@@ -105,7 +129,10 @@ def acceleration_derivatives(system: System, loads, t: Scalar, q, v, load) -> tu
     if m:
         Y = np.array([loaded.mechanism.response(zero, e)[0] for e in np.eye(m)]).T
         slopes = slopes + Y @ violation.reshape(m, 2 * n)
-    by_q, by_v, by_load = (refused_in_other_pose(system, q, part) for part in (slopes[:, :n], slopes[:, n:], X))
+    parts = slopes[:, :n], slopes[:, n:], X
+    by_q, by_v, by_load = (
+        refused_where_leaking(system, loaded.mechanism, refused_in_other_pose(system, q, part)) for part in parts
+    )
     return by_q, by_v, by_load
 
 

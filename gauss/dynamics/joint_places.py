@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss.codegen import Scalar, forward, write
 from gauss.dynamics.constrained_terms import ConstrainedTerms
+from gauss.dynamics.constraint_leak import refused_where_leaking
 from gauss.dynamics.given_link_frames import GivenLinkFrames, with_moved_joint
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import AXES, kinematics
@@ -54,7 +55,8 @@ def accelerations_by_place(
     mechanism = Mechanism(system, q, v, t, (whole(system),))
     rates, multipliers = mechanism.motion(own + load, forces)
     found = place_changes(system, loads, state, load, parameter, rates, multipliers, following)
-    return np.array([mechanism.response(motion, violation)[0] + after for motion, violation, after in found]).T
+    changes = np.array([mechanism.response(motion, violation)[0] + after for motion, violation, after in found]).T
+    return refused_where_leaking(system, Mechanism(system, q, v, t), changes)
 
 
 def place_changes(

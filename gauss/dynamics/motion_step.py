@@ -13,6 +13,7 @@ import numpy as np
 from gauss.arguments import name_list
 from gauss.codegen import Kernel, forward, reverse, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.dynamics.constraint_leak import with_alike_bodies
 from gauss.dynamics.inputs import InputForces, input_loads
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism, loop_residual
@@ -55,6 +56,7 @@ class MotionStep:
     """
 
     moved_loops: np.ndarray | None = None
+    pattern: System | None = None  # system of numbers, where those of the system are symbols
 
     def __init__(
         self,
@@ -89,8 +91,8 @@ class MotionStep:
 
     def evaluate(self, state: State, delta) -> Rates:
         """Rates of a state, with the change of the accelerations for small changes δ of the parameters."""
-        found = LoadedMechanism(self.system, self.loads, state.t, state.q, state.v, np.zeros(self.system.n_v)).motion()[0]
-        place = 0
+        none = np.zeros(self.system.n_v)
+        found, place = LoadedMechanism(self.system, self.loads, state.t, state.q, state.v, none).accelerations(), 0
         for name, size in self.sizes.items():
             still = np.zeros(self.system.n_v)
             if name not in self.absent:
@@ -113,12 +115,13 @@ class MotionStep:
     def projected(self, state: State, delta=()) -> list[np.ndarray]:
         """Coordinates and rates on the constraints, which small changes δ of the parameters may move."""
         q, v, t = state.q, state.v, state.t
+        metric = with_alike_bodies(self.system, self.pattern)
         shift = 0.0 if self.moved_loops is None else self.moved_loops @ delta
         for _ in range(PROJECTIONS):
             phi, slack = loop_residual(self.system, q, t)
-            step = Mechanism(self.system, q, v, t).position_correction(phi + shift, slack)
+            step = Mechanism(self.system, q, v, t, metric).position_correction(phi + shift, slack)
             q = Chart(_Equations(self, ()), State(t, q, v)).state(t, np.concatenate([step, v])).q
-        mechanism = Mechanism(self.system, q, v, t)
+        mechanism = Mechanism(self.system, q, v, t, metric)
         return [q, mechanism.nearest(v, mechanism.velocity_rhs)]
 
     def _kernel(self, name: str, function: Callable, *sizes: int) -> Kernel:

@@ -13,6 +13,7 @@ import numpy as np
 
 from gauss.codegen import Scalar, forward, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.dynamics.constraint_leak import refused_where_leaking
 from gauss.dynamics.inverse_dynamics_residual import along_rates, outward_accelerations
 from gauss.dynamics.joint_places import accelerations_by_place, inverse_dynamics_by_place
 from gauss.dynamics.kinematics import Kinematics, kinematics
@@ -109,7 +110,8 @@ def accelerations_by_parameter(
     rates, multipliers = loaded.motion()
     still = np.zeros(multipliers.size)
     columns = inverse_dynamics_by_parameter(system, loads, t, q, v, rates, parameter)
-    return np.array([loaded.mechanism.response(-column, still)[0] for column in columns.T]).T
+    found = np.array([loaded.mechanism.response(-column, still)[0] for column in columns.T]).T
+    return refused_where_leaking(system, loaded.mechanism, found)
 
 
 def _by_inertia(motion: Kinematics, loads, rates, kind: str, name: str) -> list[dict]:

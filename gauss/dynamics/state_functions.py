@@ -14,7 +14,7 @@ from gauss import math
 from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
-from gauss.dynamics.constraint_leak import LARGEST_LEAK, constraint_leak
+from gauss.dynamics.constraint_leak import LARGEST_LEAK, REFUSED_LEAK, constraint_leak, may_leak
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.mobility import mobility
@@ -205,8 +205,9 @@ def _function(system: System, requests, columns) -> TracedFunction:
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
     of_loops = any(TERMS[one.name].of_loops for one in requests)
-    leaks = of_loops and columns is None and system.closes
-    limits = (*error_limits(columns), *((LARGEST_LEAK,) if leaks else ()))
+    leaks = (of_loops or columns is not None) and may_leak(system)
+    largest = LARGEST_LEAK if columns is None else REFUSED_LEAK
+    limits = (*error_limits(columns), *((largest,) if leaks else ()))
     interface = Interface(sizes, "t", limits, _shapes(system, requests, columns))
 
     def values(*given):
@@ -221,7 +222,7 @@ def _function(system: System, requests, columns) -> TracedFunction:
         return *(part for own in parts for part in own), [residual, total + overflow, *others]
 
     name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
-    by_null_space = partial(null_space_terms, system, requests) if leaks else None
+    by_null_space = partial(null_space_terms, system, requests) if leaks and columns is None else None
     return TracedFunction(lambda: write(values, *interface.sizes, 1, name="state"), interface, name, by_null_space)
 
 
@@ -351,4 +352,9 @@ def refused_state(system: System, state: State, name: str, columns) -> str:
             "system.projected make a state that does."
         )
     names = ", ".join(system.coordinates[k] for k in columns)
+    if may_leak(system):
+        return (
+            f"{name}: bodies of one loop differ so much in mass or inertia that too few digits are left in this state, or "
+            f"{names} do not determine the other rates; give the lightest bodies more, or take gauss.linearise."
+        )
     return f"{name}: {names} do not determine the other rates in this state; take other independent coordinates."

@@ -11,10 +11,12 @@ import numpy as np
 from gauss import math
 from gauss.backends.estimate import SHARE_AT_REST
 from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK
+from gauss.codegen import Scalar
 from gauss.dynamics.front_rank import embedding_of
 from gauss.dynamics.mechanism import Mechanism, refined_forward_dynamics
-from gauss.dynamics.traced_system import Program, absolute_sum, applied_loads, largest
-from gauss.system import State
+from gauss.dynamics.refined_dynamics import RefinedAccelerations
+from gauss.dynamics.traced_system import Program, absolute_sum, applied_loads, constraint_residual, largest
+from gauss.system import State, System
 
 
 def refined_once(program: Program, q, v, tau, t, elimination: Callable[..., Mechanism] = Mechanism):
@@ -53,11 +55,16 @@ def refined_rates(program: Program, t, q, v, tau):
     return acceleration, power, [error]
 
 
+def refined_motion(system: System, state: State, tau, forces) -> tuple[RefinedAccelerations, Scalar]:
+    """Accelerations refined to round-off, and the constraint residual of the state; see :func:`refined_forward_dynamics`."""
+    residual = constraint_residual(system, state)
+    cut = math.clip(math.sqrt(residual), LOOP_RANK, COARSEST_LOOP_RANK)
+    return refined_forward_dynamics(system, state, tau, forces, cut), residual
+
+
 def _refined(program: Program, state: State, tau):
     own, forces, power = applied_loads(program.system, program.loads, state)
-    residual = program.residual(state)
-    cut = math.clip(math.sqrt(residual), LOOP_RANK, COARSEST_LOOP_RANK)
-    found = refined_forward_dynamics(program.system, state, own + tau, forces, cut)
+    found, residual = refined_motion(program.system, state, own + tau, forces)
     size = math.maximum(largest(found.rates * program.own), program.error_scale(state.v))
     each = zip(found.error * program.own, found.rates * program.own, strict=True)
     shares = [off / math.maximum(np.abs(rate), SHARE_AT_REST * size) for off, rate in each]

@@ -195,12 +195,7 @@ class Program:
 
         Infinite where a loop that cannot move has another pose than the rigid body to which it is reduced.
         """
-        residual = off_unit(self.system, state.q)
-        if rigid_joints(self.system):
-            residual = residual + math.where(is_in_other_pose(self.system, state.q), np.inf, 0.0)
-        if self.system.has_closures:
-            residual = residual + state_residual(kinematics(self.system, state))
-        return residual
+        return constraint_residual(self.system, state)
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a traced state, by a call."""
@@ -354,6 +349,16 @@ class Program:
         (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.projected_rates([state.t], state.q, state.v)
         q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
         return State(state.t, q, v), Rates(acceleration, power), rest
+
+
+def constraint_residual(system: System, state: State):
+    """Constraint residual of a state, in position and velocity, relative; see :meth:`Program.residual`."""
+    residual = off_unit(system, state.q)
+    if rigid_joints(system):
+        residual = residual + math.where(is_in_other_pose(system, state.q), np.inf, 0.0)
+    if system.has_closures:
+        residual = residual + state_residual(kinematics(system, state))
+    return residual
 
 
 def off_unit(system: System, q):

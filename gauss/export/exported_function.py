@@ -185,7 +185,7 @@ def _loaded(system: System, name: str) -> ExportedFunction:
             t[0].graph.parameter(one)
         if name == "acceleration_derivatives":
             return acceleration_derivatives(system, loads, t[0], q, v, load)
-        return LoadedMechanism(system, loads, t[0], q, v, load).motion()[0]
+        return LoadedMechanism(system, loads, t[0], q, v, load).accelerations()
 
     found = write(values, system.n_q, system.n_v, system.n_v, 1, name=name)
     state, (t, *u) = np.split(np.array(found.inputs, dtype=object), [-1 - len(given)])

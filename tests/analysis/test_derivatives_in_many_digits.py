@@ -6,55 +6,18 @@ stay on the constraints to first order, K δq = 0 and K δv + (∂K/∂q δq) v 
 
 from dataclasses import replace
 
-import mpmath
 import numpy as np
 import pytest
 
 import gauss
-from gauss.codegen import Expression
-from gauss.export.exported_function import exported_functions
 from gauss.system import random_state
 from tests.support import mechanisms
+from tests.support.many_digits import InManyDigits, along, tangent
 
 pytestmark = pytest.mark.slow
 
-DIGITS = 50
-STEP = mpmath.mpf(10) ** -15  # of coordinates, rates and loads
 EXACT = 1e-11  # relative to the largest entry: rounding of the derivatives in double precision, times the condition of M
 WIDE_STEP = 2.0**-8  # relative, of parameters: scenes hold doubles, whose rounding is divided by it
-OPERATIONS = {
-    "add": lambda x, y: x + y,
-    "sub": lambda x, y: x - y,
-    "mul": lambda x, y: x * y,
-    "div": lambda x, y: x / y,
-    "neg": lambda x: -x,
-    "less": lambda x, y: mpmath.mpf(x < y),
-    "less_equal": lambda x, y: mpmath.mpf(x <= y),
-    "select": lambda condition, x, y: x if condition else y,
-    "min": min,
-    "max": max,
-} | {name: getattr(mpmath, name) for name in ("sqrt", "sin", "cos", "exp", "log", "floor", "atan2")}
-
-
-class InManyDigits:
-    """Function of a state, evaluated in 50 digits."""
-
-    def __init__(self, system: gauss.System, name: str):
-        (self.exported,) = exported_functions(system, name)
-        self.takes_load = "load" in self.exported.inputs
-
-    def __call__(self, q, v=(), load=()) -> list[np.ndarray]:
-        function, given = self.exported.function, {"q": q, "v": v, "load": load, "t": [0.0]}
-        inputs = [number for name in self.exported.inputs for number in given[name]]
-        with mpmath.workdps(DIGITS):
-            values = {symbol.index: mpmath.mpf(x) for symbol, x in zip(function.inputs, inputs, strict=True)}
-            for node in function.nodes:
-                if node.is_constant:
-                    values[node.index] = mpmath.mpf(node.value)
-                elif node.op != "symbol":
-                    values[node.index] = OPERATIONS[node.op](*(values[x.index] for x in node.operands))
-            found = [values[x.index] if isinstance(x, Expression) else mpmath.mpf(x) for x in function.outputs]
-        return list(self.exported.split(found, self.exported.outputs).values())
 
 
 def sprung() -> gauss.Scene:
@@ -74,37 +37,6 @@ LOOPS = {
     "ladder": lambda: gauss.load("n_four_bar", n=2),
     "Cardan shaft": lambda: gauss.load("cardan"),
 }
-
-
-def along(function, state, load, changes) -> np.ndarray:
-    """Derivative of accelerations along changes of coordinates, rates and loads."""
-    points = []
-    with mpmath.workdps(DIGITS):
-        for sign in (1, -1):
-            moved = [
-                [mpmath.mpf(x) + sign * STEP * mpmath.mpf(d) for x, d in zip(part, change, strict=True)]
-                for part, change in zip((state.q, state.v, load), changes, strict=True)
-            ]
-            points.append(function(*moved)[0])
-        return np.array((points[0] - points[1]) / (2 * STEP), dtype=float)
-
-
-def tangent(system, state, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Random change of coordinates, rates and loads that stays on the constraints."""
-    dq, dv, dload = rng.standard_normal((3, system.n_v))
-    if not system.has_closures:
-        return dq, dv, dload
-    function = InManyDigits(system, "loop_constraints")
-    of = lambda q: next(part for part in function(q, state.v) if part.ndim == 2)  # noqa: E731
-    K = np.array(of(state.q), dtype=float)
-    pinv = np.linalg.pinv(K, rcond=1e-10)
-    dq = dq - pinv @ (K @ dq)
-    with mpmath.workdps(DIGITS):
-        ahead, behind = (
-            of([mpmath.mpf(x) + sign * STEP * mpmath.mpf(d) for x, d in zip(state.q, dq, strict=True)]) for sign in (1, -1)
-        )
-        turning = np.array((ahead - behind) / (2 * STEP), dtype=float) @ state.v
-    return dq, dv - pinv @ (K @ dv + turning), dload
 
 
 @pytest.mark.parametrize("name", TREES | LOOPS)

@@ -82,7 +82,7 @@ class OptimalEquations:
 
         def values(t, q, v, u):
             mechanism = LoadedMechanism(system, self.loads(u), t[0], q, v, np.zeros(system.n_v))
-            return coordinate_rates(system, q, v), mechanism.motion()[0]
+            return coordinate_rates(system, q, v), mechanism.accelerations()
 
         return self.in_units(values, "rates", self.units)
 

@@ -39,7 +39,7 @@ class LinearInputStep(MotionStep):
         (begin,), value, slope = np.split(delta, [1, 1 + self.equations.n_u])
         loads = self.equations.loads(value + (state.t - begin) * slope)
         still = np.zeros(self.system.n_v)
-        return Rates(LoadedMechanism(self.system, loads, state.t, state.q, state.v, still).motion()[0], np.zeros(3))
+        return Rates(LoadedMechanism(self.system, loads, state.t, state.q, state.v, still).accelerations(), np.zeros(3))
 
     def interval(self, t: float, h: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """(q, v) at the start and after each part (SUBSTEPS + 1, n_x) of an interval, from inputs u (2, n_u) at its ends."""

@@ -21,6 +21,7 @@ from gauss.analysis.sensitivity.timed_steps import SHORTEST, timed_steps
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import name_list, real_array
 from gauss.dynamics import compile_scene
+from gauss.dynamics.constraint_leak import may_leak
 from gauss.dynamics.laws.switching import timed_switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import loop_residual
@@ -127,7 +128,10 @@ class Motion:
             self._smoothly()
         if not np.isfinite(self.x).all():
             late = self.t[np.flatnonzero(~np.isfinite(self.x).all(axis=1))[0]]
-            raise SimulationError(f"sensitivities: the motion is not finite at t = {late:.6g} s; take shorter steps.")
+            unlike = " or bodies of one loop that differ less in mass" if may_leak(system) else ""
+            raise SimulationError(
+                f"sensitivities: the motion is not finite at t = {late:.6g} s; take shorter steps{unlike}."
+            )
         warn_of_jumps(system, self.t, self.x)
 
     @property

@@ -45,6 +45,7 @@ class ParametrisedStep(MotionStep):
         if not isinstance(integrator, str) or integrator not in TABLEAUS:
             raise ArgumentError(f"fit_motion: no integrator {integrator!r}. {did_you_mean(str(integrator), TABLEAUS)}")
         self.family, self.system, self.laws = family, family.system, Laws(family.pattern)
+        self.pattern = family.pattern
         DERIVATIVES.plan(Question(family.pattern, self.laws))
         self.tableau, self.inputs = TABLEAUS[integrator], tuple(self.system.scene.inputs)
         self.n_x, self.n_p = self.system.n_q + self.system.n_v, len(family.varied)
@@ -58,7 +59,7 @@ class ParametrisedStep(MotionStep):
     def evaluate(self, state: State, delta) -> Rates:
         """Rates of a state; the numbers are parameters of the graph."""
         still = np.zeros(self.system.n_v)
-        found = LoadedMechanism(self.system, self.loads, state.t, state.q, state.v, still).motion()[0]
+        found = LoadedMechanism(self.system, self.loads, state.t, state.q, state.v, still).accelerations(self.family.pattern)
         return Rates(found, np.zeros(3))
 
     def _kernel(self, name: str, function: Callable, *sizes: int) -> Kernel:

@@ -48,7 +48,7 @@ def _rates(tuned: UnitParameters) -> ExportedFunction:
     sizes = sum(output.size(scene) for output in scene.outputs.values())
 
     def rates(q, v, t):
-        acceleration = LoadedMechanism(system, loads, t, q, v, np.zeros(system.n_v)).motion()[0]
+        acceleration = LoadedMechanism(system, loads, t, q, v, np.zeros(system.n_v)).accelerations(tuned.pattern)
         motion = kinematics(system, State(t, q, v))
         outputs = [np.ravel(measured(one, motion, acceleration)) for one in scene.outputs.values()]
         return np.concatenate([coordinate_rates(system, q, v), acceleration, *outputs])
@@ -58,7 +58,7 @@ def _rates(tuned: UnitParameters) -> ExportedFunction:
 
 def _projection(tuned: UnitParameters) -> ExportedFunction:
     system, step = tuned.system, MotionStep(tuned.pattern, "rk4")
-    step.system = system  # its projection is that of the numbers that stay open
+    step.system, step.pattern = system, tuned.pattern  # its projection is that of the numbers that stay open
 
     def project(q, v, t):
         q = np.array(q, dtype=object)
