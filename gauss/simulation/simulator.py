@@ -413,5 +413,5 @@ def _floats(u) -> np.ndarray | None:
         return None
     try:
         return np.asarray(u, dtype=float)
-    except (TypeError, ValueError, RuntimeError):  # the last of torch
+    except (OverflowError, TypeError, ValueError, RuntimeError):  # the last of torch
         return None
