@@ -247,6 +247,7 @@ class Simulator:
             If a value is not finite, a prescribed motion jumps, or a step fails; the message says why. After a failed step
             the state is one before it.
         """
+        n = 1 if n == 1 else checked_count("n", n)
         if u is not None:
             self._set(u)
         self._before = self._point.tobytes()
@@ -299,8 +300,8 @@ class Simulator:
 
     def _plan_steps(self, n: int):
         """Write the ends of steps to the grid."""
-        if type(n) is not int or not 0 < n <= len(self._grid):
-            n = self._room_for(checked_count("n", n))
+        if n > len(self._grid):
+            self._room_for(n)
         begin, h, first = self._begun, self.step_size, self._steps + 1
         few = n <= FEW_STEPS
         self._times[:n] = (
@@ -308,13 +309,11 @@ class Simulator:
         )
         self._steps += n
 
-    def _room_for(self, n: int) -> int:
-        """Let the grid hold the steps of a call, of which it returns the number."""
+    def _room_for(self, n: int):
+        """Let the grid hold the steps of a call."""
         refuse_beyond_memory(STEP_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
-        if n > len(self._grid):
-            self._grid = _unchecked(n)
-            self._bind()
-        return n
+        self._grid = _unchecked(n)
+        self._bind()
 
     def _recover(self, n: int):
         """Repeat steps of contacts in Python; raise a SimulationError where a step has failed."""
