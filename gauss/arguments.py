@@ -3,6 +3,7 @@
 Numbers, tables and names of the user are read by one function for each, which refuses everything else by what was expected.
 """
 
+import sys
 from collections.abc import Callable, Mapping
 from functools import wraps
 from inspect import Parameter, Signature, signature
@@ -14,6 +15,7 @@ import numpy as np
 from gauss.errors import ArgumentError, did_you_mean
 
 T = TypeVar("T", bound=Callable)
+LARGEST_DOUBLE = sys.float_info.max  # whole numbers beyond it are no doubles
 
 
 def named_arguments(target: T) -> T:

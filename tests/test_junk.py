@@ -15,6 +15,7 @@ JUNK = {
     "ragged": [[1], [1, 2]],
     "texts": ["x"],
     "nan": [float("nan")],
+    "whole number beyond all doubles": 10**400,
     "function": lambda *given: None,
 }
 PENDULUM = gauss.load("pendulum")
@@ -81,6 +82,8 @@ def test_junk_is_refused(name, kind):
     """No TypeError of what is called within, and no answer."""
     if name in ("cycle", "reduced_inertia") and kind == "nan":
         pytest.skip("no angle: no pose there closes, and says so")
+    if name == "excitation: seed" and kind.startswith("whole"):
+        pytest.skip("a seed like any other")
     with pytest.raises(GaussError):
         CALLS[name](JUNK[kind])
 

@@ -15,7 +15,7 @@ from gauss.analysis.loop_closure import closed, with_rates
 from gauss.analysis.tangents import Tangents
 from gauss.analysis.target_problem import positive_values
 from gauss.analysis.time_scaling import REST, along_lines, extremes, through_points
-from gauss.arguments import named_arguments
+from gauss.arguments import LARGEST_DOUBLE, named_arguments
 from gauss.codegen import Expression
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble_motion
@@ -353,5 +353,5 @@ def _refuse_beyond(system: System, names: Sequence[str], law: PPoly):
 
 def _refuse_begin(begin):
     """Raise an ArgumentError if the begin of a motion is no finite time."""
-    if isinstance(begin, bool) or not isinstance(begin, float | int) or not np.isfinite(begin):
+    if isinstance(begin, bool) or not isinstance(begin, float | int) or not abs(begin) <= LARGEST_DOUBLE:
         raise ArgumentError(f"plan_motion: begin: expected a finite time [s], got {begin!r:.80}.")

@@ -264,7 +264,12 @@ def as_doubles(given) -> np.ndarray | None:
     try:
         array = np.asarray(_as_array(given))
         return array.astype(float, copy=False) if array.dtype.kind in CONVERTIBLE_KINDS else None
-    except (TypeError, ValueError, RuntimeError):  # the last of torch: part of a graph of gradients, or a negative view
+    except (
+        OverflowError,
+        TypeError,
+        ValueError,
+        RuntimeError,
+    ):  # the last of torch: gradients, a negative view
         return None
 
 
@@ -298,7 +303,7 @@ def _vector(name: str, given, size: int) -> np.ndarray:
 def _number(name: str, given) -> float:
     try:
         return float(given.__float__())
-    except (AttributeError, TypeError, ValueError):
+    except (AttributeError, OverflowError, TypeError, ValueError):
         raise StateError(f"{name}: expected a number, got {described(given)}.") from None
 
 

@@ -105,7 +105,7 @@ def _pose(moving: LinkMotion) -> np.ndarray:
 def _numbers(what: str, given) -> np.ndarray:
     try:
         array = np.atleast_1d(np.asarray(given, dtype=float))
-    except (TypeError, ValueError) as error:
+    except (OverflowError, TypeError, ValueError) as error:
         raise LinkageError(f"{what}: expected numbers, got {given!r}.") from error
     if array.ndim != 1 or not array.size or not np.isfinite(array).all():
         raise LinkageError(f"{what}: expected one or more finite numbers in a row, got shape {array.shape}.")

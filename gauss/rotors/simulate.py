@@ -6,7 +6,7 @@ from numbers import Real
 
 import numpy as np
 
-from gauss.arguments import named_arguments
+from gauss.arguments import LARGEST_DOUBLE, named_arguments
 from gauss.codegen import one_tier
 from gauss.errors import SimulationError, SwitchingWarning, did_you_mean, user_level
 from gauss.rotors.contract import reduce
@@ -121,7 +121,7 @@ def _checked(duration: float, times, rtol: float, atol: float | None, method: st
             isinstance(value, bool)
             or not isinstance(value, Real)
             or not value > 0
-            or (name != "max_step" and not np.isfinite(value))
+            or (name != "max_step" and not value <= LARGEST_DOUBLE)
         ):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if method not in CHOICES:

@@ -31,7 +31,10 @@ def number(value, what: str, unit: str, *, positive=False, non_negative=False) -
     sign = "a positive " if positive else "a non-negative " if non_negative else "a "
     if type(value) is not float and (isinstance(value, bool) or not isinstance(value, Real)):
         raise SceneError(f"{what}: expected {sign}number in [{unit}], got {value!r} ({type(value).__name__}).")
-    value = float(value)
+    try:
+        value = float(value)
+    except OverflowError:  # a whole number beyond all doubles
+        value = math.inf
     if not math.isfinite(value) or (positive and value <= 0) or (non_negative and value < 0):
         raise SceneError(f"{what}: expected {sign}finite number in [{unit}], got {value!r}.")
     return value

@@ -6,6 +6,7 @@ from math import isfinite
 
 import numpy as np
 
+from gauss.arguments import LARGEST_DOUBLE
 from gauss.codegen import Scalar
 from gauss.dynamics.inputs import driven_scene
 from gauss.dynamics.scene_compilation import compile_scene
@@ -50,7 +51,7 @@ class HeldInputs:
         self.system, self.names = system, tuple(system.scene.inputs)
         if not self.names:
             raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
-        if not isinstance(rate, int | float) or not np.isfinite(rate) or rate <= 0:
+        if not isinstance(rate, int | float) or not 0.0 < rate <= LARGEST_DOUBLE:
             raise SimulationError(f"rate: expected a positive number of samples in a second [Hz], got {rate!r}.")
         asked = (end - start) * rate
         refuse_beyond_memory(SAMPLE_NUMBERS * asked, f"rate: {rate:.3g} Hz are {asked:.2g} samples that", SHORTER)
@@ -187,5 +188,5 @@ def as_floats(u) -> np.ndarray | None:
         return None
     try:
         return np.asarray(u, dtype=float)
-    except (TypeError, ValueError, RuntimeError):  # the last of torch
+    except (OverflowError, TypeError, ValueError, RuntimeError):  # the last of torch
         return None

@@ -221,6 +221,8 @@ class Simulator:
             If a value is not finite, a prescribed motion jumps, or a step fails; the message says why. After a failed step
             the state is one before it.
         """
+        if type(n) is not int or n < 1:
+            n = checked_count("n", n)
         if u is not None:
             self._set(u)
         self._before = self._point.tobytes()
@@ -265,11 +267,9 @@ class Simulator:
 
     def _plan_steps(self, n: int):
         """Write the ends of steps."""
-        if type(n) is not int or not 0 < n <= len(self._ends.grid):
-            n = checked_count("n", n)
-            if n > len(self._ends.grid):
-                self._ends.make_room(n)
-                self._bind()
+        if n > len(self._ends.grid):
+            self._ends.make_room(n)
+            self._bind()
         self._ends.write(self._begun, self._steps + 1, n)
         self._steps += n
 

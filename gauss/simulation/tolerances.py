@@ -5,6 +5,7 @@ from numbers import Integral
 
 import numpy as np
 
+from gauss.arguments import LARGEST_DOUBLE
 from gauss.errors import ArgumentError, SimulationError, did_you_mean
 from gauss.integrators import Tolerance
 from gauss.system import System, rate_units
@@ -106,7 +107,7 @@ def _pair(value, what: str) -> tuple[float, float]:
 
 def _is_positive(value) -> bool:
     if type(value) in SCALARS:
-        return 0.0 < value < np.inf
+        return 0.0 < value <= LARGEST_DOUBLE
     try:
         given = np.asarray(value)
     except ValueError:  # rows of several lengths

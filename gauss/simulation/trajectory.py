@@ -129,7 +129,7 @@ class Trajectory:
         """
         try:
             times, samples = np.array(t, dtype=float), np.array(q, dtype=float)
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             raise StateError(f"from_coordinates: expected numbers t (k,) and q (k, {system.n_q}), got others.") from None
         if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0).all() or len(samples) != len(times):
             raise StateError(

@@ -205,7 +205,7 @@ class System(NamedPlaces, StateFunctions):
             q[place] /= length
         try:
             time = float(t)  # type: ignore[arg-type]  # a traced time is refused by float()
-        except (TypeError, ValueError) as error:
+        except (OverflowError, TypeError, ValueError) as error:
             raise StateError(f"t: expected a time [s], got {t!r}.") from error
         if not isfinite(time):
             raise StateError(f"t: expected a finite time [s], got {time}.")
@@ -216,7 +216,7 @@ class System(NamedPlaces, StateFunctions):
             return default
         try:
             array = np.array(given, dtype=float)
-        except (TypeError, ValueError) as error:
+        except (OverflowError, TypeError, ValueError) as error:
             raise StateError(f"{name}: expected {default.size} numbers ({what}), got {given!r}.") from error
         if array.shape != default.shape or not np.isfinite(array).all():
             raise StateError(

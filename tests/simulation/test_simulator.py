@@ -148,6 +148,16 @@ def test_steps_are_positive(step, n):
         gauss.Simulator(gauss.load("pendulum"), step).step(n=n)
 
 
+def test_a_refused_number_of_steps_leaves_the_inputs():
+    scene = gauss.load("pendulum")
+    scene.input("push", "A")
+    sim = gauss.Simulator(scene, STEP)
+    before = sim.snapshot()
+    with pytest.raises(SimulationError, match="positive number"):
+        sim.step([1.0], n=0)
+    assert sim.snapshot() == before
+
+
 def test_scenes_without_a_compiled_step_are_refused():
     with pytest.raises(SimulationError, match="does not locate the events"):
         gauss.Simulator(gauss.load("friction_oscillator"), STEP, "rk4")
