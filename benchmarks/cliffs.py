@@ -8,7 +8,8 @@ Each scene is measured alone and with one element more. "state" is one call of `
 of motions with "dop853" (tolerance 1e-9), after a first one, over their number of evaluations; both are CPU times, medians
 of several rounds. The ratio of the motion to that of the same scene without the element is the cliff. "plan" is the driver
 and the dynamics of the motion. Laws that call ``float`` are opaque; the others are traced.
-Opaque laws of time are sampled thousands of times before each motion, which is most of what short ones cost under them.
+Opaque laws of time are sampled thousands of times before a first motion, which is not counted; while they are unchanged,
+they are compared at a few times before later ones.
 
 Writes benchmarks/results/cliffs.csv and .md.
 """

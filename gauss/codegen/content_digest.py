@@ -33,6 +33,11 @@ IMPORTS = {dis.opmap["IMPORT_NAME"]}
 # kinds of Python's own objects, which have no name by which they are found
 PYTHON_KINDS = {FunctionType, MethodType, BuiltinFunctionType, CodeType, ModuleType, NoneType}
 IS_CONTENT = "is_content"  # metadata of a field of a record: False if results do not depend on it
+KILOBYTE = 1024  # bytes
+HEAP_TYPE = 1 << 9  # flag of classes that are written in Python, whose objects hold their attributes alone
+# attributes of a class that calls of its objects do not reach: they make no objects
+UNCALLED = {"__annotations__", "__dict__", "__doc__", "__firstlineno__", "__init__", "__module__", "__qualname__"}
+UNCALLED |= {"__eq__", "__hash__", "__repr__", "__static_attributes__", "__weakref__"}
 CODE_FIELDS: tuple[str, ...] = (
     "co_code",
     "co_names",
@@ -49,9 +54,13 @@ class NoDigestError(TypeError):
     """An object whose content is unknown."""
 
 
-def content_digest(*things) -> bytes | None:
-    """SHA-256 of the content of objects; None if the content of one is unknown."""
-    encoder = _Encoder()
+def content_digest(*things, most: int = sys.maxsize, in_process: bool = False) -> bytes | None:
+    """SHA-256 of the content of objects; None if the content of one is unknown, or has more parts than ``most``.
+
+    A kilobyte of an array is a part. Objects of classes of the user have content within a process only: their attributes,
+    and the functions of their classes.
+    """
+    encoder = _Encoder(most, in_process)
     try:
         encoder.encode(things)
     except (NoDigestError, RecursionError):
@@ -62,7 +71,8 @@ def content_digest(*things) -> bytes | None:
 class _Encoder:
     """Encoding of objects as tagged and delimited parts."""
 
-    def __init__(self):
+    def __init__(self, most: int, in_process: bool):
+        self.most, self.in_process = most, in_process
         self.parts: list[bytes] = []
         self.functions: dict[int, int] = {}  # address of each traced function encoded so far → its number
         self.names: dict[int, bytes] = {}  # address of each named object encoded so far → its name
@@ -81,6 +91,8 @@ class _Encoder:
         present = iter((thing,))
         while True:
             for one in present:
+                if len(self.parts) > self.most:
+                    raise NoDigestError(f"content of more than {self.most} parts")
                 kind = type(one)
                 simple = _SIMPLE.get(kind)
                 if simple is not None:
@@ -130,11 +142,25 @@ def _writer(kind: type) -> Writer:
     for kinds, write, exactly in _WRITERS:
         if issubclass(kind, kinds):
             return write if not exactly or kind in kinds else _refused
-    return _record if is_dataclass(kind) and _has_name(kind) else _refused
+    return _record if is_dataclass(kind) and _has_name(kind) else _object
 
 
 def _refused(_: _Encoder, thing) -> Sequence:
     raise NoDigestError(f"{type(thing).__name__}: unknown content")
+
+
+def _object(encoder: _Encoder, thing) -> Sequence:
+    """Attributes of an object, and what its classes hold: it is told within this process only."""
+    classes = type(thing).__mro__[:-1]
+    if not encoder.in_process or any(not kind.__flags__ & HEAP_TYPE or "__slots__" in vars(kind) for kind in classes):
+        return _refused(encoder, thing)
+    held = [{name: _behind(value) for name, value in vars(kind).items() if name not in UNCALLED} for kind in classes]
+    return encoder.sequence(b"o%d" % id(type(thing)), (vars(thing), *held))
+
+
+def _behind(value):
+    """Function behind a property or a method of a class; any other value itself."""
+    return value.fget if isinstance(value, property) else getattr(value, "__func__", value)
 
 
 def _tuple(encoder: _Encoder, thing) -> Sequence:
@@ -176,7 +202,7 @@ def _field_names(kind: type) -> tuple[str, ...]:
 
 def _array(encoder: _Encoder, array: np.ndarray) -> Sequence:
     kind = f"a{array.dtype.str}{array.shape}:".encode()
-    if array.dtype.fields is not None:
+    if array.dtype.fields is not None or array.nbytes > KILOBYTE * encoder.most:
         _refused(encoder, array)
     if array.dtype.hasobject:
         return encoder.sequence(kind, array.ravel().tolist())
@@ -191,7 +217,7 @@ def _number(encoder: _Encoder, number: np.generic) -> Sequence:
 def _set(encoder: _Encoder, things) -> Sequence:
     found = []
     for thing in things:
-        own = _Encoder()
+        own = _Encoder(encoder.most, encoder.in_process)
         own.encode(thing)
         found.append(b"".join(own.parts))
     return encoder.sequence(b"u", sorted(found))

@@ -105,10 +105,21 @@ def obtain_key(folder: Path) -> bytes | None:
 
 
 def write_temporary(folder: Path, data: bytes) -> str:
-    """Path of a new private file, to be renamed once it is complete."""
+    """Path of a new private file, to be renamed once it is complete.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written, as on a full disk; nothing is left of it.
+    """
     handle, temporary = tempfile.mkstemp(dir=folder, prefix=PARTIAL)
-    with os.fdopen(handle, "wb") as file:
-        file.write(data)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+    except OSError:
+        with suppress(FileNotFoundError):
+            os.unlink(temporary)
+        raise
     return temporary
 
 

@@ -55,7 +55,8 @@ class SystemDynamics(Store):
         """Loads with opaque laws: what a call costs, and why they are opaque."""
         from gauss.dynamics.laws.sampled_laws import SAMPLES
 
-        text = f"about {1e6 * CALL:.0f} µs (estimated), and up to {SAMPLES} times before a motion if it is a law of time"
+        sampled = f"up to {SAMPLES} times before the first motion if it is a law of time"
+        text = f"about {1e6 * CALL:.0f} µs (estimated), and {sampled}"
         return {name: f"{text}; {why}" for name, why in Laws(system).reasons.items()}
 
     def operations(self, system: System, subsystems: tuple[Subsystem, ...]) -> int | None:

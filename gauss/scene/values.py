@@ -18,6 +18,7 @@ from gauss.math import piecewise
 
 UNIT_TOLERANCE = 1e-6  # error of the length of a quaternion, or of an orthonormal matrix, that is typed with 7 digits
 ORTHONORMAL = 1e-15  # error of the same at round-off: nothing to normalise
+FLOATS = float, np.float64  # kinds of numbers that laws return
 
 
 def keep(element, **checked):
@@ -153,7 +154,7 @@ def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
         value = branches(lambda: law(*given)) if isinstance(given[0], Expression) else law(*given)
     except Exception as error:  # a law may fail in any way
         raise SceneError(f"{what}: at {_when(given[0])} its law raised {type(error).__name__}: {error}") from error
-    if type(value) is float and size == 1:  # the usual case, quickly
+    if size == 1 and type(value) in FLOATS:  # the usual case, quickly
         return np.array([value])
     entries = _entries(value)
     if entries.size == size and (entries.dtype == float or all(map(is_scalar, entries))):

@@ -8,7 +8,7 @@ import warnings
 
 import numpy as np
 
-from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError, SwitchingWarning, user_level
 from gauss.scene.stateful_laws import PreservedState
@@ -40,7 +40,7 @@ class History:
         SimulationError
             If a law has other values in a second call with the same state of the mechanism and of its own; with its name.
         """
-        motion = kinematics(system, start) if self.kept else None
+        motion = Kinematics(system, start)
         for name, law, before in self.kept:
             if _is_random(law, motion, before):
                 raise SimulationError(

@@ -14,6 +14,7 @@ import pytest
 import gauss
 from gauss.codegen import Kernel, from_disk, machine, object_cache, trace
 from gauss.codegen import cache_size as size
+from gauss.codegen.file_trust import write_temporary
 from gauss.errors import CacheWarning
 
 disk_cache = import_module("gauss.codegen.disk_cache")
@@ -177,6 +178,19 @@ def test_a_size_that_is_none_is_said(given, monkeypatch):
     monkeypatch.setenv("GAUSS_CACHE_SIZE", given)
     with pytest.warns(CacheWarning, match="GAUSS_CACHE_SIZE"):
         assert size.largest_size() == size.DEFAULT_SIZE * 1e6
+
+
+def test_a_file_that_cannot_be_written_whole_leaves_nothing(tmp_path):
+    """As on a full disk: here, files may have ten bytes."""
+    resource = pytest.importorskip("resource")
+    kept = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10, kept[1]))
+    try:
+        with pytest.raises(OSError):
+            write_temporary(tmp_path, bytes(100))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, kept)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_cache_of_no_size_keeps_nothing_and_compiles(place, monkeypatch):

@@ -6,7 +6,7 @@ A law that does not read the time at a state has one value there at all times.
 from collections.abc import Callable
 from sys import getrefcount
 
-from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.kinematics import FOUND, Kinematics
 from gauss.scene.stateful_laws import preserved
 from gauss.system import State
 
@@ -70,7 +70,7 @@ def reads_time(law: Callable, motion: Kinematics) -> tuple[bool, bool]:
         Kinematics of the state.
     """
     own, of_motion = RecordedTime(motion.state.t), RecordedTime(motion.state.t)
-    given = at_time(motion, of_motion)
+    given = KinematicsAtTime(motion, of_motion)
     of_motion.is_read = False  # a checker of types may have asked for it
     unread = getrefcount(own), getrefcount(of_motion)
     try:
@@ -83,9 +83,21 @@ def reads_time(law: Callable, motion: Kinematics) -> tuple[bool, bool]:
     return own.is_read or kept[0], of_motion.is_read or kept[1]
 
 
-def at_time(motion: Kinematics, t) -> Kinematics:
-    """Kinematics of the same coordinates and rates at another time."""
-    found = Kinematics.__new__(Kinematics)
-    found.__dict__.update(motion.__dict__)
-    found.state = State(t, motion.state.q, motion.state.v)
-    return found
+class KinematicsAtTime(Kinematics):
+    """Kinematics of the same coordinates and rates at another time: poses are those of the other one.
+
+    Parameters
+    ----------
+    motion : Kinematics
+        Kinematics of these coordinates and rates.
+    t : float
+        Time [s].
+    """
+
+    def __init__(self, motion: Kinematics, t):
+        self.system, self.state, self._other = motion.system, State(t, motion.state.q, motion.state.v), motion
+
+    def __getattr__(self, name: str):
+        if name not in FOUND:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return getattr(self._other, name)

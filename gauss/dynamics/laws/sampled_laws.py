@@ -9,7 +9,8 @@ from functools import partial
 
 import numpy as np
 
-from gauss.dynamics.laws.recorded_time import at_time, reads_time
+from gauss.dynamics.laws.known_searches import KnownSearch
+from gauss.dynamics.laws.recorded_time import KinematicsAtTime, reads_time
 from gauss.dynamics.laws.step_sampling import LawOfTime
 from gauss.dynamics.laws.switching_times import CLOSE, NO_TIMES, Timetable
 from gauss.scene.stateful_laws import preserved
@@ -23,7 +24,9 @@ JUMP_RATIO = 8.0  # of a change between two samples to its neighbours, above whi
 PARTS = 8  # cells of an interval in which a law changes, next to intervals in which it is constant
 
 
-def sampled_times(law, motion, begin: float, end: float, what: str = "a law", uses_time: bool = False) -> Timetable:
+def sampled_times(
+    law, motion, begin: float, end: float, what: str = "a law", uses_time: bool = False, known: KnownSearch | None = None
+) -> Timetable:
     """Jumps of one law, and ends of the intervals in which it is constant; with the law itself unless it is constant.
 
     Parameters
@@ -38,13 +41,20 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law", us
         Name of the law in warnings.
     uses_time : bool
         Whether the law is known to use the time: a constant value is then warned of.
+    known : KnownSearch, optional
+        Last search of this law of loads, which is not repeated for the same law.
     """
     own, of_motion = (True, False) if motion is None else reads_time(law, motion)
     values = partial(_values, law, motion, of_motion)
+    count = _count(motion, end - begin) if own or of_motion or uses_time else LEAST_SAMPLES
+    search = partial(_located, values, begin, end, what, count, CONSTANT if uses_time else "")
     try:
         with preserved(law):
-            count = _count(motion, end - begin) if own or of_motion or uses_time else LEAST_SAMPLES
-            found = _located(values, begin, end, what, count, CONSTANT if uses_time else "")
+            if known is None:
+                found = search()
+            else:
+                key = known.key(law, motion.state, begin, end, what, own, of_motion, uses_time)
+                found = known.found(key, values, (begin, end), search)
         return (
             found
             if found.limitations or found is NO_TIMES
@@ -63,7 +73,7 @@ def law_of_time(law, motion) -> LawOfTime | None:
 def _values(law, motion, of_motion: bool, times) -> np.ndarray:
     """Values (k, n) at times (k,)."""
     try:
-        return _rows([law(t, at_time(motion, t) if of_motion else motion) for t in np.asarray(times).tolist()])
+        return _rows([law(t, KinematicsAtTime(motion, t) if of_motion else motion) for t in np.asarray(times).tolist()])
     except Exception as error:  # a law may fail in any way at other times
         raise _NoValueError from error
 

@@ -1,18 +1,21 @@
 """Switching of laws along one motion: switching times, switching functions of the state, jumps of prescribed velocities."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.codegen import Expression
-from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.laws.known_searches import KnownSearch
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
 from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.laws.sampled_laws import law_of_time, sampled_times
 from gauss.dynamics.laws.switching_functions import functions_of
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable, timetable
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_law
+from gauss.dynamics.store import cached
 from gauss.integrators import Point
 from gauss.scene.values import ConstantLaw, as_function
 from gauss.system import BoundLoad, Relations, State, System
@@ -82,7 +85,7 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     times, jumps = timed_switching(system, laws, start, end, breaks, monotone)
     timed = (system.contacts, system.set_valued) if has_own_gaps(system.scene) else (system.set_valued,)
     times = times.join(*(prescribed_times(found, begin, end, monotone) for found in timed))
-    motion = kinematics(system, start) if laws.called else None
+    motion = Kinematics(system, start)  # its poses are computed on first access: many laws need none
     times = times.join(*(_sampled(bound, laws, motion, begin, end) for bound in laws.called))
     times = times.join(*_limits(system, start, end))
     watch, called = functions_of(system, laws), tuple(bound.load.name for bound in laws.called if needs_poses(bound.load))
@@ -109,17 +112,22 @@ def timed_switching(
     return times, prescribed_jumps(system, start, end, [*prescribed.stops(begin, end), (last, end)])
 
 
-def _sampled(bound: BoundLoad, laws: Laws, motion, begin: float, end: float) -> Timetable:
+def _sampled(bound: BoundLoad, laws: Laws, motion: Kinematics, begin: float, end: float) -> Timetable:
     """Jumps of the opaque laws of a load."""
     what, given = f"the law of {bound.load.name!r}", getattr(bound.load, "breaks", ())
-    uses_time = laws.fails(bound.load.name) and not needs_poses(bound.load) and not given
-    varying = [law for law in bound.laws if not isinstance(law, ConstantLaw)]
-    return NO_TIMES.join(*(sampled_times(law, motion, begin, end, what, uses_time) for law in varying))
+    takes_motion = needs_poses(bound.load)
+    uses_time = laws.fails(bound.load.name) and not takes_motion and not given
+    found = []
+    for k, law in enumerate(bound.laws):
+        if not isinstance(law, ConstantLaw):
+            known = cached(motion.system, (KnownSearch, bound.load.name, k), partial(KnownSearch, takes_motion))
+            found.append(sampled_times(law, motion, begin, end, what, uses_time, known))
+    return NO_TIMES.join(*found)
 
 
 def called_laws(system: System, laws: Laws, start: State) -> Timetable:
     """Opaque laws of time, of which fixed steps may be too long; no switching time is looked for."""
-    motion = kinematics(system, start) if laws.called else None
+    motion = Kinematics(system, start)
     bound = [law for one in laws.called for law in one.laws if not isinstance(law, ConstantLaw)]
     found = (law_of_time(law, motion) for law in bound)
     return Timetable(NO_TIMES.switches, NO_TIMES.mesh, laws=tuple(law for law in found if law is not None))
