@@ -6,6 +6,7 @@ from math import isfinite
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.codegen import Scalar
 from gauss.dynamics.inputs import driven_scene
 from gauss.dynamics.scene_compilation import compile_scene
@@ -143,17 +144,6 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
         k = int(np.flatnonzero(~np.isfinite(found))[0])
         raise SimulationError(f"t = {t:.6g} s: input {names[k]!r} is {found[k]}; expected a finite number.")
     return found
-
-
-def real_numbers(value) -> np.ndarray | None:
-    """Array of numbers; None of anything else."""
-    if np.ma.is_masked(value):
-        return None
-    try:
-        found = np.asarray(value)
-    except (ValueError, RuntimeError):  # ragged; a tensor of torch in a graph of gradients
-        return None
-    return found.astype(float) if found.dtype.kind in "biuf" else None
 
 
 def numbers_in_words(numbers: np.ndarray | None) -> str:
