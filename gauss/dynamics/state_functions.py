@@ -208,7 +208,7 @@ def _function(system: System, requests, columns) -> TracedFunction:
         parts = [result if isinstance(result, tuple) else (result,) for result in found]
         of_loops = columns is not None or any(TERMS[one.name].of_loops for one in requests)
         residual, total, *others = error_measures(terms, given, of_loops)
-        overflow = sum(_overflow(one.name, own, v) for one, own in zip(requests, parts, strict=True))
+        overflow = np.abs(sum(_overflow(one.name, own, v) for one, own in zip(requests, parts, strict=True)))  # −∞, too
         return *(part for own in parts for part in own), [residual, total + overflow, *others]
 
     name = ", ".join(":".join(filter(None, one[:2])) for one in requests)

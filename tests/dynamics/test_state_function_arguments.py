@@ -1,6 +1,7 @@
 """Arguments of functions of a state: batches of states, arrays of other libraries, quaternions, mistakes."""
 
 import copy
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -182,6 +183,16 @@ def test_results_that_overflow_are_refused(arm, name):
             function(
                 np.broadcast_to(q, rates.shape[:-1] + q.shape), rates, *(np.broadcast_to(u, rates.shape) for u in given)
             )
+
+
+@pytest.mark.parametrize("power", np.arange(153.0, 156.0, 0.25))
+@pytest.mark.parametrize("name", ["bias_forces", "kinetic_energy", "inverse_dynamics"])
+def test_no_result_is_infinite(arm, name, power):
+    """Of either sign, where squares of rates begin to overflow."""
+    (q,), (v,) = states(arm, 1)
+    for rates in (10.0**power * v, -(10.0**power) * v):
+        with suppress(StateError):
+            assert np.isfinite(arm.function(name)(q, rates, *([0.0 * v] if name == "inverse_dynamics" else []))).all()
 
 
 @pytest.mark.parametrize("name", ["coriolis_matrix", "momentum"])
