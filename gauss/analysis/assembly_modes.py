@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from gauss.arguments import generator
-from gauss.backends.recursion import Factor
+from gauss.backends.closure import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.assembly_search import NEWTON_STEPS, RESIDUAL_TOLERANCE
 from gauss.dynamics.kinematics import kinematics
@@ -82,7 +82,7 @@ def _refuse_freedoms(system: System, pose: State, held):
     motion = kinematics(system, pose)
     factor = cast(Factor, held_factor(system, assemble_motion(motion, Applied(motion, ())), held))  # no body is massless
     in_tree = sum(columns.stop - columns.start for columns in factor.tree.columns)
-    remaining = in_tree - (factor.closure.rank if factor.closure.size else 0)
+    remaining = in_tree - (factor.rank if factor.size else 0)
     if remaining:
         raise StateError(
             f"{remaining} freedom{'s remain' if remaining > 1 else ' remains'}, so that there are modes without end; "

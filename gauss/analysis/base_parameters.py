@@ -14,6 +14,7 @@ from textwrap import shorten
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
+from gauss.analysis.loop_closure import POSITION_STEPS
 from gauss.analysis.regressor import RegressorModel
 from gauss.arguments import named_arguments
 from gauss.dynamics.consistent_states import violations
@@ -28,7 +29,6 @@ ROWS_PER_COLUMN = 2  # of random samples, at least
 LEAST_SAMPLES = 30
 ATTEMPTS = 10  # random states for each sample: those that do not assemble are left out
 LONGEST_STEP = 0.5  # of a random walk, in the units of the coordinates
-PROJECTION_STEPS = 30
 SHOWN_DIGITS, SHOWN_LENGTH = 4, 110
 
 
@@ -211,5 +211,5 @@ def _walked(system: System, state: State, rng: np.random.Generator) -> State:
     """State a random step away."""
     step = LONGEST_STEP * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
     guess = State(state.t, retract(system, state.q, step), np.zeros(system.n_v))
-    found = project_positions(system, guess, PROJECTION_STEPS)
+    found = project_positions(system, guess, POSITION_STEPS)
     return state if violations(system, found) else found

@@ -9,7 +9,7 @@ from gauss.analysis.sample_forces import kept_with
 from gauss.analysis.sample_solution import refuse_doubtful
 from gauss.backends import Backend, solve
 from gauss.backends.certificate import UNDETERMINED_SHARE
-from gauss.backends.recursion import Factor
+from gauss.backends.closure import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.contact_stepper import contact_stepper
@@ -106,7 +106,7 @@ def _of_all(trajectory: Trajectory, backend) -> GapForces:
         solution = solve(compulsion, backend)
         found.solutions[k] = solution, which
         if solution.status.certified:
-            free = Factor(compulsion, np.arange(which.size)).closure.free_active()
+            free = Factor(compulsion, np.arange(which.size)).free_active()
             sizes = np.linalg.norm(free, axis=1)
             found.values[k, which] = _least(solution.inequality_multipliers, free)
             found.ambiguous[k, which] = sizes > UNDETERMINED_SHARE * sizes.max(initial=0.0)

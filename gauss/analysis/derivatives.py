@@ -11,9 +11,11 @@ import numpy as np
 from gauss.codegen import Kernel, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.assemble import checked_load
+from gauss.dynamics.constraint_leak import LARGEST_LEAK, constraint_leak
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, on_boundary
 from gauss.dynamics.laws.law_kinks import kinked_laws
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.null_space_dynamics import NullSpaceDynamics
 from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.dynamics.rules import Question
@@ -131,14 +133,27 @@ class AccelerationChanges:
         load = np.zeros(system.n_v) if self.load is None else self.load
         given = np.concatenate([[state.t], state.q, state.v, load])
         with judged_later():
-            fixed = np.tile(np.concatenate([given, solve(given)])[:, None], directions.shape[1])
+            leak, *solution = solve(given)
+            if not leak <= LARGEST_LEAK:
+                return self._by_null_space(load, directions)
+            fixed = np.tile(np.concatenate([given, solution])[:, None], directions.shape[1])
             found = slope(np.concatenate([fixed, directions]))
         if not np.isfinite(found).all():
-            system.accelerations(state, self.load)  # raises where accelerations are not determined
-            raise SimulationError(
-                f"scene {system.scene.name!r}: the accelerations have no finite derivatives in this state."
-            )
+            raise self._undetermined()
         return found
+
+    def _by_null_space(self, load: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """The same where elimination leaves few digits."""
+        found = NullSpaceDynamics(self.system, self.laws, self.state, load).changes(directions)
+        if not np.isfinite(found).all():
+            raise self._undetermined()
+        return found
+
+    def _undetermined(self) -> SimulationError:
+        self.system.accelerations(self.state, self.load)  # raises where accelerations are not determined
+        return SimulationError(
+            f"scene {self.system.scene.name!r}: the accelerations have no finite derivatives in this state."
+        )
 
 
 def _of_mode(system: System, state: State, load) -> System:
@@ -154,11 +169,12 @@ def _of_mode(system: System, state: State, load) -> System:
 
 
 def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
-    """(t, q, v, load) → (q̈, λ), and (t, q, v, load, q̈, λ, changes of q, v and load) → change of q̈."""
+    """(t, q, v, load) → (constraint leak, q̈, λ), and (t, q, v, load, q̈, λ, changes of q, v and load) → change of q̈."""
     sizes = 1, system.n_q, system.n_v, system.n_v
 
     def solved(t, q, v, load):
-        return LoadedMechanism(system, loads, t[0], q, v, load).motion()
+        loaded = LoadedMechanism(system, loads, t[0], q, v, load)
+        return [constraint_leak(system, loaded.mechanism)], *loaded.motion()
 
     def change(t, q, v, load, rates, multipliers, along_q, along_v, along_load):
         loaded = LoadedMechanism(system, loads, t[0], q, v, load)
@@ -166,6 +182,6 @@ def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
         return loaded.mechanism.response(force + along_load, constraint)[0] + following
 
     solve = write(solved, *sizes, name="solve")
-    count = len(solve.outputs) - system.n_v
+    count = len(solve.outputs) - 1 - system.n_v
     directions = [system.n_v] * 3
     return Kernel(solve, batch=False), Kernel(write(change, *sizes, system.n_v, count, *directions, name="change"))

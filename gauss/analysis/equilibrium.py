@@ -14,6 +14,7 @@ import numpy as np
 from gauss.analysis.derivatives import derivatives
 from gauss.analysis.frozen_time import own_states, resting, state_at
 from gauss.analysis.linear_model import LinearModel, linearise
+from gauss.analysis.loop_closure import POSITION_STEPS
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import generator, named_arguments
 from gauss.dynamics import compile_scene
@@ -29,7 +30,6 @@ from gauss.system import State, System, retract
 AT_REST = 1e-9  # largest acceleration of an equilibrium, in the units of the scene
 STEPS, LEAST_SHARE, LONGEST = 60, 2.0**-12, 0.5  # of Newton's method; share of a step that is tried last; step in units
 KICKS = 5  # steps along the accelerations, where Newton's method stalls
-POSITION_STEPS = 30  # Gauss–Newton steps onto the constraints after a step
 SAME = 1e-6  # distance of two equilibria in units, below which they are one
 
 

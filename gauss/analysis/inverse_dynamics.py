@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.arguments import real_array
+from gauss.backends.closure import Factor
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor, TreeFactor
+from gauss.backends.tree_factor import TreeFactor
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.projection import fixed_columns
 from gauss.errors import StateError

@@ -25,8 +25,9 @@ from gauss.dynamics import compile_scene
 from gauss.dynamics.consistent_states import refuse_off_constraints
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.outputs import FORCES, measured
+from gauss.dynamics.outputs import FORCES
 from gauss.dynamics.projection import fixed_columns
+from gauss.dynamics.sensor_values import measured
 from gauss.errors import ArgumentError, MissingPackageError, SimulationError, StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.system import State, System, coordinate_rates

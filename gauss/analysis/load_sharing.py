@@ -6,8 +6,8 @@ L is a basis of the null space of Kᵀ (redundancies), c are the compliances of 
 import numpy as np
 
 from gauss.arguments import real_numbers
+from gauss.backends.closure import Factor
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import SceneError, did_you_mean

@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.analysis.tangents import RANK_TOLERANCE, Tangents, row_lengths
+from gauss.analysis.tangents import Tangents
 from gauss.codegen import Kernel, write
 from gauss.dynamics.assembly_search import RESIDUAL_TOLERANCE
 from gauss.dynamics.mechanism import loop_residual
+from gauss.dynamics.null_space import RANK_TOLERANCE, row_lengths
 from gauss.dynamics.projection import position_residual_of, project_positions, project_rates, relative
 from gauss.dynamics.store import cached
 from gauss.system import State, System, retract, whole
@@ -26,7 +27,7 @@ def closed(system: System, state: State, held=()) -> tuple[State, bool]:
     """State near another one that meets the position constraints, and whether it does; entries ``held`` of v are fixed."""
     if not system.has_closures:
         return state, True
-    kernel = cached(system, (closed,), lambda: _kernel(system))
+    kernel = position_residuals(system)
     free = np.setdiff1d(np.arange(system.n_v), list(held))
     units, found = system.scale.coordinates[free], state
     for _ in range(NEWTON_STEPS):
@@ -58,8 +59,12 @@ def with_rates(system: System, state: State, held=()) -> State:
     return replace(state, v=N @ np.linalg.lstsq(N[places], state.v[places], rcond=RANK_TOLERANCE)[0])
 
 
-def _kernel(system: System) -> Kernel:
-    """(t, q) → position residuals, those of the coordinates of loop joints included."""
+def position_residuals(system: System) -> Kernel:
+    """(t, q) → position residuals, those of the coordinates of loop joints included; made once for a system."""
+    return cached(system, (position_residuals,), lambda: _residuals(system))
+
+
+def _residuals(system: System) -> Kernel:
     unreduced = (whole(system),)
 
     def residual(t, q):

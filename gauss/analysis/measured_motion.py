@@ -8,19 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.analysis.loop_closure import POSITION_STEPS, position_residuals
 from gauss.analysis.regressor import RegressorModel
 from gauss.arguments import real_numbers
-from gauss.codegen import Kernel, write
-from gauss.dynamics.mechanism import loop_residual
 from gauss.dynamics.projection import fixed_columns, project_positions
-from gauss.dynamics.store import cached
 from gauss.errors import StateError, did_you_mean
 from gauss.scene.set_valued import JointFriction
-from gauss.system import State, System, whole
+from gauss.system import State, System
 
 SMALL_RESIDUAL = 1e-10  # of the positions, relative to the scales of the constraints: no projection
 LARGEST_MOVE = 0.1  # of a projected sample, in the units of the coordinates
-PROJECTION_STEPS = 30
 
 
 class MeasuredMotion(NamedTuple):
@@ -89,25 +86,14 @@ def _efforts(system: System, forces, count: int):
 
 def _projected(system: System, q: np.ndarray) -> np.ndarray:
     """Coordinates (n, n_q) that meet the constraints."""
-    kernel = cached(system, (_projected,), lambda: _residuals(system))
-    residual = kernel(np.concatenate([np.zeros((1, len(q))), q.T]))
+    residual = position_residuals(system)(np.concatenate([np.zeros((1, len(q))), q.T]))
     found, units = q.copy(), np.append(system.scale.coordinates, system.scale.length)
     for k in np.flatnonzero(np.abs(residual).max(axis=0) > SMALL_RESIDUAL * units.min()):
-        found[k] = project_positions(system, State(0.0, q[k], np.zeros(system.n_v)), PROJECTION_STEPS).q
+        found[k] = project_positions(system, State(0.0, q[k], np.zeros(system.n_v)), POSITION_STEPS).q
         moved = np.abs(found[k] - q[k]).max() / system.scale.coordinates.max()
         if not moved <= LARGEST_MOVE:
             raise StateError(f"identify: sample {k} is off the constraints: they move its coordinates by {moved:.3g}.")
     return found
-
-
-def _residuals(system: System) -> Kernel:
-    """(t, q) → position residuals of all constraints, a column for each sample."""
-
-    def residuals(t, q):
-        held, slack = loop_residual(system, q, t[0], (whole(system),))
-        return np.concatenate([held, *(part for parts in slack for part in parts)])
-
-    return Kernel(write(residuals, 1, system.n_q, name="residuals"), batch=False)
 
 
 def _load_forces(system: System, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -119,13 +119,7 @@ def plan_path(
 
 
 class _Line:
-    """Straight line from one target to another of its kind.
-
-    Parameters
-    ----------
-    one, other : PoseTarget or PointTarget
-        Its ends.
-    """
+    """Straight line from one target to another of its kind."""
 
     def __init__(self, one: PoseTarget | PointTarget, other: PoseTarget | PointTarget):
         self.one, self.way, self.turn = one, np.zeros(3), np.zeros(3)

@@ -18,9 +18,9 @@ from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.linear_terms import LinearTerms
-from gauss.dynamics.outputs import measured
 from gauss.dynamics.plan import LINEAR_MODELS
 from gauss.dynamics.rules import Plan, Question
+from gauss.dynamics.sensor_values import measured
 from gauss.dynamics.state_functions import TracedFunction, compiled, error_limits, error_measures
 from gauss.dynamics.store import cached
 from gauss.dynamics.term_table import traced_loads

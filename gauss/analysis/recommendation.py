@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.backends.closure import Factor
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.conditions import located_contacts, refuse_motionless
 from gauss.dynamics.kinematics import kinematics
@@ -129,14 +129,13 @@ def advise(system: System, state: State | None = None) -> Recommendation:
 
 def _separation(system: System, state: State, factor: Factor) -> float | None:
     """σ_min/σ_max of the independent loop constraints, relative to their sizes on free bodies."""
-    closure = factor.closure
-    if not closure.size or not closure.rank:
+    if not factor.size or not factor.rank:
         return None
     if not (system.slips.placed or system.set_valued.placed or system.losses) and mobility(system, state).is_singular:
         return 0.0
-    unbound = closure.unbound(factor.compulsion)
-    sigma = np.linalg.svd(closure.W @ closure.rest / np.where(unbound > 0, unbound, 1.0), compute_uv=False)
-    return float(sigma[closure.rank - 1] / sigma[0])
+    unbound = factor.unbound(factor.compulsion)
+    sigma = np.linalg.svd(factor.W @ factor.rest / np.where(unbound > 0, unbound, 1.0), compute_uv=False)
+    return float(sigma[factor.rank - 1] / sigma[0])
 
 
 def _spread(values: np.ndarray) -> float:

@@ -31,11 +31,6 @@ def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figu
     figures : sequence of (str, Figure)
         Figures with what they show.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     ArgumentError

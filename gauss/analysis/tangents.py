@@ -15,19 +15,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import qr
 
-from gauss.backends.rank import COARSEST_LOOP_RANK, numerical_rank
 from gauss.codegen import Kernel, forward, write
 from gauss.dynamics.conditions import refuse_motionless
 from gauss.dynamics.mechanism import Mechanism, loop_residual
+from gauss.dynamics.null_space import RowSpace
 from gauss.dynamics.projection import position_residual_of, relative
 from gauss.dynamics.store import cached
 from gauss.system import State, System, coordinate_rates, whole
-
-RANK_TOLERANCE = 1e-9  # singular values below this share of the largest are zero
-ROUND_OFF = 1e-13  # rows below this share of the longest bind nothing
-TIES = 1e-6  # share by which one of equally good coordinates is preferred to the next one
 
 
 @dataclass(frozen=True)
@@ -60,7 +55,7 @@ class Tangents:
     @cached_property
     def position(self) -> np.ndarray:
         """N_q (n_v, k)."""
-        return _basis(self.position_rows, self.held, self._units, self._residual)
+        return RowSpace(self.position_rows, self._units, self._residual, self.held).null_space
 
     @cached_property
     def position_rows(self) -> np.ndarray:
@@ -70,7 +65,7 @@ class Tangents:
     @cached_property
     def rate(self) -> np.ndarray:
         """N_v (n_v, l)."""
-        return _basis(self._rate_rows, self.held, self._units, self._residual)
+        return RowSpace(self._rate_rows, self._units, self._residual, self.held).null_space
 
     @cached_property
     def change(self) -> np.ndarray:
@@ -155,33 +150,6 @@ def _kernel(system: System) -> tuple[Kernel, np.ndarray]:
 
     function = write(slopes, 1, system.n_q, system.n_v, system.n_v, system.n_v, name="tangents")
     return Kernel(function, batch=False), np.cumsum(sizes[:-1])
-
-
-def row_lengths(rows: np.ndarray, residual: float = 0.0) -> np.ndarray:
-    """Lengths (m,) by which rows (m, n) are divided, so that units do not decide on the rank; 1 for rows of round-off."""
-    lengths = np.linalg.norm(rows, axis=1)
-    return np.where(lengths > max(ROUND_OFF, residual) * lengths.max(initial=0.0), lengths, 1.0)
-
-
-def _basis(rows: np.ndarray, held, units: np.ndarray, residual: float) -> np.ndarray:
-    """Null space (n, k) of rows, unit rows at the places that pivoting in the units chooses as independent.
-
-    A residual η of the state makes redundant rows look independent by η, and the answer wrong by η/σ for the least singular
-    value σ: a rank tolerance of √η balances the two.
-    """
-    n = units.size
-    bound = np.concatenate([rows * units, np.eye(n)[list(held)]])
-    _, sizes, Vt = np.linalg.svd(bound / row_lengths(bound, residual)[:, None], full_matrices=True)
-    rank = numerical_rank(sizes, float(np.clip(np.sqrt(residual), RANK_TOLERANCE, COARSEST_LOOP_RANK)))
-    N = Vt[rank:].T
-    if not N.shape[1]:
-        return N
-    _, _, order = qr(N.T * (1.0 - TIES * np.arange(n)), pivoting=True)
-    chosen = np.sort(order[: N.shape[1]])
-    N = np.linalg.solve(N[chosen].T, N.T).T
-    N = units[:, None] * N / units[chosen]
-    N[chosen] = np.eye(len(chosen))
-    return N
 
 
 def _units_of(N: np.ndarray) -> list[int]:

@@ -14,7 +14,8 @@ import numpy as np
 from scipy import sparse
 
 from gauss.backends import make
-from gauss.backends.programme import Programme, Programmed, attempt
+from gauss.backends.programme import Programme
+from gauss.backends.programmed import Programmed, attempt
 from gauss.errors import BackendError, SimulationError
 
 NEAR_SINGULAR = 1e-8  # singular values of a level relative to its largest, below which it leaves a direction free

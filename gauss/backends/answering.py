@@ -4,10 +4,8 @@ Whatever somebody else's code raises or wrongly returns is the reason of a faile
 Arrays that come back are copied, for they may be a workspace of the backend that its next call overwrites.
 """
 
-import traceback
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -16,13 +14,12 @@ from gauss.backends.backend import BACKENDS, Backend, Factored
 from gauss.backends.certificate import certify, conclude
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.factorisation import factors
+from gauss.backends.foreign import call, kind, real_array, truth, whole_number
 from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.solution import Answer, Solution, failure
 from gauss.errors import BackendError
 
-DOUBLE = np.dtype(float)
 OURS = "gauss."  # modules whose classes write to nothing that they are given
-REAL_KINDS = "fiu"  # kinds of arrays of real numbers; others might be converted, but hardly mean these numbers
 
 
 def certified(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solution:
@@ -74,31 +71,6 @@ def _factored_answer(
     return answer, factor, correction
 
 
-def call(method: Callable, *given):
-    """Result of a foreign method.
-
-    Raises
-    ------
-    BackendError
-        If it raises anything.
-    """
-    try:
-        return method(*given)
-    except (KeyboardInterrupt, SystemExit, BackendError):
-        raise
-    except np.linalg.LinAlgError as error:  # numpy's message names the fault of the matrix
-        raise BackendError(str(error)) from error
-    except BaseException as error:  # panics of Rust code are no Exceptions
-        raise BackendError(f"failed: {raised(error)}") from error
-
-
-def raised(error: BaseException) -> str:
-    """An error in words: its kind, its message, and the line that raised it."""
-    frames = traceback.extract_tb(error.__traceback__)
-    where = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {error}{where}"
-
-
 def checked_answer(compulsion: Compulsion, said) -> Answer:
     """Answer of a backend as arrays of the shapes of the compulsion; multipliers of None are zero.
 
@@ -108,7 +80,7 @@ def checked_answer(compulsion: Compulsion, said) -> Answer:
         If it is no answer, or holds other things than real numbers of these shapes.
     """
     if not isinstance(said, Answer):
-        raise BackendError(f"failed: it returned {_kind(said)}, expected a gauss.backends.Answer.")
+        raise BackendError(f"failed: it returned {kind(said)}, expected a gauss.backends.Answer.")
     sizes = {"a": compulsion.Phi.size, "qdd": compulsion.P.size}
     duals = {"multipliers": compulsion.D.size, "inequality_multipliers": compulsion.h.size}
     arrays = {name: real_array(name, getattr(said, name), size) for name, size in sizes.items()}
@@ -129,58 +101,8 @@ def checked_refinement(factor: KKTFactor, said) -> tuple[Answer, Correction]:
         If it returns something else.
     """
     if not (isinstance(said, tuple) and len(said) == 2 and isinstance(said[1], tuple) and len(said[1]) == 4):
-        raise BackendError(f"failed: it returned {_kind(said)}, expected an Answer and a correction (a, qdd, λ, μ).")
+        raise BackendError(f"failed: it returned {kind(said)}, expected an Answer and a correction (a, qdd, λ, μ).")
     answer = checked_answer(factor.compulsion, said[0])
     sizes = answer.a.size, answer.qdd.size, answer.multipliers.size, factor.active.size
     a, qdd, multipliers, mu = (real_array("the correction", *given) for given in zip(said[1], sizes, strict=True))
     return answer, (a, qdd, multipliers, mu)
-
-
-def real_array(name: str, given, size: int) -> np.ndarray:
-    """Copy of real numbers, shape (size,).
-
-    Raises
-    ------
-    BackendError
-        If they are not real numbers of this shape.
-    """
-    if type(given) is np.ndarray and given.dtype is DOUBLE and given.shape == (size,):
-        return given.copy()
-    try:
-        found = np.asarray(given)
-    except Exception as error:  # of an object that a backend returns, whatever it is
-        raise BackendError(f"failed: {name} is no array: {raised(error)}.") from error
-    if found.dtype.kind not in REAL_KINDS or found.shape != (size,):
-        what = f"{found.dtype} of shape {found.shape}" if found.ndim else _kind(given)
-        raise BackendError(f"failed: {name} is {what}, expected {size} real numbers, shape ({size},).")
-    return found.astype(float)
-
-
-def truth(found) -> bool:
-    """Whether a backend claims success, as a bool.
-
-    Raises
-    ------
-    BackendError
-        If it is neither True nor False.
-    """
-    if not isinstance(found, bool | np.bool_):
-        raise BackendError(f"failed: found is {_kind(found)}, expected True or False.")
-    return bool(found)
-
-
-def whole_number(iterations) -> int:
-    """Number of iterations of a backend.
-
-    Raises
-    ------
-    BackendError
-        If it is no whole number.
-    """
-    if not isinstance(iterations, int | np.integer):
-        raise BackendError(f"failed: iterations is {_kind(iterations)}, expected a whole number.")
-    return int(iterations)
-
-
-def _kind(given) -> str:
-    return "None" if given is None else f"a {type(given).__name__}"

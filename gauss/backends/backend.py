@@ -27,7 +27,7 @@ class Backend(Protocol):
 
     Any object of this form can be given wherever a backend is named, also a class that makes one without arguments.
     Exceptions that it raises, and arrays of other shapes, become the reason of a status; accelerations and multipliers are
-    certified. A QP solver is wrapped by :class:`gauss.backends.programme.Programmed`, and then gets matrices.
+    certified. A QP solver is wrapped by :class:`gauss.backends.programmed.Programmed`, and then gets matrices.
 
     Attributes
     ----------

@@ -13,28 +13,29 @@ values: W = U σ Zᵀ, (WᵀW)⁺ = Z σ⁻² Zᵀ.
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK, numerical_rank
 from gauss.backends.structure import Structure
+from gauss.backends.tree_factor import TreeFactor
 
 MET_BY_TREE = 1e-8  # √round-off, of the length of a row if its bodies were free: below it the tree alone meets the row
 
 
-class Closure:
-    """Factorisation of the rows outside the tree.
+class Factor(KKTFactor):
+    """Factorisation of the whole KKT system: the tree, then the rows outside it.
 
     Parameters
     ----------
     compulsion : Compulsion
         Source of all matrices.
-    tree : TreeFactor
-        Factorisation of the tree.
-    active : ndarray of int
-        Inequality rows held as equalities.
+    active : ndarray of int, optional
+        Inequality rows that are held as equalities.
     """
 
-    def __init__(self, compulsion: Compulsion, tree, active: np.ndarray):
-        self.tree, self.active = tree, active
-        structure = compulsion.structure
+    def __init__(self, compulsion: Compulsion, active=()):
+        self.compulsion, self.active = compulsion, np.asarray(active, dtype=int)
+        self.tree = tree = TreeFactor(compulsion)
+        active, structure = self.active, compulsion.structure
         self.rows, self.loop_columns, self.K_a, self.K_q = outside_rows(compulsion, active)
         self.size = self.rows.size + active.size
         if not self.size:
@@ -72,8 +73,8 @@ class Closure:
         # multipliers in the range of Z are those of least norm
         self.sigma, self.Z = sigma[: self.rank], Z_transposed[: self.rank].T
 
-    def solve(self, r1, r2, r3, r4):
-        """Solve for (a, q̈, λ, μ) with the given right-hand sides, one each column."""
+    def solve_columns(self, r1, r2, r3, r4) -> Correction:
+        """Solve for (a, q̈, λ, μ) with the given right-hand sides; see :class:`KKTFactor`."""
         if not self.size:
             return *self.tree.solve(r1, r2, r3)[:3], r4
         tree_r2, tree_r3 = r2.copy(), r3.copy()
@@ -108,8 +109,8 @@ class Closure:
         """Entries (s, k) of this basis for the active inequality rows."""
         return self._free()[self.size - self.active.size :]
 
-    def free_part(self, multipliers, mu):
-        """Projection of multipliers (r,), (s,) on this null space."""
+    def free_part(self, multipliers, mu) -> tuple[np.ndarray, np.ndarray]:
+        """Projection of λ, and of the μ of active rows, on this null space."""
         if not self.size or self.rank == self.rest.shape[1]:
             return np.zeros_like(multipliers), np.zeros_like(mu)
         z = (self.rest.T @ np.concatenate([multipliers[self.rows], mu])) / self.scale

@@ -11,17 +11,12 @@ import numpy as np
 
 from gauss.backends.closure import outside_rows
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.recursion import TreeFactor
 from gauss.backends.solution import Answer
+from gauss.backends.tree_factor import TreeFactor
 
 
 class Coordinates:
     """The form F3 of a compulsion.
-
-    Parameters
-    ----------
-    compulsion : Compulsion
-        The full form.
 
     Attributes
     ----------

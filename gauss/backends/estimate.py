@@ -17,15 +17,7 @@ SHARE_AT_REST = 1e-6  # of the acceleration by one reaction alone: its errors at
 
 
 class AccelerationScale:
-    """Sizes that errors of the accelerations of one answer are relative to; what takes long is found when first needed.
-
-    Parameters
-    ----------
-    compulsion : Compulsion
-        The problem.
-    answer : Answer
-        The answer.
-    """
+    """Sizes that errors of the accelerations of one answer are relative to; what takes long is found when first needed."""
 
     def __init__(self, compulsion: Compulsion, answer: Answer):
         self.compulsion, self.answer, self.lengths = compulsion, answer, compulsion.gyrations

@@ -5,12 +5,11 @@ from contextlib import suppress
 
 import numpy as np
 
-from gauss.backends.closure import outside
+from gauss.backends.closure import Factor, outside
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.full_factor import FullFactor
 from gauss.backends.kkt_factor import KKTFactor
-from gauss.backends.recursion import Factor
 from gauss.backends.sparse_factor import SparseFactor
-from gauss.backends.svd import FullFactor
 from gauss.errors import BackendError
 
 SPARSE_FROM_ROWS = 150  # rows outside the tree from which on a sparse factorisation is faster than a dense one of these rows

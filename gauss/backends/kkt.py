@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import LinAlgWarning, lapack, lu_factor, lu_solve
 
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.full_factor import equilibrate
 from gauss.backends.solution import Answer, failure
-from gauss.backends.svd import equilibrate
 
 SINGULAR_CONDITION = (
     1e-14  # reciprocal condition of the equilibrated matrix below which rows are redundant or motion is free

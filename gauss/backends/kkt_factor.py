@@ -14,12 +14,15 @@ from functools import lru_cache
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.estimate import acceleration_errors
 from gauss.backends.solution import Answer
 
 Correction = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # what is subtracted from (a, q̈, λ, μ of active rows)
 EPSILON = float(np.finfo(float).eps)
 RANDOM_ROUNDINGS = 8  # number of random residuals of the size of round-off
 KEPT_SIZES = 32  # sizes of problems whose random roundings are kept
+MOST_REFINEMENTS = 30  # steps
+REFINED_ERROR = 1e-14  # relative error of accelerations at which refinement has reached round-off
 ROUNDING_MARGIN = 4.0  # times the root mean square of their effects: a bound of the effect of one rounding
 
 
@@ -62,6 +65,26 @@ class KKTFactor(ABC):
         r4 = np.zeros(self.active.size) if r4 is None else r4
         a, qdd, multipliers, mu = self.solve_columns(*(r[:, None] for r in (r1, r2, r3, r4)))
         return a[:, 0], qdd[:, 0], multipliers[:, 0], mu[:, 0]
+
+    def refined(self) -> tuple[Answer, Correction]:
+        """Solution of the equality rows, and its last correction.
+
+        Refinement goes on until the correction is at round-off or no longer halves. One step does unless masses differ by
+        nine orders or more: there the factorisation itself has lost digits, and each step brings some of them back.
+        """
+        compulsion = self.compulsion
+        shifted = compulsion.about_free()
+        a, qdd, multipliers, _ = self.solve(shifted.impressed, shifted.D, shifted.P)
+        deviation = Answer(a, qdd, multipliers, np.zeros(0))
+        correction, size = self.correction(shifted, deviation), np.inf
+        for step in range(MOST_REFINEMENTS):
+            deviation = self.less(deviation, correction)
+            correction = self.correction(shifted, deviation)
+            answer = replace(deviation, a=compulsion.a_free + deviation.a, iterations=step + 1)
+            last, size = size, acceleration_errors(compulsion, answer, correction).max()
+            if size <= REFINED_ERROR or size > last / 2:
+                break
+        return answer, correction
 
     def without_free(self, answer: Answer) -> Answer:
         """Answer without the part of its multipliers that redundant rows leave undetermined, which may be of any size.

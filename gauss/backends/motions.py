@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.backends.closure import half_factors
-from gauss.backends.recursion import Factor
+from gauss.backends.closure import Factor, half_factors
 from gauss.shapes import Shaped
 
 
@@ -34,22 +33,19 @@ class Allowed:
 
 def allowed(factor: Factor) -> Allowed:
     """Motions that the rows of a factorised compulsion allow, and multipliers that are redundant."""
-    compulsion, tree, closure = factor.compulsion, factor.tree, factor.closure
-    structure = compulsion.structure
+    tree, structure = factor.tree, factor.compulsion.structure
     columns = [j for places in tree.columns for j in range(places.start, places.stop)]
     drives = np.zeros((structure.n_columns, len(columns)))
     drives[columns, range(len(columns))] = 1.0
     none_a, none_r = np.zeros((6 * structure.n_bodies, len(columns))), np.zeros((structure.n_rows, len(columns)))
     H = half_factors(tree, tree.solve(none_a, none_r, drives)[3], len(columns))
     z = np.eye(H.shape[0])
-    if closure.size and closure.rank:
-        taken = closure.W @ (closure.rest @ (closure.scale[:, None] * closure.Z))
-        z = np.linalg.qr(taken / closure.sigma, mode="complete")[0][:, closure.rank :]
+    if factor.size and factor.rank:
+        taken = factor.W @ (factor.rest @ (factor.scale[:, None] * factor.Z))
+        z = np.linalg.qr(taken / factor.sigma, mode="complete")[0][:, factor.rank :]
     rates = np.zeros((structure.n_columns, z.shape[1]))
     rates[columns] = H.T @ z
     a = tree.carried(rates)
-    if closure.size and closure.R.size:
-        rates[closure.loop_columns] = -np.linalg.solve(
-            closure.R, closure.held.T @ (closure.K_a @ a + closure.K_tree @ rates)
-        )
-    return Allowed(a, rates, closure.free_multipliers())
+    if factor.size and factor.R.size:
+        rates[factor.loop_columns] = -np.linalg.solve(factor.R, factor.held.T @ (factor.K_a @ a + factor.K_tree @ rates))
+    return Allowed(a, rates, factor.free_multipliers())

@@ -4,9 +4,9 @@ from functools import partial
 from importlib import import_module
 
 from gauss.backends.accuracy import KEPT, own_settings
-from gauss.backends.answering import call
 from gauss.backends.backend import BACKENDS, Backend
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.foreign import call
 from gauss.errors import ArgumentError, BackendError, did_you_mean
 
 # QP solvers that are called directly; the others go through qpsolvers, which imports all of them.
@@ -109,7 +109,7 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
             settings = settings or {"form": form}
             raise BackendError(f"backend {backend!r} takes no settings, got {', '.join(settings)}.")
         return getattr(import_module(f"gauss.backends.{backend}"), BACKENDS[backend])()
-    programmed = import_module("gauss.backends.programme").Programmed
+    programmed = import_module("gauss.backends.programmed").Programmed
     solver = backend.removeprefix("qpsolvers:")
     if not (is_installed(solver) if backend in DIRECT else solver in installed_solvers()):
         raise BackendError(

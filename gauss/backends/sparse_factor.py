@@ -5,7 +5,7 @@
 Rows of the tree are independent, so E is zero there. Rows outside it may be redundant: with E > 0 the matrix can be factored
 all the same, and iteration on the residual of the true rows, E = 0, removes the error (the proximal method of multipliers;
 Rockafellar, SIAM Journal on Control and Optimization 14, 1976). For loops that each touch few bodies the
-factor has few entries per body, whereas :class:`gauss.backends.closure.Closure` fills the square of the number of rows.
+factor has few entries per body, whereas :class:`gauss.backends.closure.Factor` fills the square of the number of rows.
 """
 
 from functools import cached_property

@@ -10,7 +10,8 @@ import numpy as np
 import qpsolvers
 
 from gauss.backends import qpsolvers_
-from gauss.backends.programme import Outcome, Programme, Programmed, checked_outcome
+from gauss.backends.programme import Outcome, Programme
+from gauss.backends.programmed import Programmed, checked_outcome
 from gauss.bench import casadi_, clocks, conic, coulomb, jaxopt_, mujoco_
 from gauss.bench.instances import FILE, Instance
 from gauss.bench.levels import settings

@@ -9,7 +9,8 @@ import numpy as np
 from gauss.backends import certify, make, solve
 from gauss.backends.certificate import TOLERANCE, conclude
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.programme import Outcome, Programme, read
+from gauss.backends.programme import Outcome, Programme
+from gauss.backends.programmed import read
 from gauss.backends.solution import Answer
 from gauss.bench.clocks import COMPILING, UNKNOWN, ended, median_times, summary, timed
 from gauss.bench.contestants import ready, refusal, started

@@ -12,9 +12,9 @@ import numpy as np
 
 from gauss.backends import make
 from gauss.backends.active_set import ROUNDED_VIOLATION, active_rows
+from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
-from gauss.backends.recursion import Factor
 from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 

@@ -11,7 +11,7 @@ from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OURS, OWN
 from gauss.bench.markdown import head, in_time, number, share, table
 from gauss.bench.measure import WRONG
 from gauss.bench.problems import INCONSISTENT, SELECTION
-from gauss.bench.reuse_report import reuse_lines
+from gauss.bench.reuse import reuse_lines
 from gauss.bench.settings_report import settings_lines
 from gauss.bench.summary import (
     PENALTIES,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gauss.cli import bench, docs, doctor, export, linkage, rotors, run, scenes, show, sweep
+from gauss.cli import bench, doctor, export, linkage, rotors, run, scenes, show, sweep
 from gauss.cli.common import group
 from gauss.errors import GaussError
 from gauss.versions import VERSION
@@ -29,7 +29,7 @@ for command in (
     scenes.models,
     bench.chart,
     doctor.doctor,
-    docs.docs,
+    doctor.docs,
 ):
     app.command()(command)
 app.add_typer(bench.bench, name="bench")

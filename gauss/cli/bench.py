@@ -35,13 +35,13 @@ def qp(
     ] = None,
     form: Annotated[
         list[str] | None,
-        typer.Option(help="This form, F1, F2, F2s or F3; may be repeated; F2 and F2s if not given, of classes F2s."),
+        typer.Option(help="This form, F1, F2, F2s or F3; may be repeated. If not given, F2 and F2s; for classes, F2s."),
     ] = None,
     level: Annotated[
         list[str] | None,
         typer.Option(
-            help="At low, mid, high or tightest accuracy; may be repeated; all if not given, of classes high and, of eight "
-            "problems, low and mid."
+            help="This accuracy: low, mid, high or tightest; may be repeated. If not given, all; for classes, high, and low "
+            "and mid of eight problems each."
         ),
     ] = None,
     group: Annotated[
@@ -68,7 +68,7 @@ def qp(
         bool,
         typer.Option(
             "--quick",
-            help="Eight problems, or eight of each class, scaled, at one level, none on JAX: two minutes.",
+            help="Eight problems, or eight of each class, in form F2s at one level, without solvers on JAX: two minutes.",
         ),
     ] = False,
     motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
@@ -224,7 +224,7 @@ def chart(
         typer.Option(
             "--time-limit",
             "--patience",
-            help="Settings get finer until a run takes so long [s]; three with each backend at least.",
+            help="Settings get finer until one run takes this long [s]; at least three settings with each backend.",
         ),
     ] = 0.5,
     output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),

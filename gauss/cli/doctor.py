@@ -1,12 +1,15 @@
-"""Command ``gauss doctor``."""
+"""Commands ``gauss doctor`` and ``gauss docs``."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 
 def doctor(
-    cache: Annotated[bool, typer.Option("--cache", help="The cache of machine code alone: folder, numbers, sizes.")] = False,
+    cache: Annotated[
+        bool, typer.Option("--cache", help="Report the cache of machine code only: folder, numbers, sizes.")
+    ] = False,
     empty: Annotated[bool, typer.Option("--empty", help="With --cache: remove its files first.")] = False,
 ):
     """Look at the installation: processor, machine code, its cache, solvers, packages; exit code 1 if gauss cannot run."""
@@ -22,3 +25,15 @@ def doctor(
             typer.echo(f"  {'':13} → {finding.remedy}")
     if not all(finding.works for finding in findings):
         raise typer.Exit(1)
+
+
+def docs(
+    context: typer.Context,
+    output: Annotated[Path, typer.Option(help="Folder for the pages.")] = Path("gauss-docs"),
+    gallery: Annotated[bool, typer.Option(help="Run and draw the examples of the gallery.")] = True,
+    strict: Annotated[bool, typer.Option("--strict", help="Take warnings for errors.")] = False,
+):
+    """Write the documentation as web pages: guides, gallery, reference of all public names, benchmarks."""
+    from gauss.docs.build import build  # imports what no other command needs
+
+    typer.echo(f"documentation written to {build(output, context.find_root().command, gallery, strict)}")

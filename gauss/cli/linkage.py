@@ -45,7 +45,7 @@ def linkage(
         float | None, typer.Option(help="Size the flywheel for this fluctuation of speed, (ω_max − ω_min) / ω.")
     ] = None,
     run: Annotated[
-        float | None, typer.Option(help="Run the linkage under its own motor from rest, for so long [s].")
+        float | None, typer.Option(help="Run the linkage from rest under its own motor for this time [s].")
     ] = None,
 ):
     """Analyse a planar linkage by its Assur groups: torque, reactions, work, quality of motion."""

@@ -20,14 +20,18 @@ def rotors(
     rtol: Annotated[float, typer.Option(help="Relative local error of angles and speeds.")] = 1e-9,
     atol: Annotated[
         float | None,
-        typer.Option(help="Absolute local error [rad, rad/s]; 1e-9 rad, and so much of slow speeds, if not given."),
+        typer.Option(
+            help="Absolute local error [rad, rad/s]; if not given, 1e-9 rad and 1e-11 of the largest start or no-load speed."
+        ),
     ] = None,
     method: Annotated[str, typer.Option(help="auto, dop853 (explicit) or radau (implicit, for stiff slips).")] = "auto",
     steady: Annotated[bool, typer.Option("--steady", help="Find all steady operating points at the end.")] = False,
     modes: Annotated[
         bool, typer.Option("--modes", help="List torsional eigenfrequencies and modes in the state at the end.")
     ] = False,
-    explain: Annotated[bool, typer.Option("--explain", help="Say what the network is reduced to, in symbols.")] = False,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Print the reduced equations of the network, in symbols.")
+    ] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw speeds, slips, torques and losses to this file.")] = None,
     network: Annotated[Path | None, typer.Option(help="Draw the network to this file (.png, .svg, .pdf).")] = None,
     output: Annotated[

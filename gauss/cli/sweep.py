@@ -27,7 +27,7 @@ def sweep(
     ],
     duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
     together: Annotated[
-        bool, typer.Option("--together", help="Vary all together, not every value with every other.")
+        bool, typer.Option("--together", help="Vary all parameters together, value by value, instead of every combination.")
     ] = False,
     samples: Annotated[int, typer.Option(help="Number of equally spaced samples.", min=2)] = 101,
     integrator: Annotated[str, typer.Option(help=f"One of {', '.join(INTEGRATORS)}.")] = "dop853",

@@ -24,7 +24,7 @@ from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
 from gauss.codegen.schedule import schedule
 from gauss.codegen.staging import entered, staged
-from gauss.codegen.substitute import substitute
+from gauss.codegen.substitute import numbers_of, substitute
 from gauss.codegen.taylor_series import Series
 from gauss.codegen.terminal_line import compile_notice
 
@@ -95,6 +95,7 @@ __all__ = [
     "schedule",
     "staged",
     "straight_line",
+    "numbers_of",
     "substitute",
     "trace",
     "without_series",

@@ -42,13 +42,7 @@ class BatchCode(NamedTuple):
 
 
 class BatchEntry:
-    """Function over rows of arrays.
-
-    Parameters
-    ----------
-    code : MachineCode
-        Its code.
-    """
+    """Function over rows of arrays."""
 
     def __init__(self, code: machine.MachineCode):
         self._run = code.entry("batch", SIGNATURE)

@@ -1,5 +1,8 @@
 """Substitution of values for symbols in expressions; what becomes constant folds."""
 
+from collections.abc import Callable
+from operator import itemgetter
+
 import numpy as np
 
 from gauss.codegen.expression import Expression, reachable
@@ -37,6 +40,41 @@ def substitute(outputs, symbols, values) -> np.ndarray:
     for index, node in np.ndenumerate(outputs):
         result[index] = given[node.index] if isinstance(node, Expression) else node
     return result
+
+
+def numbers_of(outputs, symbols) -> Callable[[list[float]], np.ndarray]:
+    """Function from numbers in place of all symbols to the numbers (m,) that the outputs fold to, without new nodes.
+
+    Raises
+    ------
+    TypeError
+        If an output contains an operation other than arithmetic, such as a call; as :func:`substitute`.
+    """
+    given = [symbol.index for symbol in symbols]
+    fixed, steps = {}, []
+    for node in reachable(outputs):
+        operands = [operand.index for operand in node.operands]
+        if node.op == "constant":
+            fixed[node.index] = node.value
+        elif operands:
+            steps.append((node.index, _function_of(node.op), itemgetter(*operands), len(operands) == 1))
+
+    def numbers(values: list[float]) -> np.ndarray:
+        known = {**fixed, **dict(zip(given, values, strict=True))}
+        for index, function, operands, single in steps:
+            known[index] = function(operands(known)) if single else function(*operands(known))
+        return np.array([known[x.index] if isinstance(x, Expression) else x for x in outputs], dtype=float)
+
+    return numbers
+
+
+def _function_of(op: str) -> Callable[..., float]:
+    """Evaluation of an operation of numbers."""
+    if op == "select":
+        return lambda condition, x, y: x if condition else y
+    if op not in BINARY and op not in UNARY:
+        raise TypeError(f"cannot substitute in a {op!r}.")
+    return BINARY[op] if op in BINARY else UNARY[op]
 
 
 def _rebuilt(node: Expression, operands) -> Expression:

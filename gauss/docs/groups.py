@@ -49,7 +49,7 @@ GROUPS = (
         "Simulate",
         "From one motion to many, from a call to a loop of your own. Which route a motion takes: :doc:`/concepts/plan`.",
         _of("gauss", "simulate Trajectory Simulator SimulatorBatch prepare rollout sweep crossings Plan Baumgarte Taylor")
-        + _of("gauss", "generalised_alpha advise"),
+        + _of("gauss", "Sleeping generalised_alpha advise"),
     ),
     Group(
         "instant",

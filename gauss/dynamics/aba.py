@@ -1,8 +1,8 @@
 """Articulated-body algorithm: Î_i = I_i + Σ_c X_cᵀ (Î_c − U_c D_c⁻¹ U_cᵀ) X_c with U = Î S and D = Sᵀ Î S.
 
-The elimination of ``gauss.backends.recursion`` in the moving axes of each link, over numbers or symbols (Featherstone, Rigid
-Body Dynamics Algorithms, 2008, sec. 7.3). A tree is eliminated once for any number of right-hand sides. Articulated inertias
-are kept as three 3 × 3 blocks [A, B; Bᵀ, C], so that symmetry and zeros are used.
+The elimination of ``gauss.backends.tree_factor`` in the moving axes of each link, over numbers or symbols (Featherstone,
+Rigid Body Dynamics Algorithms, 2008, sec. 7.3). A tree is eliminated once for any number of right-hand sides. Articulated
+inertias are kept as three 3 × 3 blocks [A, B; Bᵀ, C], so that symmetry and zeros are used.
 """
 
 from contextlib import suppress
@@ -91,13 +91,7 @@ class FreeElimination:
 
 
 class ArticulatedBody:
-    """Forward dynamics of an open tree in one state: M q̈ + h = τ.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The tree.
-    """
+    """Forward dynamics of an open tree in one state: M q̈ + h = τ."""
 
     def __init__(self, tree: KinematicTree):
         self.tree = tree

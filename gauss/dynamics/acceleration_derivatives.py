@@ -31,17 +31,24 @@ class LoadedMechanism:
         Time [s].
     q, v, load : ndarray, shape (n_q,), (n_v,), (n_v,)
         Coordinates, rates, generalised forces added to the loads.
+    subsystems : sequence of Subsystem, optional
+        Subsystems of another stage of the reduction; those of the system when not given.
     """
 
-    def __init__(self, system: System, loads, t: Scalar, q, v, load):
+    def __init__(self, system: System, loads, t: Scalar, q, v, load, subsystems=None):
         own, self.forces, _ = applied_loads(system, loads, State(t, q, v))
         self.system, self.q, self.v, self.effort = system, q, v, own + load
-        self.mechanism = Mechanism(system, q, v, t)
+        self.mechanism = Mechanism(system, q, v, t, subsystems)
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """Accelerations (n_v,) and multipliers (m,); not numbers where a loop that cannot move has another pose."""
         rates, multipliers = self.mechanism.motion(self.effort, self.forces)
         return refused_in_other_pose(self.system, self.q, rates), multipliers
+
+    def residual(self, rates, multipliers) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residuals of the equations of motion (n_v,) and of the loop constraints (m,), and all accelerations (n_v,)."""
+        motion, violation = self.mechanism.residual(rates, multipliers, self.effort, self.forces)
+        return motion, violation, self.mechanism.dependent_accelerations(rates)
 
     def changes(self, rates, multipliers, directions) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Changes along directions, at fixed accelerations and multipliers, symbols or numbers.
@@ -59,8 +66,7 @@ class LoadedMechanism:
             For each direction the change of the residual of the equations of motion (n_v,), of the loop constraints (m,),
             and of dependent accelerations (n_v,).
         """
-        motion, violation = self.mechanism.residual(rates, multipliers, self.effort, self.forces)
-        parts = motion, violation, self.mechanism.dependent_accelerations(rates)
+        parts = self.residual(rates, multipliers)
         moving = np.concatenate([self.q, self.v])
         along = [np.concatenate([coordinate_rates(self.system, self.q, dq), dv]) for dq, dv in directions]
         outputs, ends = np.concatenate(parts), np.cumsum([part.size for part in parts])[:-1]

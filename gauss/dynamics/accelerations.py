@@ -68,13 +68,7 @@ BY_KERNELS: dict[str, Callable[[System, Sequence], NativeFunction]] = {  # dynam
 
 
 class Accelerations:
-    """Accelerations of one system; every law is called at every evaluation, because it may change.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    """
+    """Accelerations of one system; every law is called at every evaluation, because it may change."""
 
     def __init__(self, system: System):
         self.system, laws = system, Laws(system, trace=False)

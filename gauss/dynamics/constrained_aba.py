@@ -135,7 +135,11 @@ class ConstrainedArticulatedBody:
 
     def velocity_residual(self) -> np.ndarray:
         """K v − C."""
-        return self._rows(self._by_joint(self.v), self.tree.carried(self.v), still=True) - self.velocity_rhs
+        return self.along_rows(self.v) - self.velocity_rhs
+
+    def along_rows(self, rates) -> np.ndarray:
+        """K x (m,) of rates x (n_v,)."""
+        return self._rows(self._by_joint(rates), self.tree.carried(rates), still=True)
 
     def baumgarte_feedback(self, phi, slack, alpha: float, beta: float) -> BaumgarteFeedback:
         """Accelerations −2α φ̇ − β² φ (Baumgarte 1972) for a position residual, see :meth:`position_correction`."""

@@ -9,13 +9,7 @@ from gauss.system import Subsystem
 
 
 class Couplings:
-    """Rows K q̇ = 0: q̇_driven − ratio · q̇_driver.
-
-    Parameters
-    ----------
-    subsystem : Subsystem
-        Their subsystem.
-    """
+    """Rows K q̇ = 0: q̇_driven − ratio · q̇_driver."""
 
     def __init__(self, subsystem: Subsystem):
         self.K = np.zeros((len(subsystem.couplings), subsystem.n_v))

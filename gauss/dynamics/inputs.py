@@ -24,11 +24,6 @@ def input_loads(system: System) -> tuple[BoundLoad, ...]:
 class InputForces:
     """Inputs of a system as generalised forces, Q = S clip(u) where each acts along one rate.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-
     Attributes
     ----------
     columns : ndarray of int, shape (n_u,)

@@ -13,14 +13,12 @@ from gauss.codegen import Scalar, forward, write
 from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.given_link_frames import GivenLinkFrames, with_moved_joint
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
-from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.kinematics import AXES, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_residual
 from gauss.dynamics.parameters import changed
 from gauss.dynamics.traced_system import applied_loads
 from gauss.system import BoundLoad, State, System, coordinate_rates, whole
-
-AXES = np.eye(3)  # of the frame that a place is given in
 
 
 def inverse_dynamics_by_place(
@@ -55,6 +53,28 @@ def accelerations_by_place(
     own, forces, _ = applied_loads(system, loads, state)
     mechanism = Mechanism(system, q, v, t, (whole(system),))
     rates, multipliers = mechanism.motion(own + load, forces)
+    found = place_changes(system, loads, state, load, parameter, rates, multipliers, following)
+    return np.array([mechanism.response(motion, violation)[0] + after for motion, violation, after in found]).T
+
+
+def place_changes(
+    system: System, loads: Sequence[BoundLoad], state: State, load, parameter: str, rates, multipliers, following=None
+) -> list[list[np.ndarray]]:
+    """Changes by the place of a joint, at fixed accelerations and multipliers of the loops of the whole system.
+
+    Parameters
+    ----------
+    system, loads, state, load, parameter, following
+        As of :func:`accelerations_by_place`.
+    rates, multipliers : ndarray, shape (n_v,), (m,)
+        Accelerations and multipliers.
+
+    Returns
+    -------
+    list of list of ndarray
+        For each axis the change of the residual of the equations of motion (n_v,), of the loop constraints (m,), and of
+        dependent accelerations (n_v,).
+    """
     n, m = system.n_v, multipliers.size
 
     def parts(t: Scalar, q, v, place, load, rates, multipliers):
@@ -64,10 +84,9 @@ def accelerations_by_place(
         motion, violation = moved.residual(rates, multipliers, own + load, forces)
         return np.concatenate([motion, violation, moved.dependent_accelerations(rates)])
 
-    moving = np.zeros((3, q.size + n)) if following is None else following
+    moving = np.zeros((3, state.q.size + n)) if following is None else following
     columns = _along_axes(parts, state, moving, load, rates, multipliers)
-    split = (np.split(column, [n, n + m]) for column in columns)
-    return np.array([mechanism.response(motion, violation)[0] + after for motion, violation, after in split]).T
+    return [np.split(column, [n, n + m]) for column in columns]
 
 
 def following_place(terms: ConstrainedTerms, parameter: str) -> np.ndarray:

@@ -19,13 +19,7 @@ NUMBER = 8  # bytes
 
 
 class LoadReceiver(Receiver):
-    """Loads with opaque laws as machine code calls them: (t, q, v) → (generalised forces (n_v,), power (3,)).
-
-    Parameters
-    ----------
-    forces : LoadForces
-        The loads.
-    """
+    """Loads with opaque laws as machine code calls them: (t, q, v) → (generalised forces (n_v,), power (3,))."""
 
     def __init__(self, forces: LoadForces):
         self.forces, self.n_q, self.n_in, self.size = forces, forces.n_q, forces.n_in, NUMBER * forces.n_in

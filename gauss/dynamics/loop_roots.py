@@ -13,13 +13,7 @@ HUB_CHAINS = 4  # chains that meet at a hub, its own inner joint among them; few
 
 
 class LoopTopology:
-    """Chains of the loops of a tree.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The tree.
-    """
+    """Chains of the loops of a tree."""
 
     def __init__(self, tree: KinematicTree):
         self.tree = tree

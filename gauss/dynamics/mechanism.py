@@ -171,6 +171,10 @@ class Mechanism:
         """Left side K v of the loop constraints."""
         return self.velocity_residual() + self.velocity_rhs
 
+    def along_rows(self, rates) -> np.ndarray:
+        """K x (m,) of rates x (n_v,)."""
+        return _joined([body.along_rows(rates[body.subsystem.v]) for body in self.bodies])
+
     @property
     def scale(self) -> np.ndarray:
         """Factor of each row of K that makes K M⁻¹ Kᵀ of free bodies 1."""

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gauss.backends.closure import Factor
 from gauss.backends.motions import Allowed, allowed
-from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.consistent_states import consistent
 from gauss.dynamics.kinematics import kinematics

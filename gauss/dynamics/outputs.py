@@ -1,22 +1,16 @@
-"""Outputs of a scene in one state: values of its sensors, from the kinematics and the accelerations; numbers or expressions.
-
-A point r from the centre of mass c of a body has the acceleration a = a_c + α × r + ω × (ω × r); an accelerometer measures
-Rᵀ (a − g).
-"""
+"""Outputs of a scene in one state, in machine code: values of sensors, and forces of joints and contacts."""
 
 import numpy as np
 
 from gauss.codegen import Function, write
-from gauss.dynamics.inverse_dynamics_residual import outward_accelerations
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.sample_multipliers import are_unique, multipliers_of, sample_multipliers
+from gauss.dynamics.sensor_values import INERTIAL, measured
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
-from gauss.rotations import cross
 from gauss.scene import Output, Scene
 from gauss.system import System, sides
 
-INERTIAL = ("acceleration", "accelerometer")  # kinds that depend on the accelerations
 OF_JOINTS = {"joint_moment": slice(0, 3), "joint_force": slice(3, 6)}  # rows of a joint, with the forces −λ
 FORCES = (*OF_JOINTS, "contact_force")
 
@@ -104,52 +98,3 @@ def joint_forces(output: Output, system: System, t, q, v) -> np.ndarray:
         raise SimulationError(f"output {output.name!r}: the forces of {output.of!r} are not certain; use gauss.reactions.")
     rows = next(constraint.rows for constraint in system.structure.constraints if constraint.name == output.of)
     return -found[0][:, rows][:, OF_JOINTS[output.kind]]
-
-
-def measured(output: Output, motion: Kinematics, acceleration=None) -> np.ndarray:
-    """Values of an output.
-
-    Parameters
-    ----------
-    output : Output
-        The sensor.
-    motion : Kinematics
-        Poses and velocities.
-    acceleration : ndarray, shape (n_v,), optional
-        Accelerations, for the kinds that depend on them.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Values in one row, a rotation row by row.
-    """
-    state, name = motion.state, output.of
-    match output.kind:
-        case "coordinate":
-            return state.q[motion.system.joint(name).q]
-        case "rate":
-            return state.v[motion.system.joint(name).v]
-        case "position":
-            return motion.position(name, output.at)
-        case "rotation":
-            return np.ravel(motion.rotation(name))
-        case "velocity":
-            return motion.velocity(name, output.at)
-        case "angular_velocity":
-            return motion.angular_velocity(name)
-        case "gyroscope":
-            return motion.rotation(name).T @ motion.angular_velocity(name)
-    found = _acceleration(output, motion, acceleration)
-    if output.kind == "acceleration":
-        return found
-    return motion.rotation(name).T @ (found - np.array(motion.system.scene.gravity))
-
-
-def _acceleration(output: Output, motion: Kinematics, acceleration) -> np.ndarray:
-    """Acceleration (3,) of the point of an output in world axes [m/s²]."""
-    body = motion.system.frame(output.of).body
-    if body < 0:
-        return np.zeros(3)
-    alpha, linear = next(found for edge, *found in outward_accelerations(motion, acceleration) if edge.outer == body)
-    arm, omega = motion.position(output.of, output.at) - motion.x[body], motion.W[body]
-    return linear + cross(alpha, arm) + cross(omega, cross(omega, arm))

@@ -1,9 +1,32 @@
 """Functions of a system for compiled loops, by the dynamics of a :class:`gauss.dynamics.rules.Plan`.
 
-Each is imported where it is asked for: one motion needs one of them.
+Those of other files are imported where they are asked for: one motion needs one of them.
 """
 
+from functools import cached_property
+
+from gauss.dynamics.front_rank import Embedding, embedding_of
 from gauss.dynamics.traced_system import Program
+
+
+class EmbeddedProgram(Program):
+    """Functions of a system with loop constraints of which those that are eliminated are independent.
+
+    Where a front is near singular, accelerations are not finite; the fallback of the plan goes on from the last state
+    before.
+    """
+
+    has_full_rank = True
+
+    @cached_property
+    def elimination(self) -> Embedding:
+        """That whose fronts are regular."""
+        return embedding_of(self.pattern)
+
+    @property
+    def may_lose_rank(self) -> bool:
+        """Whether fronts without hubs tell where the loop constraints lose rank."""
+        return self.projects and self.shared.monitors
 
 
 def program_of(dynamics: str) -> type[Program]:
@@ -22,8 +45,6 @@ def program_of(dynamics: str) -> type[Program]:
 
             return CalledProgram
         case "embedded loops":
-            from gauss.dynamics.embedded_program import EmbeddedProgram
-
             return EmbeddedProgram
         case _:
             return Program

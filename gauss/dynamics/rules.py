@@ -14,8 +14,7 @@ from gauss.dynamics.stabilisation import Drift
 from gauss.errors import SimulationError
 from gauss.integrators import Integrator
 from gauss.system import System
-
-MOST_REASONS = 5  # violated conditions of a rule that are listed
+from gauss.system.explain import MOST_REASONS
 
 
 class Rejected(NamedTuple):

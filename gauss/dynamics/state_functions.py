@@ -5,6 +5,7 @@ Several functions asked for at once are traced in one graph, where equal operati
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,16 +14,18 @@ from gauss import math
 from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
+from gauss.dynamics.constraint_leak import LARGEST_LEAK, constraint_leak
 from gauss.dynamics.inertial_regressor import STANDARD
-from gauss.dynamics.mechanism import loop_constraint_scales, loop_residual
+from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.mobility import mobility
+from gauss.dynamics.null_space_terms import null_space_terms
 from gauss.dynamics.parameter_terms import size_of
 from gauss.dynamics.projection import fixed_columns
 from gauss.dynamics.rigid_loops import is_in_other_pose, refuse_other_pose, rigid_joints
 from gauss.dynamics.state_terms import REFERENCES, StateTerms
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.term_table import TERMS, Term, traced_loads
-from gauss.dynamics.traced_system import FINITE, off_unit
+from gauss.dynamics.traced_system import FINITE, absolute_sum, off_unit
 from gauss.errors import ArgumentError, StateError, did_you_mean
 from gauss.system import State, System, refuse_changed, whole
 
@@ -187,18 +190,24 @@ class TracedFunction(NamedTuple):
         Its arguments and results.
     name : str
         Its name in messages.
+    by_null_space : callable or None
+        (state, arguments by name) → its results where elimination leaves few digits; None where it is not by elimination.
     """
 
     trace: Callable[[], Function]
     interface: Interface
     name: str
+    by_null_space: Callable[[State, dict], Sequence[np.ndarray]] | None = None
 
 
 def _function(system: System, requests, columns) -> TracedFunction:
     """Traced function of requests, and its interface in Python."""
     names = _arguments([TERMS[one.name] for one in requests])
     sizes = {name: system.n_q if name == "q" else system.n_v for name in names}
-    interface = Interface(sizes, "t", error_limits(columns), _shapes(system, requests, columns))
+    of_loops = any(TERMS[one.name].of_loops for one in requests)
+    leaks = of_loops and columns is None and system.closes
+    limits = (*error_limits(columns), *((LARGEST_LEAK,) if leaks else ()))
+    interface = Interface(sizes, "t", limits, _shapes(system, requests, columns))
 
     def values(*given):
         arguments = dict(zip(names, given[:-1], strict=True))
@@ -206,13 +215,14 @@ def _function(system: System, requests, columns) -> TracedFunction:
         terms = StateTerms(system, q, v, t) if columns is None else ConstrainedTerms(system, q, v, t, columns)
         found = [_traced(TERMS[one.name], terms, one, arguments) for one in requests]
         parts = [result if isinstance(result, tuple) else (result,) for result in found]
-        of_loops = columns is not None or any(TERMS[one.name].of_loops for one in requests)
-        residual, total, *others = error_measures(terms, given, of_loops)
+        residual, total, *others = error_measures(terms, given, of_loops or columns is not None)
+        others += [constraint_leak(system, Mechanism(system, q, v, t))] if leaks else []
         overflow = np.abs(sum(_overflow(one.name, own, v) for one, own in zip(requests, parts, strict=True)))  # −∞, too
         return *(part for own in parts for part in own), [residual, total + overflow, *others]
 
     name = ", ".join(":".join(filter(None, one[:2])) for one in requests)
-    return TracedFunction(lambda: write(values, *interface.sizes, 1, name="state"), interface, name)
+    by_null_space = partial(null_space_terms, system, requests) if leaks else None
+    return TracedFunction(lambda: write(values, *interface.sizes, 1, name="state"), interface, name, by_null_space)
 
 
 def _on_device(system: System, requests, columns, key, device: str) -> Callable:
@@ -241,7 +251,7 @@ def compiled(system: System, function: TracedFunction, columns, key: tuple) -> C
     key : tuple
         What tells it from other functions of the system in the cache.
     """
-    trace, interface, name = function
+    trace, interface, name, by_null_space = function
     sizes, limits = interface.vectors, interface.limits
     entry = cached_on_disk(system, (entry_code, *key), lambda: entry_code(trace(), interface))
     batch = lambda: cached_on_disk(system, (batch_code, *key), lambda: batch_code(trace(), interface)).entry()  # noqa: E731
@@ -251,9 +261,14 @@ def compiled(system: System, function: TracedFunction, columns, key: tuple) -> C
         state = system.state(q, others[0] if "v" in sizes else None, t)
         if not all(np.isfinite(part).all() for part in (*others, t)):
             raise StateError(f"{name}: expected finite numbers, got {others[-1] if others else ''} at t = {t}.")
-        if np.array_equal(state.q, q):
+        if not np.array_equal(state.q, q):
+            found = run(state.q, *others, None, t)
+        elif by_null_space is None or is_in_other_pose(system, state.q):
             raise StateError(refused_state(system, state, name, columns))
-        found = run(state.q, *others, None, t)
+        else:
+            found = tuple(by_null_space(state, dict(zip(sizes, (q, *others), strict=True))))
+            if not all(np.isfinite(part).all() for part in found):
+                raise StateError(refused_state(system, state, name, columns))
         return np.concatenate([np.ravel(part) for part in (found if isinstance(found, tuple) else (found,))])
 
     outputs = entry.outputs - len(limits)
@@ -300,7 +315,7 @@ def error_measures(terms: StateTerms, given, of_loops: bool) -> list:
     pose than in the scene.
     """
     system, unit = terms.system, terms.system.scale.coordinates
-    residual, total = off_unit(system, terms.q), sum(np.abs(part).sum() for part in given)
+    residual, total = off_unit(system, terms.q), absolute_sum(*given)
     if of_loops and rigid_joints(system):
         residual = residual + math.where(is_in_other_pose(system, terms.q), np.inf, 0.0)
     if not isinstance(terms, ConstrainedTerms):

@@ -13,7 +13,7 @@ from gauss.backends.estimate import SHARE_AT_REST
 from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK
 from gauss.dynamics.front_rank import embedding_of
 from gauss.dynamics.mechanism import Mechanism, refined_forward_dynamics
-from gauss.dynamics.traced_system import Program, applied_loads, largest
+from gauss.dynamics.traced_system import Program, absolute_sum, applied_loads, largest
 from gauss.system import State
 
 
@@ -33,7 +33,7 @@ def refined_once(program: Program, q, v, tau, t, elimination: Callable[..., Mech
     rows, along = mechanism.acceleration_residual(reached), mechanism.dependent_accelerations(reached) - reached
     left = np.abs(change * program.own).sum() + np.abs(along * program.own).sum() + np.abs(rows * program.shares).sum()
     error = left / math.maximum(largest(found * program.own), program.error_scale(v))
-    return reached, [error, program.residual(state), _sum(q, v, total, t)]
+    return reached, [error, program.residual(state), absolute_sum(q, v, total, t)]
 
 
 def embedded_once(program: Program, q, v, tau, t):
@@ -44,7 +44,7 @@ def embedded_once(program: Program, q, v, tau, t):
 def refined(program: Program, q, v, tau, t):
     """q̈ refined to round-off, and [its error by the measure of certificates, the rest as of :func:`refined_once`]."""
     acceleration, _, error, residual = _refined(program, State(t[0], q, v), tau)
-    return acceleration, [error, residual, _sum(q, v, tau, t)]
+    return acceleration, [error, residual, absolute_sum(q, v, tau, t)]
 
 
 def refined_rates(program: Program, t, q, v, tau):
@@ -63,7 +63,3 @@ def _refined(program: Program, state: State, tau):
     shares = [off / math.maximum(np.abs(rate), SHARE_AT_REST * size) for off, rate in each]
     error = sum(shares) + np.abs(found.residual * program.shares).sum() / size
     return found.rates, power + np.array([found.power, 0.0, 0.0]), error, residual
-
-
-def _sum(*vectors):
-    return sum(np.abs(vector).sum() for vector in vectors)

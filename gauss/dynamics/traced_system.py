@@ -376,6 +376,15 @@ def largest(values):
     return _fold(math.maximum, np.abs(values))
 
 
+def absolute_sum(*vectors):
+    """Sum of absolute values, halves to halves: as a chain it would take longer than many a function that it guards."""
+    values = np.abs(np.concatenate(vectors))
+    while len(values) > 1:
+        half = len(values) // 2
+        values = np.concatenate([values[:half] + values[half : 2 * half], values[2 * half :]])
+    return values.sum()
+
+
 def _fold(function, values):
     total = values[0]
     for value in values[1:]:

@@ -88,13 +88,7 @@ static inline void gauss_sincos(int n, const double *x, double *s, double *c)
 
 
 class CBody:
-    """Statements of one function.
-
-    Parameters
-    ----------
-    exported : ExportedFunction
-        The function.
-    """
+    """Statements of one function."""
 
     def __init__(self, exported: ExportedFunction):
         self.schedule = schedule(exported.function)

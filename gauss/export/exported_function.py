@@ -15,6 +15,7 @@ import numpy as np
 
 from gauss.arguments import name_list
 from gauss.codegen import Expression, Function, Graph, write
+from gauss.codegen.python_wrapper import Shape
 from gauss.dynamics import compile_scene
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism, acceleration_derivatives
 from gauss.dynamics.inputs import input_loads
@@ -38,7 +39,6 @@ RESULTS = {  # names of the results of the other functions, "result" of one alon
     "inverse_dynamics_derivatives": ("by_q", "by_v"),
     "loop_constraints": ("residual", "jacobian", "bias"),
 }
-Shape = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ def semi_implicit_euler(equations: Equations, point: Point, h: Scalar) -> tuple[
 
 
 EXPLICIT_FIXED = (
-    FixedStep("rk4", "classical Runge–Kutta", 4, "Kutta 1901", 4, rk4),
+    FixedStep("rk4", "classical Runge–Kutta", 4, "Kutta 1901", 4, rk4, evaluates_end=True),
     FixedStep(
         "semi_implicit_euler",
         "semi-implicit Euler",

@@ -107,6 +107,7 @@ def generalised_alpha(rho: float = 0.8) -> FixedStep:
         partial(step, Weights.of(rho)),
         mechanical=True,
         starts_from_accelerations=True,
+        evaluates_end=True,
     )
 
 

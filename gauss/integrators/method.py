@@ -66,6 +66,8 @@ class FixedStep:
         Whether its method state has the size n_v and is initially the accelerations.
     nonsmooth : bool
         Whether its steps contain impacts and friction (Moreau–Jean time stepping).
+    evaluates_end : bool
+        Whether a step evaluates the laws of time at its end, and of a law that jumps there the value after the jump.
     """
 
     name: str
@@ -78,6 +80,7 @@ class FixedStep:
     state_size: Callable[[System], int] | None = None
     starts_from_accelerations: bool = False
     nonsmooth: bool = False
+    evaluates_end: bool = False
 
 
 @runtime_checkable

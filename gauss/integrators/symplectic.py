@@ -132,6 +132,7 @@ SYMPLECTIC = (
         partial(step, RATTLE),
         True,
         CompensatedSums.size,
+        evaluates_end=True,
     ),
     FixedStep(
         "variational_midpoint",

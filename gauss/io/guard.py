@@ -11,12 +11,13 @@ from xml.parsers import expat
 
 from gauss.errors import FileError
 from gauss.io.numbers import number
+from gauss.scene.file_contents import contents
 
-LARGEST_FILE = 20_000_000  # bytes
 MOST_INCLUDES = 1000  # included files of one file, nested ones counted: more is a mistake, or an attack
 DEEPEST = 200  # elements inside elements; parsers call themselves for each
 DEEPEST_OF = {"mujoco": 499, "mujocoinclude": 499}  # by the outermost element: chains of bodies; the limit of MuJoCo
 LARGEST_MAGNITUDE = 1e20  # of a number, in any SI unit: above those of any mechanism
+MOST_ATTRIBUTES = 1000  # of one element: parsers compare each with all others
 NAMES = ("name", "link", "joint", "body")  # attributes that may look like numbers and are none
 
 
@@ -64,18 +65,15 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = (), loose_c
         If it cannot be read, or holds what is refused; the message says where.
     """
     path = Path(path)
-    if not path.exists():
-        raise FileError(f"{path}: no such file.")
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise FileError(f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; a mechanism needs less.")
-        content = path.read_bytes()
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
+    content = contents(path)
     try:
         source = _parsed(path, content, loose_comments)
     except expat.ExpatError as error:
         raise FileError(f"{path}: not XML: {error}.") from error
+    except FileError:
+        raise
+    except (LookupError, ValueError) as error:  # of the encoding that the file names
+        raise FileError(f"{path}: cannot be decoded: {error}; write it in UTF-8.") from error
     if source.root.tag not in roots:
         got = source.root.tag
         raise FileError(f"{path}: expected <{roots[0]}>, got <{got}>; other formats are read by their own endings.")
@@ -91,16 +89,33 @@ def require_inside(source: Source, element: Element, home: Path, named: str, roo
     Raises
     ------
     FileError
-        Naming the file and where it is asked for.
+        Naming the file and where it is asked for; also of a pipe or device, from which reading may not end.
     """
-    file, allowed = (home / named).resolve(), [folder for folder in (home, root_folder) if folder is not None]
+    file = resolved(home / named, source.place(element))
+    allowed = [folder for folder in (home, root_folder) if folder is not None]
     if any(file.is_relative_to(folder.resolve()) for folder in allowed):
+        if file.exists() and not (file.is_file() or file.is_dir()):
+            raise FileError(f"{source.place(element)}: names {named!r}, a pipe or device; name a file.")
         return
     if root_folder is None:
         remedy = "put a copy there, or name a folder that holds both, where it can be: gauss.load(..., root_folder=...)"
     else:
         remedy = f"and outside root_folder {str(root_folder)!r}; name a folder that holds both"
     raise FileError(f"{source.place(element)}: names the file {named!r} outside its own folder; {remedy}.")
+
+
+def resolved(path: Path, place: str) -> Path:
+    """Path without links.
+
+    Raises
+    ------
+    FileError
+        If its links go round in a circle.
+    """
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError) as error:
+        raise FileError(f"{place}: names the file {path.name!r}, whose links lead round in a circle.") from error
 
 
 def checked_root(path, root_folder) -> Path | None:
@@ -159,6 +174,8 @@ class _Parser:
     def _start(self, tag: str, attributes: dict):
         if not self.depth:
             self.deepest = DEEPEST_OF.get(tag, DEEPEST)
+        if len(attributes) > MOST_ATTRIBUTES:
+            raise FileError(f"{self._here}: <{tag}> has {len(attributes)} attributes, more than {MOST_ATTRIBUTES}.")
         self.depth += 1
         if self.depth > self.deepest:
             raise FileError(f"{self._here}: elements are nested more than {self.deepest} deep.")

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gauss.errors import FileError, extra
+from gauss.scene.file_contents import contents
 
 LARGEST_TEXT = 1_000_000  # bytes; the largest known file has 2 000
 DEEPEST_LISTS = 8  # lists inside lists
@@ -28,9 +29,7 @@ def yaml_entries(path: Path) -> dict[str, Marked]:
     with extra("yaml"):
         import yaml  # few robots need it
     try:
-        if path.stat().st_size > LARGEST_TEXT:
-            raise FileError(f"{path}: larger than {LARGEST_TEXT / 1e6:g} MB; no list of loops is.")
-        text = path.read_text(encoding="utf-8")
+        text = contents(path, LARGEST_TEXT).decode("utf-8")
         if re.search(r"[\[{]\s*" * DEEPEST_LISTS, text):
             raise FileError(f"{path}: lists are nested more than {DEEPEST_LISTS - 1} deep.")
         for event in yaml.parse(text, Loader=yaml.SafeLoader):
@@ -38,7 +37,7 @@ def yaml_entries(path: Path) -> dict[str, Marked]:
                 raise FileError(f"{path}:{event.start_mark.line + 1}: anchors, aliases and tags are not read.")
         node = yaml.compose(text, Loader=yaml.SafeLoader)
         return _mapping(yaml, path, node)
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise FileError(f"{path}: cannot be read: {error}.") from error
     except RecursionError:
         raise FileError(f"{path}: lists are nested too deep.") from None
@@ -51,10 +50,12 @@ def _mapping(yaml, path: Path, node) -> dict[str, Marked]:
         return {}
     found: dict[str, Marked] = {}
     for key, entry in node.value:
+        place = f"{path}:{key.start_mark.line + 1}"
+        if not isinstance(key, yaml.ScalarNode):
+            raise FileError(f"{place}: a key is no text; write a name there.")
         if key.value in found:
-            raise FileError(f"{path}:{key.start_mark.line + 1}: the key {key.value!r} stands twice.")
-        if isinstance(key, yaml.ScalarNode):
-            found[key.value] = _marked(yaml, path, entry)
+            raise FileError(f"{place}: the key {key.value!r} stands twice.")
+        found[key.value] = _marked(yaml, path, entry)
     return found
 
 

@@ -10,7 +10,6 @@ cycle of crank angles is one call::
 from gauss.arguments import named_arguments, named_methods
 from gauss.linkages.balancing import shaking
 from gauss.linkages.chain import Chain, Dyad, Triad
-from gauss.linkages.columns import coupler_curves, table
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.cycles import cycle
 from gauss.linkages.dynamics import CrankRun, ReducedLinkage, run
@@ -20,8 +19,8 @@ from gauss.linkages.four_bar import FourBarDesign
 from gauss.linkages.kernels import cycle_kernel, reduced_kernel
 from gauss.linkages.linkage import Linkage
 from gauss.linkages.motion_generation import motion_generation
+from gauss.linkages.report import coupler_curves, report, table
 from gauss.linkages.scene import scene_state, to_scene
-from gauss.linkages.summary import report
 from gauss.linkages.synthesis import function_generation, path_generation
 from gauss.versions import current_name
 

@@ -17,11 +17,6 @@ class Jacobian:
 
     Groups that change different rows share a column (J. Inst. Maths Applics 13 (1974) 117). The three works sum over all
     shafts: their rows are assembled torque by torque.
-
-    Parameters
-    ----------
-    phase : NetworkPhase
-        The phase.
     """
 
     def __init__(self, phase: NetworkPhase):

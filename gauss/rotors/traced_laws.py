@@ -16,11 +16,6 @@ SMOOTH = (Constant, Viscous, Quadratic, Linear, Kloss, DC, Periodic)  # laws wit
 class TracedLaws:
     """Torques and characteristics of a network as expressions of (t, θ, w); opaque ones by name.
 
-    Parameters
-    ----------
-    reduced : ReducedNetwork
-        The network.
-
     Attributes
     ----------
     t : Expression

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf
 
-from gauss.errors import SceneError, did_you_mean
+from gauss.errors import SceneError, did_you_mean, listed
 from gauss.scene import values
 from gauss.scene.builder import SceneBuilder, name_of
 from gauss.scene.loads import Drive, Force
@@ -23,13 +23,24 @@ SENSORS = {
     "rotation": ("frame", 9),
     "velocity": ("frame", 3),
     "angular_velocity": ("frame", 3),
+    "x_axis": ("frame", 3),
+    "y_axis": ("frame", 3),
+    "z_axis": ("frame", 3),
     "acceleration": ("frame", 3),
+    "angular_acceleration": ("frame", 3),
+    "proper_acceleration": ("frame", 3),
     "accelerometer": ("frame", 3),
     "gyroscope": ("frame", 3),
+    "velocimeter": ("frame", 3),
+    "center_of_mass": ("body", 3),
+    "center_of_mass_velocity": ("body", 3),
+    "angular_momentum": ("body", 3),
     "joint_force": ("joint", 3),
     "joint_moment": ("joint", 3),
     "contact_force": ("contact", 0),
 }
+AXES = ("x_axis", "y_axis", "z_axis")
+SEEN = ("position", "rotation", *AXES, "velocity", "angular_velocity")  # from another frame, if asked for
 
 
 @dataclass(frozen=True)
@@ -122,20 +133,27 @@ class Output:
         Name of the output.
     kind : str
         "coordinate" [rad, m] or "rate" [rad/s, m/s] of a joint; of a point of a body or frame, in world axes, "position"
-        (3,) [m], "rotation" (3, 3) row by row, "velocity" (3,) [m/s], "angular_velocity" (3,) [rad/s] or "acceleration" (3,)
-        [m/s²]; in its own axes, "accelerometer" (3,), acceleration less gravity [m/s²], or "gyroscope" (3,) [rad/s]. Of the
-        parent on the child of a joint, in world axes, "joint_force" (3,) [N] and "joint_moment" (3,) about the joint point
-        [N m]. "contact_force" [N, N m], one value for each gap of a contact, stop or rope.
+        (3,) [m], "rotation" (3, 3) row by row, its columns "x_axis", "y_axis", "z_axis" (3,), "velocity" (3,) [m/s],
+        "angular_velocity" (3,) [rad/s], "acceleration" (3,) [m/s²], "proper_acceleration" (3,), acceleration less
+        gravity [m/s²], or "angular_acceleration" (3,) [rad/s²]; in its own axes, "accelerometer" (3,), acceleration less
+        gravity [m/s²], "gyroscope" (3,) [rad/s] or "velocimeter" (3,) [m/s]. Of a body and all that hangs on it in the
+        spanning tree, or of "ground", in world axes, "center_of_mass" (3,) [m], "center_of_mass_velocity" (3,) [m/s] and
+        "angular_momentum" (3,) about it [kg m²/s]. Of the parent on the child of a joint, in world axes, "joint_force"
+        (3,) [N] and "joint_moment" (3,) about the joint point [N m]. "contact_force" [N, N m], one value for each gap of
+        a contact, stop or rope.
     of : str
         Joint; body or frame; contact, stop or rope.
     at : array_like, shape (3,)
         Point in the body or frame [m].
+    relative_to : str, optional
+        Body or frame that poses and velocities are seen from, in whose axes they are then; the ground when not given.
     """
 
     name: str
     kind: str
     of: str
     at: tuple = (0.0, 0.0, 0.0)
+    relative_to: str = ""
 
     def __post_init__(self):
         """Check every value."""
@@ -143,6 +161,10 @@ class Output:
         if self.kind not in SENSORS:
             raise SceneError(f"{what}: no kind {self.kind!r}. {did_you_mean(str(self.kind), SENSORS)}")
         values.text(self.of, f"{what}: of")
+        if self.relative_to != "":
+            values.text(self.relative_to, f"{what}: relative_to")
+            if self.kind not in SEEN:
+                raise SceneError(f"{what}: relative_to: {self.kind!r} is not seen from a frame, only {listed(SEEN)} are.")
         values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
 
     def size(self, scene) -> int:
@@ -187,9 +209,9 @@ class InputBuilder(SceneBuilder):
             joint, limits = drive.joint, drive.limit if limits is None else limits
         return self.add(Input(name, name_of(joint), limits, effort, forces))
 
-    def output(self, name: str, kind: str, of, at=(0.0, 0.0, 0.0)) -> Output:
+    def output(self, name: str, kind: str, of, at=(0.0, 0.0, 0.0), relative_to="") -> Output:
         """Measure a joint, body, frame or contact; see :class:`gauss.scene.Output` for the kinds."""
-        return self.add(Output(name, kind, name_of(of), at))
+        return self.add(Output(name, kind, name_of(of), at, name_of(relative_to)))
 
     def _place_input(self, given: Input):
         self._require_new(given.name, "input", self.inputs | self.loads | self._constraints)
@@ -208,6 +230,10 @@ class InputBuilder(SceneBuilder):
         elif measured == "contact":
             if output.of not in self.contacts:
                 raise SceneError(f"{what}: no contact {output.of!r}. {did_you_mean(output.of, self.contacts)}")
+        elif measured == "body":
+            self._require_body(output.of, what)
         else:
             self._require_place(output.of, what)
+            if output.relative_to:
+                self._require_place(output.relative_to, f"{what}: relative_to")
         self.outputs[output.name] = output

@@ -131,13 +131,7 @@ class Polynomial(Profile):
 
 @dataclass(frozen=True)
 class Several:
-    """Several laws of time, as one law that returns an array.
-
-    Parameters
-    ----------
-    entries : tuple of float or Profile
-        The laws.
-    """
+    """Several laws of time, as one law that returns an array."""
 
     entries: tuple
 

@@ -46,13 +46,7 @@ NO_TRIANGLES = Triangles(np.zeros((0, 3), dtype=int), np.zeros((0, 3, 3)), np.ze
 
 
 class Terrain:
-    """Height field in its own axes around the middle of its box.
-
-    Parameters
-    ----------
-    field : HeightField
-        The shape.
-    """
+    """Height field in its own axes around the middle of its box."""
 
     def __init__(self, field: HeightField):
         x, y, z = field.grid

@@ -28,15 +28,7 @@ TINY = 1e-12  # relative to the size of the field: distance of a centre from the
 
 
 class BallOnTerrain:
-    """Contact points of a ball and a height field.
-
-    Parameters
-    ----------
-    ball : Segment
-        The ball.
-    terrain : Terrain
-        The field.
-    """
+    """Contact points of a ball and a height field."""
 
     def __init__(self, ball: Segment, terrain: Terrain):
         self.radius, self.terrain = ball.radius, terrain
@@ -88,15 +80,7 @@ def nearest_places(point: np.ndarray, triangles: Triangles, cell: np.ndarray) ->
 
 
 class SolidOnTerrain:
-    """Contact points of a convex solid and a height field.
-
-    Parameters
-    ----------
-    first : Solid
-        The solid.
-    terrain : Terrain
-        The field.
-    """
+    """Contact points of a convex solid and a height field."""
 
     def __init__(self, first: Solid, terrain: Terrain):
         self.first, self.terrain = first, terrain

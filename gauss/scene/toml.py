@@ -10,6 +10,7 @@ from gauss import scene as package
 from gauss.errors import FileError, SceneError, did_you_mean
 from gauss.lazy import LazyTable
 from gauss.scene import Scene
+from gauss.scene.file_contents import contents
 
 # Section → class, in the order in which elements may refer to each other.
 CLASSES = {
@@ -58,6 +59,7 @@ CLASSES = {
 }
 SECTIONS = LazyTable(CLASSES, partial(getattr, package))
 HEADER_KEYS = ("name", "gravity")
+LARGEST_SCENE = 200_000_000  # bytes: meshes and height fields may stand in it
 RENAMED_KEYS = {("joint", "type"): "kind"}  # key in the file → field of the class
 # A name may be left out: that of the joint serves.
 NAMED_BY_SCENE = {"drive": "drive", "prescribed": "drive", "limited_drive": "drive", "stop": "stop"}
@@ -66,14 +68,13 @@ NAMED_BY_SCENE |= {"joint_friction": "friction"}
 
 def tables(path: Path) -> dict:
     """Contents of a TOML file."""
+    content = contents(Path(path), LARGEST_SCENE)
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except ValueError as error:  # of the syntax, the encoding, or an integer of thousands of digits
         raise FileError(f"{path}: not a TOML file: {error}.") from error
     except RecursionError:
         raise FileError(f"{path}: tables or arrays are nested too deep.") from None
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
 
 
 def read_file(source, shipped: dict[str, Path], kind: str, make):

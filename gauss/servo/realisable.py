@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.backends.recursion import Factor
+from gauss.backends.closure import Factor
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.servo.instant import ServoInstant

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gauss.backends import solve as solve_compulsion
+from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
-from gauss.backends.recursion import Factor
 from gauss.backends.solution import Answer
 from gauss.backends.structure import ConstraintRows
 from gauss.dynamics.assemble import assemble_motion

@@ -4,6 +4,7 @@ from gauss.simulation.batch.simulator_batch import SimulatorBatch
 from gauss.simulation.contact_export import friction_problem
 from gauss.simulation.initial_overlaps import resolve_overlaps
 from gauss.simulation.integrators import INTEGRATORS
+from gauss.simulation.moreau.sleeping import Sleeping
 from gauss.simulation.prepared_motion import PreparedMotion, prepare
 from gauss.simulation.simulate import simulate
 from gauss.simulation.simulator import Simulator
@@ -17,6 +18,7 @@ __all__ = [
     "Rollout",
     "Simulator",
     "SimulatorBatch",
+    "Sleeping",
     "Stats",
     "Trajectory",
     "crossings",

@@ -125,6 +125,7 @@ def described(problem: Problem, duration: float, integrator: str | Integrator, r
         "backend": named(problem.backend),
         "stabilisation": problem.stabilisation,
         **({} if problem.held is None else {"rate": problem.held.rate}),
+        **({} if problem.sleeping is None else {"sleeping": problem.sleeping}),
     }
 
 

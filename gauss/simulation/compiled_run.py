@@ -2,8 +2,8 @@
 
 Accelerations are checked every few steps by inverse dynamics in machine code, and at the ends by the certified recursion;
 the loop stops at a failed check, and the fallback dynamics of the plan continue from the last confirmed point
-(:mod:`gauss.simulation.handover`). Adaptive methods: :mod:`gauss.simulation.compiled_adaptive_run`; fixed steps:
-:mod:`gauss.simulation.compiled_fixed_run`.
+(:func:`gauss.simulation.compiled_runs.finished`). Adaptive methods: :mod:`gauss.simulation.compiled_adaptive_run`; fixed
+steps: :mod:`gauss.simulation.compiled_fixed_run`.
 """
 
 import time

@@ -16,8 +16,7 @@ from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
-from gauss.simulation.compiled_runs import adaptive_run, fixed_run, moreau_run
-from gauss.simulation.handover import finished
+from gauss.simulation.compiled_runs import adaptive_run, finished, fixed_run, moreau_run
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 

@@ -169,3 +169,13 @@ def _called(law: Callable) -> Callable:
     except ValueError:  # a builtin that hides its signature
         pass
     return law
+
+
+def as_floats(u) -> np.ndarray | None:
+    """Array of numbers of any kind; None where they are none, or masked."""
+    if np.ma.is_masked(u):
+        return None
+    try:
+        return np.asarray(u, dtype=float)
+    except (TypeError, ValueError, RuntimeError):  # the last of torch
+        return None

@@ -63,9 +63,9 @@ class Event:
     kind : str
         "impact": a gap closes with a velocity, or a prescribed velocity jumps; "opens" or "closes" without impact; "slips"
         or "holds" of joint friction and limited drives; "power reversal", "starts", "stuck" of links with losses;
-        "contact" or "separate" of backlash sides.
+        "contact" or "separate" of backlash sides; "sleeps" or "wakes" of bodies.
     gaps : tuple of str
-        Names of the gaps or elements, and of drives and constraints whose velocity jumps.
+        Names of the gaps, elements or bodies, and of drives and constraints whose velocity jumps.
     loss : float
         Kinetic energy lost, the work of prescribed motions included [J].
     impulses : dict of str to tuple of float

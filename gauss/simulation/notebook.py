@@ -26,11 +26,6 @@ def html_table(system: System, t: np.ndarray, q: np.ndarray, title: str) -> str:
         Coordinates.
     title : str
         Text above the table.
-
-    Returns
-    -------
-    str
-        HTML.
     """
     units = list(coordinate_units(system).items()) if len(t) else []
     least = {"m": NOISE * system.scale.length}

@@ -1,7 +1,8 @@
 """Switching of laws of time within fixed steps that do not end there: of stepping objects, and of steps without events.
 
 A prescribed velocity must not jump within such a step, for an impact is no part of it; features that are shorter than the
-steps are warned of, and so are jumps of laws, at which steps are of order 1.
+steps are warned of, and so are jumps of laws, at which steps of methods of higher order are of order 1. A jump at an end of
+a step does no harm to methods that evaluate nothing there; the last stage of others sees the value after it.
 """
 
 import math
@@ -10,21 +11,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen import Expression
 from gauss.dynamics.laws.constraint_modes import refuse_surfaces
-from gauss.dynamics.laws.intervals import Interval, enclose
-from gauss.dynamics.laws.prescribed_jumps import RELATIVE, SMOOTH, generic_state
+from gauss.dynamics.laws.load_jumps import first_jump
 from gauss.dynamics.laws.switching import called_laws, timed_switching
 from gauss.dynamics.laws.switching_times import APART, Timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError, SwitchingWarning, user_level
+from gauss.integrators import FixedStep
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System
 
 CONTINUOUS = "let prescribed velocities be continuous, and prescribed positions smooth"  # a remedy
+SIMULATED = "use gauss.simulate, or an input, which is held within each step"  # a remedy
 HORIZON = 10_000  # steps of a stepping object, which has no end, in which switching is looked for at once
 RESOLVING_STEPS = 2.0  # steps that a feature of a law of time must last
-BESIDE = np.array([-2.0, -1.0, 1.0, 2.0])  # places of samples beside a switching time, in distances of ends of steps
 
 
 def smooth_timetable(system: System, laws: Laws, start: State, end: float, remedy: str = CONTINUOUS) -> Timetable:
@@ -63,8 +63,30 @@ def warn_of_features(scene: str, step: float, remedy: str, first: float | None =
     warnings.warn(f"{scene!r}: {text}", SwitchingWarning, stacklevel=user_level())
 
 
-def examine_steps(system: System, laws: Laws, start: State, end: float, step: float, remedy: str = "use gauss.simulate"):
+def examine_steps(
+    system: System,
+    laws: Laws,
+    start: State,
+    end: float,
+    step: float,
+    remedy: str = SIMULATED,
+    method: FixedStep | None = None,
+    warned_of: set[str] | None = None,
+):
     """Refuse or warn of switching of laws of time in fixed steps that pass over it; parameters of :func:`smooth_timetable`.
+
+    Parameters
+    ----------
+    system, laws, start, end
+        See :func:`smooth_timetable`; a step begins at the start.
+    step : float
+        Step [s].
+    remedy : str
+        What to do about it.
+    method : FixedStep, optional
+        Method of the steps; an explicit Runge–Kutta method when not given.
+    warned_of : set of str, optional
+        What was warned of before, and is not again; what is warned of here is added.
 
     Warns
     -----
@@ -77,40 +99,41 @@ def examine_steps(system: System, laws: Laws, start: State, end: float, step: fl
         If a prescribed position or velocity jumps.
     """
     name, times = system.scene.name, smooth_timetable(system, laws, start, end, remedy)
-    short = times.switches[:-1][np.diff(times.switches) < RESOLVING_STEPS * step]
-    times = times.join(called_laws(system, laws, start))
-    first = min(float(short[0]) if short.size else np.inf, times.first_coarse(start.t, end, step))
-    if first < np.inf or times.unresolved(start.t, end, step):
-        warn_of_features(name, step, remedy, first if first < np.inf else None)
+    said = set() if warned_of is None else warned_of
+    if "feature" not in said:
+        first = _first_feature(times.join(called_laws(system, laws, start)), start.t, end, step)
+        if first is not None:
+            said.add("feature")
+            warn_of_features(name, step, remedy, first if first < np.inf else None)
+            return
+    if "jump" in said or (method is not None and method.order == 1):
         return
-    jumping = _jumping(system, laws, start, times.switches)
-    if jumping.size:
-        text = f"steps of {step:g} s do not end where a law of time jumps, at t = {jumping[0]:.6g} s"
-        warnings.warn(f"{name!r}: {text}: they are of order 1 there; {remedy}.", SwitchingWarning, stacklevel=user_level())
+    ending = _ends_of_steps(times.switches, start.t, step)
+    harmful = times.switches if method is None or method.evaluates_end else times.switches[~ending]
+    first = first_jump(system, laws, start, end, harmful)
+    if first < np.inf:
+        said.add("jump")
+        at_end = ", at the end of one, where its method evaluates the law" if first in times.switches[ending] else ""
+        text = f"steps of {step:g} s are of order 1 where a law of time jumps, at t = {first:.6g} s{at_end}"
+        warnings.warn(f"{name!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=user_level())
 
 
-def _jumping(system: System, laws: Laws, start: State, times: np.ndarray) -> np.ndarray:
-    """Times of some (k,) at which the value of a traced load jumps, at the start or at a generic state [s]."""
-    if not times.size or laws.motion is None or not laws.outputs:
-        return np.zeros(0)
-    symbols = laws.motion.state
-    assert isinstance(symbols.t, Expression)
-    looks = times[:, None] + APART * np.abs(times).max() * BESIDE
-    found = np.zeros(times.size, dtype=bool)
-    for state in (start, generic_state(system, start)):
-        numbers = zip([*symbols.q, *symbols.v], [*state.q, *state.v], strict=True)
-        given = {symbol.index: Interval.point(np.full(looks.shape, value)) for symbol, value in numbers}
-        with np.errstate(all="ignore"):
-            ranges = enclose(laws.outputs, given | {symbols.t.index: Interval.point(looks)})
-            for one in ranges:
-                before, last, first, after = np.moveaxis(np.broadcast_to(one.low, looks.shape), -1, 0)
-                smooth = np.abs(last - before) + np.abs(after - first)
-                found |= np.abs(first - last) > SMOOTH * smooth + RELATIVE * np.maximum(np.abs(first), np.abs(last))
-    return times[found]
+def _first_feature(times: Timetable, begin: float, end: float, step: float) -> float | None:
+    """Time of the first feature that steps do not resolve [s], infinite where it is not known; None if there is none."""
+    inside = ~_ends_of_steps(times.switches, begin, step)
+    short = (np.diff(times.switches) < RESOLVING_STEPS * step) & (inside[1:] | inside[:-1])
+    first = min(times.switches[:-1][short].min(initial=np.inf), times.first_coarse(begin, end, step))
+    return float(first) if first < np.inf or times.unresolved(begin, end, step) else None
+
+
+def _ends_of_steps(times: np.ndarray, begin: float, step: float) -> np.ndarray:
+    """Whether some times (k,) are ends of steps [s], but for rounding."""
+    ends = begin + np.round((times - begin) / step) * step
+    return np.abs(times - ends) <= APART * np.maximum(abs(begin), np.abs(times))
 
 
 class StepsAhead:
-    """Time ahead of a stepping object in which switching has been looked for.
+    """Time ahead of a stepping object in which switching has been looked for; a feature and a jump are warned of once.
 
     Parameters
     ----------
@@ -120,6 +143,8 @@ class StepsAhead:
         Its loads.
     step : float
         Step [s].
+    method : FixedStep
+        Method of the steps.
 
     Raises
     ------
@@ -127,21 +152,32 @@ class StepsAhead:
         If a constraint jumps at a condition on the state.
     """
 
-    def __init__(self, system: System, laws: Laws, step: float):
+    def __init__(self, system: System, laws: Laws, step: float, method: FixedStep):
         refuse_surfaces(system, "a motion in fixed steps of one call each")
-        self.system, self.laws, self.step = system, laws, step
-        is_timed = system.relations.asks_time or bool(laws.outputs) or bool(laws.called)
-        self.begin, self.end = (0.0, -math.inf) if is_timed else (-math.inf, math.inf)
+        self.system, self.laws, self.step, self.method = system, laws, step, method
+        self.is_timed = system.relations.asks_time or bool(laws.outputs) or bool(laws.called)
+        self.begin, self.horizons, self.warned_of = 0.0, 0, set[str]()
+
+    @property
+    def end(self) -> float:
+        """End of the time in which switching has been looked for [s]."""
+        return self.begin + self.horizons * (HORIZON * self.step)
 
     def seen_from(self, t: float) -> float:
         """Number of steps from a time [s] in which switching has been looked for."""
-        return (self.end - t) / self.step if self.begin <= t <= self.end else 0.0
+        if not self.is_timed:
+            return math.inf
+        known = self.begin <= t <= self.end and _ends_of_steps(np.array([t]), self.begin, self.step).all()
+        return (self.end - t) / self.step if known else 0.0
 
     def look(self, start: State, end: float):
         """Look for switching from a state up to a time [s] at least; as :func:`examine_steps`."""
-        if not self.begin <= start.t <= self.end:
-            self.begin = self.end = start.t
+        if not self.is_timed:
+            return
+        if not self.seen_from(start.t):
+            self.begin, self.horizons = start.t, 0
         while self.end < end:
-            further = self.end + HORIZON * self.step
-            examine_steps(self.system, self.laws, replace(start, t=self.end), further, self.step)
-            self.end = further
+            further = self.begin + (self.horizons + 1) * (HORIZON * self.step)
+            given = self.system, self.laws, replace(start, t=self.end), further, self.step
+            examine_steps(*given, method=self.method, warned_of=self.warned_of)
+            self.horizons += 1

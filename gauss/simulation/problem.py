@@ -11,6 +11,7 @@ from gauss.dynamics.rules import Question
 from gauss.dynamics.stabilisation import Baumgarte, Drift
 from gauss.integrators import Integrator, Tolerance
 from gauss.simulation.held_inputs import HeldInputs
+from gauss.simulation.moreau.sleeping import Sleeping
 from gauss.system import State, System
 
 
@@ -47,6 +48,8 @@ class Problem(NamedTuple):
         Whether a progress bar is shown.
     held : HeldInputs, optional
         Inputs, held between samples; they are zero when not given.
+    sleeping : Sleeping, optional
+        When bodies at rest sleep; never when not given.
     """
 
     system: System
@@ -63,6 +66,7 @@ class Problem(NamedTuple):
     samples: np.ndarray | None
     progress: bool
     held: HeldInputs | None = None
+    sleeping: Sleeping | None = None
 
     @property
     def question(self) -> Question:

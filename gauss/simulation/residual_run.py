@@ -20,11 +20,6 @@ MULTIPLIER_TOLERANCE = 1e10  # absolute: multipliers have no error control
 class ResidualEquations:
     """Residual F of one system as machine code.
 
-    Parameters
-    ----------
-    program : Program
-        The system.
-
     Raises
     ------
     SimulationError

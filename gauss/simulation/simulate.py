@@ -25,12 +25,15 @@ from gauss.simulation.constraint_surfaces import across_surfaces
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.energy_balance import watch_balance
 from gauss.simulation.history import History
+from gauss.simulation.moreau.sleeping import Sleeping, checked_sleeping
 from gauss.simulation.prescribed import beside_jumps
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.simulation.verify import verified
 from gauss.system import State, System
+
+SLEEPING_PLAN = Plan("time stepping", "pair kernels")  # of motions whose bodies sleep
 
 
 @named_arguments
@@ -50,6 +53,7 @@ def simulate(
     breaks=(),
     control=None,
     rate: float | None = None,
+    sleeping: bool | Sleeping = False,
     verify: bool = False,
     progress: bool = True,
     plan: Plan | None = None,
@@ -111,6 +115,10 @@ def simulate(
         system of the trajectory has drives by these values for its inputs. Without it the inputs are zero.
     rate : float, optional
         Samples of the law in a second [Hz]; the first is at the start.
+    sleeping : bool or Sleeping
+        By time stepping of free bodies: islands of bodies that touch each other sleep once they have been slow for a while
+        (:class:`Sleeping`), and cost next to nothing until another body pushes them. Their kinetic energy counts as
+        dissipated; events "sleeps" and "wakes" name the bodies.
     verify : bool
         Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool
@@ -156,10 +164,12 @@ def simulate(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
         problem = problem._replace(held=held_inputs(problem, control, rate))
+        problem = problem._replace(sleeping=checked_sleeping(sleeping, problem))
         settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
         if not isinstance(problem.method, FixedStep):
             history.refuse_random(problem.system, problem.start)
-        found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
+        wanted = SLEEPING_PLAN if problem.sleeping is not None and plan is None else plan
+        found = _simulated(problem, plan_of(problem.question, wanted), settings, verify, run)
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)
     history.warn(found)

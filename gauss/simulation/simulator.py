@@ -7,13 +7,13 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from gauss.arguments import named_arguments
 from gauss.codegen import one_tier
-from gauss.codegen.kernels import Due, LoopStatus
+from gauss.codegen.kernels import LoopStatus
 from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
@@ -26,16 +26,15 @@ from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, random_changes
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_runs import fixed_run
-from gauss.simulation.held_inputs import FLOAT, HeldInputs, checked_inputs
+from gauss.simulation.held_inputs import FLOAT, HeldInputs, as_floats, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
-from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
-from gauss.simulation.moreau.unseen_contacts import PassingWatch
-from gauss.simulation.passed_switching import StepsAhead
+from gauss.simulation.simulator_state import SimulatorState
+from gauss.simulation.step_ends import StepEnds
 from gauss.simulation.step_limits import steps_per_check
+from gauss.simulation.step_watch import StepWatch
 from gauss.simulation.tolerances import check_tolerances, checked_count
-from gauss.simulation.undetected_switching import warn_of_undetected
 from gauss.system import State, System, retract
 
 FAILURES = {
@@ -44,43 +43,19 @@ FAILURES = {
     LoopStatus.UNSOLVED: "the equations of the step were not solved",
     LoopStatus.NOT_FINITE: "the motion is not finite",
 }
-STEP_NUMBERS = 6  # in memory for each step of a call
-FEW_STEPS = 16  # so many times are written one by one in less time than as arrays
 STEPS = {("compiled loop", code) for code in ("embedded loops", "compiled", "callbacks")}
 STEPS |= {("time stepping", code) for code in ("compiled", "pair kernels", "callbacks")}
-
-
-class SimulatorState(NamedTuple):
-    """State of a simulator, opaque.
-
-    Attributes
-    ----------
-    point, control : bytes
-        Point of the motion and record of its loop.
-    begun : float
-        Time of the state that the motion began from [s].
-    steps : int
-        Steps since then.
-    contacts : object
-        Contacts that the next step starts from, where the point does not hold them.
-    of : tuple
-        Step and methods of the simulator; any where empty.
-    """
-
-    point: bytes
-    control: bytes
-    begun: float
-    steps: int
-    contacts: Any = None
-    of: tuple = ()
 
 
 class Simulator:
     """Motion of a scene in fixed steps, one call after the other.
 
-    Steps do not end where laws switch: a warning names the first feature of a law of time that is shorter than the steps, or
-    the first jump, and laws of the state that may have switched undetected; prescribed velocities must not jump.
-    Opaque laws are called by the machine code of the steps; nothing is known of them between its calls.
+    Steps do not end where laws switch: warnings name the first feature of a law of time that is shorter than the steps, the
+    first jump, and laws of the state that may have switched undetected; prescribed velocities must not jump. A jump of a law
+    makes the step around it of order 1; at the end of a step it does so with methods that evaluate the law there ("rk4",
+    "verlet", "generalised_alpha"), and does no harm with others ("gauss4", "variational_midpoint", "energy_momentum").
+    Values that change from step to step are best given as inputs, which are held within each step.
+    Opaque laws are called by the machine code of the steps; nothing is known of them between its calls but at ``breaks``.
 
     Parameters
     ----------
@@ -142,8 +117,7 @@ class Simulator:
             if (plan.driver, plan.dynamics) not in STEPS:
                 why = "; ".join(map(str, plan.rejected)) or "nothing in it can move"
                 raise SimulationError(f"steps of {whole.name!r} are not compiled: {why}.")
-            self._ahead = StepsAhead(self.system, problem.laws, self.step_size)
-            self._ahead.look(problem.start, problem.start.t + self.step_size)
+            self._watch = StepWatch(self.system, problem.laws, problem.start, self.step_size, method)
             problem = problem._replace(switching=Switching())
             run: CompiledFixedRun | PairKernelSteps
             run = PairKernelSteps(problem) if plan.dynamics == "pair kernels" else fixed_run(problem, plan.dynamics)
@@ -153,13 +127,11 @@ class Simulator:
         self._point, self._confirmed = np.zeros(run.layout.size), np.zeros(run.layout.size)
         self._u, self._before = self._point[run.layout.size - n_u :], self._point.tobytes()
         self._values: Any = self._u.data
-        rates = self._point[1 + run.layout.n_q :][: run.layout.n_v]
-        self._rates, self._passing = rates, PassingWatch(self.system, self.step_size)
-        self._out, self._grid = np.empty((0, run.layout.row)), _unchecked(1)
+        self._rates = self._point[1 + run.layout.n_q :][: run.layout.n_v]
+        self._out, self._ends = np.empty((0, run.layout.row)), StepEnds(self.step_size)
         run.control.every = steps_per_check(method.evaluations)
         self._begun, self._steps, self._options = 0.0, 0, (self.step_size, integrator, stabilisation)
-        watch = run.program.watch
-        self._switches, self._warned = bool(watch or watch.phases), False
+        self._switches = bool(run.program.watch or run.program.watch.phases)
         self._measure: Callable[[np.ndarray], np.ndarray] | None = None
         self._bind()
         self.reset()
@@ -172,11 +144,15 @@ class Simulator:
         """Functions of the smooth system."""
         return self._run.program
 
+    @property
+    def warned_of(self) -> set[str]:
+        """What was warned of laws of time."""
+        return self._watch.warned_of
+
     def _bind(self):
-        """Keep the addresses of the arrays of the loop; a grid has all steps of a call."""
-        self._given: tuple = self._run.arrays(self._point, self._confirmed, self._grid, self._out)
-        self._times = self._grid[:, 0]
-        self._end: Any = self._grid.data.cast("B").cast("d")  # the first number is the end of the first step
+        """Keep the addresses of the arrays of the loop."""
+        self._given: tuple = self._run.arrays(self._point, self._confirmed, self._ends.grid, self._out)
+        self._end: Any = self._ends.grid.data.cast("B").cast("d")  # the first number is the end of the first step
 
     def reset(self, state: State | None = None, *, seed: int | None = None, spread: float = 0.05) -> State:
         """Begin anew; inputs are zero until the next step.
@@ -216,10 +192,8 @@ class Simulator:
         self._point[:] = run.begun(start)
         self._confirmed[:] = self._point
         self._begun, self._steps = float(self._point[0]), 0
-        self._seen = 0.0 if self._passing.has_pairs else self._ahead.seen_from(self._begun)
         run.control.steps = run.control.status = run.control.unseen = 0.0
-        self._warned = False
-        self._passing.begin()
+        self._watch.begin(self._begun)
         return self.state
 
     def step(self, u=None, n: int = 1):
@@ -236,8 +210,8 @@ class Simulator:
         Warns
         -----
         SwitchingWarning
-            Once for each motion, if a law of the state may have switched undetected within a step; every ten thousand
-            steps, if a law of time jumps, or has a feature shorter than the step, in the next ones.
+            Once for each motion, if a law of the state may have switched undetected within a step; once for all motions, if
+            a law of time jumps, and if it has a feature shorter than the step, in the next ten thousand steps.
         ContactLawWarning
             Once for each motion, if shapes may pass through each other unseen at the rates where a call begins or ends.
 
@@ -256,8 +230,10 @@ class Simulator:
         else:
             self._plan_steps(n)
         try:
-            if self._steps > self._seen:
-                self._look_ahead()
+            if self._steps > self._watch.seen:
+                if self._watch.has_pairs:
+                    self._look_for_passing()
+                self._watch.look_ahead(self.state, self._begun, self._steps)
             self._loop.call(*self._given, n)
         except BaseException:  # Ctrl-C, or of an opaque law
             self._steps, self._point[:] = self._steps - n, np.frombuffer(self._before)
@@ -265,26 +241,16 @@ class Simulator:
         if self._run.control.status:
             self._recover(n)
         if self._switches and self._run.control.unseen:
-            self._warn_of_switching()
-        if self._passing.has_pairs:
-            self._passing.examine(self._rates.dot(self._rates), self._steps, lambda: [("", self.state)])
+            self._run.control.unseen = 0.0
+            self._watch.switched(self.t)
+        if self._watch.has_pairs:
+            self._look_for_passing()
 
-    def _look_ahead(self):
-        """Look at the shapes, and for switching of laws of time in steps that are to be made, and beyond them."""
-        if self._passing.has_pairs:
-            self._passing.examine(self._rates.dot(self._rates), self._steps, lambda: [("", self.state)])
-        self._ahead.look(self.state, self._begun + self._steps * self.step_size)
-        self._seen = self._ahead.seen_from(self._begun)
-
-    def _warn_of_switching(self):
-        """Warn of a law of the state that may have switched undetected within a step, once for each motion."""
-        self._run.control.unseen = 0.0
-        if not self._warned:
-            self._warned = True
-            warn_of_undetected(self.system.scene.name, f"before t = {self.t:.6g} s, within a step of {self.step_size:g} s,")
+    def _look_for_passing(self):
+        self._watch.look(self._rates, self._steps, lambda: self.state)
 
     def _set(self, u):
-        given = u if type(u) is np.ndarray and u.dtype is FLOAT else _floats(u)
+        given = u if type(u) is np.ndarray and u.dtype is FLOAT else as_floats(u)
         if given is None or given.shape != self._u.shape or not isfinite(sum(given.tolist())):
             given = checked_inputs(u, self.inputs, self.t)
         try:
@@ -298,27 +264,18 @@ class Simulator:
             self._point[:] = self._layout.pack(replace(point, rates=rates, method_state=rates.acceleration), self._u.copy())
 
     def _plan_steps(self, n: int):
-        """Write the ends of steps to the grid."""
-        if type(n) is not int or not 0 < n <= len(self._grid):
-            n = self._room_for(checked_count("n", n))
-        begin, h, first = self._begun, self.step_size, self._steps + 1
-        few = n <= FEW_STEPS
-        self._times[:n] = (
-            [begin + h * k for k in range(first, first + n)] if few else begin + h * np.arange(first, first + n)
-        )
+        """Write the ends of steps."""
+        if type(n) is not int or not 0 < n <= len(self._ends.grid):
+            n = checked_count("n", n)
+            if n > len(self._ends.grid):
+                self._ends.make_room(n)
+                self._bind()
+        self._ends.write(self._begun, self._steps + 1, n)
         self._steps += n
-
-    def _room_for(self, n: int) -> int:
-        """Let the grid hold the steps of a call, of which it returns the number."""
-        refuse_beyond_memory(STEP_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
-        if n > len(self._grid):
-            self._grid = _unchecked(n)
-            self._bind()
-        return n
 
     def _recover(self, n: int):
         """Repeat steps of contacts in Python; raise a SimulationError where a step has failed."""
-        control, ends, before = self._run.control, self._times[:n].copy(), self._steps - n
+        control, ends, before = self._run.control, self._ends.times[:n].copy(), self._steps - n
         while control.status:
             status, control.status = LoopStatus(int(control.status)), 0.0
             reached = int(np.searchsorted(ends, self._point[0], side="right"))
@@ -329,7 +286,7 @@ class Simulator:
             if not np.isfinite(self._point[: self._layout.row]).all():
                 self._refuse(before, FAILURES[LoopStatus.NOT_FINITE])
             rest = ends[reached + 1 :]
-            self._steps, self._times[: rest.size] = before + n, rest
+            self._steps, self._ends.times[: rest.size] = before + n, rest
             if rest.size:
                 self._loop.call(*self._given, rest.size)
 
@@ -375,7 +332,8 @@ class Simulator:
     def snapshot(self) -> SimulatorState:
         """Present state of the simulator, to the last bit; of the same scene and step, any simulator can restore it."""
         point, run = self._point.tobytes(), self._run
-        return SimulatorState(point, bytes(run.control), self._begun, self._steps, run.kept(), self._options)
+        control, kept, watched = bytes(run.control), run.kept(), self._watch.kept()
+        return SimulatorState(point, control, self._begun, self._steps, kept, self._options, watched)
 
     def restore(self, snapshot: SimulatorState):
         """Continue from a snapshot.
@@ -392,7 +350,7 @@ class Simulator:
         self._point[:] = point
         ctypes.memmove(ctypes.byref(self._run.control), snapshot.control, len(snapshot.control))
         self._begun, self._steps = snapshot.begun, snapshot.steps
-        self._seen = self._ahead.seen_from(self._begun)
+        self._watch.go_on(self._begun, snapshot.watched)
         self._run.take(snapshot.contacts)
 
 
@@ -401,17 +359,3 @@ def _again(given: tuple, snapshot: SimulatorState) -> Simulator:
     simulator = Simulator(*given)
     simulator.restore(snapshot)
     return simulator
-
-
-def _unchecked(n: int) -> np.ndarray:
-    """Grid (n, 2) of steps that are checked every few steps, not where a call ends."""
-    return np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
-
-
-def _floats(u) -> np.ndarray | None:
-    if np.ma.is_masked(u):
-        return None
-    try:
-        return np.asarray(u, dtype=float)
-    except (TypeError, ValueError, RuntimeError):  # the last of torch
-        return None

@@ -14,8 +14,9 @@ from gauss import rotations
 from gauss.arguments import real_numbers
 from gauss.codegen import content_key, trace
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.dynamics.outputs import FORCES, INERTIAL, OF_JOINTS, joint_forces, measured, shape_of
+from gauss.dynamics.outputs import FORCES, OF_JOINTS, joint_forces, shape_of
 from gauss.dynamics.rules import Plan
+from gauss.dynamics.sensor_values import INERTIAL, measured
 from gauss.dynamics.state_functions import distance_of_loops
 from gauss.errors import RecordedMotionWarning, StateError, did_you_mean, require
 from gauss.shapes import Shaped

@@ -60,13 +60,6 @@ def defect_is_large(
 def warn_of_switching(trajectory: Trajectory, method: Integrator):
     """Warn where a law may have switched between two evaluations.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-        Motion.
-    method : Integrator
-        Its integrator.
-
     Warns
     -----
     SwitchingWarning

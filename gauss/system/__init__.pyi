@@ -20,8 +20,8 @@ from gauss.system.manifold import (
     velocity_lead,
 )
 from gauss.system.named_access import View
+from gauss.system.passes import Stage
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
-from gauss.system.reduction import Stage
 from gauss.system.relations import Relations
 from gauss.system.scale import Scale
 from gauss.system.state import State

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.errors import AssemblyError, GaussError, SimulationError, listed
 
-MOST_REASONS = 5  # number of reasons of a pass that are listed
+MOST_REASONS = 5  # of a pass, or of a rule of the plan, that are listed
 RANK_ROWS = 150  # number of loop constraints up to which freedoms are counted by rank: the time grows with its cube
 CLOSE_ROUTES = 1.5  # ratio of estimated costs up to which two routes are called equally fast
 MOST_LISTED = 40  # number of joints and names in a list

@@ -1,9 +1,8 @@
 """Refusal of functions of the user that have changed since they were differentiated.
 
 Efforts are evaluated in every motion and may change from one to the next. Residuals, gap functions and prescribed motions
-are
-differentiated once, when the system is built. A function that changes afterwards, by a variable that it closes over, would
-leave the rows of another mechanism.
+are differentiated once, when the system is built. A function that changes afterwards, by a variable that it closes over,
+would leave the rows of another mechanism.
 """
 
 from dataclasses import fields

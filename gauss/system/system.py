@@ -22,9 +22,9 @@ from gauss.system.dynamics_protocol import Dynamics
 from gauss.system.explain import explain
 from gauss.system.frozen_functions import refuse_changed
 from gauss.system.named_places import NamedPlaces
+from gauss.system.passes import Stage, reduction
 from gauss.system.pickling import rebuilding
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
-from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations, place_relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State

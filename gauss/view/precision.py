@@ -31,11 +31,6 @@ def plot_precision(panels, path=None, title: str = "", note: str = "", uncertain
         Above and below the panels.
     uncertainties : dict, optional
         {name of the scene: how far its reference may be off [m]}, drawn as a band.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
     """
     columns = min(WIDE, len(panels))
     rows = -(-len(panels) // columns)

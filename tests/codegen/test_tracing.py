@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 
 from gauss import math, rotations
 from gauss.codegen import (
+    Expression,
     Function,
     Graph,
     Kernel,
     count,
     forward,
     jacobian,
+    numbers_of,
     object_cache,
     object_code,
     processor,
@@ -275,3 +277,21 @@ def test_substitution_folds_what_becomes_constant():
     kernel = Kernel(Function("before", [x, y], outputs)), Kernel(Function("after", [x], list(folded)))
     assert kernel[1]([0.7]) == pytest.approx(kernel[0]([0.7, 0.0]), abs=1e-15)
     assert substitute([x * y], [x], [y])[0] is y * y
+
+
+@given(st.floats(-5.0, 5.0), st.floats(0.1, 5.0))
+def test_numbers_of_expressions_are_those_that_substitution_folds_to(a, b):
+    graph = Graph()
+    symbols = [graph.symbol("a"), graph.symbol("b")]
+    outputs = [*everything(symbols), math.floor(symbols[0]), graph.constant(2.0), 3.0]
+    folded = substitute(outputs, symbols, [a, b])
+    known = [one.value if isinstance(one, Expression) else one for one in folded]
+    np.testing.assert_array_equal(numbers_of(outputs, symbols)([a, b]), known)
+
+
+def test_calls_have_no_numbers():
+    graph = Graph()
+    x = graph.symbol("x")
+    (called,) = graph.call(Function("inner", [x], [np.sin(x)]), [x])
+    with pytest.raises(TypeError, match="call"):
+        numbers_of([called], [x])

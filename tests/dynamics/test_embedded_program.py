@@ -7,10 +7,10 @@ import pytest
 
 import gauss
 from gauss.codegen import Kernel, write
-from gauss.dynamics import embedded_program
-from gauss.dynamics.embedded_program import EmbeddedProgram
+from gauss.dynamics import programs
 from gauss.dynamics.front_rank import Embedding
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.programs import EmbeddedProgram
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.traced_system import Program
@@ -76,7 +76,7 @@ def test_a_batch_makes_the_motions_of_the_general_elimination():
 @pytest.mark.parametrize("method", [{}, RK4], ids=["dop853", "rk4"])
 def test_a_motion_near_a_singular_front_goes_on_with_the_general_elimination(method, monkeypatch):
     """A stretched leg cannot meet its own rows, though the platform moves on."""
-    monkeypatch.setattr(embedded_program, "embedding_of", lambda system: Embedding())
+    monkeypatch.setattr(programs, "embedding_of", lambda system: Embedding())
     system = gauss.compile_scene(replace(_platform("revolute", reach=2.0), gravity=(0.0, 0.1, -9.7)))  # a scene of its own
     found, expected = (gauss.simulate(system, 0.01, plan=plan, progress=False, **method) for plan in (EMBEDDED, GENERAL))
     assert found.stats.handed_over is not None and expected.stats.handed_over is None

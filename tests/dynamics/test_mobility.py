@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.backends.closure import Factor
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor
 from gauss.errors import AssemblyError, NonUniqueReactionWarning, SceneError
 from tests.support import mechanisms
 

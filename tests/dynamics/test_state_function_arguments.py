@@ -195,6 +195,18 @@ def test_no_result_is_infinite(arm, name, power):
             assert np.isfinite(arm.function(name)(q, rates, *([0.0 * v] if name == "inverse_dynamics" else []))).all()
 
 
+@pytest.mark.slow
+def test_a_number_that_is_not_finite_is_found_wherever_it_stands(arm):
+    (q,), (v,) = states(arm, 1)
+    for function in (arm.function("inverse_dynamics"), arm.forward_dynamics):
+        for k in range(q.size + 2 * v.size):
+            for wrong in (np.nan, np.inf, -np.inf):
+                given = np.concatenate([q, v, v])
+                given[k] = wrong
+                with pytest.raises(StateError, match="finite"):
+                    function(*np.split(given, [q.size, q.size + v.size]))
+
+
 @pytest.mark.parametrize("name", ["coriolis_matrix", "momentum"])
 def test_results_that_are_linear_in_the_rates_do_not_overflow(arm, name):
     (q,), (v,) = states(arm, 1)

@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 import gauss
 from gauss import math as gm
 from gauss.codegen import Graph, branches
+from gauss.dynamics.laws import switching_times
+from gauss.dynamics.laws.affine_conditions import affine_changes
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.sampled_laws import sampled_times
 from gauss.dynamics.laws.switching import switching
-from gauss.dynamics.laws.switching_times import timetable
+from gauss.dynamics.laws.switching_times import CONDITIONS, timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from tests.support.switching import bell, slider
 
@@ -129,6 +131,43 @@ def test_all_switching_times_are_found(places, waves):
     close = 1e-13  # of ten seconds: times nearer than that are one
     assert all(np.abs(found - place).min() < close for place in expected)
     assert all(np.abs(expected - place).min() < close for place in found)
+
+
+AFFINE = {
+    "ramp": lambda x, y: 2.0 * x - 3.0,
+    "sum": lambda x, y: x + y,
+    "difference": lambda x, y: x / 3.0 - y,
+    "negative": lambda x, y: -x,
+    "clipped": lambda x, y: gm.clip(x, -1.0, 1.0),
+    "larger": gm.maximum,
+    "gate": lambda x, y: gm.where(x < y, x, 1.0 - y),
+    "absolute": lambda x, y: gm.abs(x - 4.0),
+    "product": lambda x, y: x * y,  # affine where one is constant
+    "quotient": lambda x, y: x / (gm.abs(y) + 1.0),
+}
+
+
+@pytest.mark.slow
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from([*AFFINE]), st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=6))
+def test_roots_of_piecewise_affine_conditions_are_those_that_bisection_finds(steps):
+    graph = Graph()
+    t = graph.symbol("t")
+    made = [t, 5.0 - t, t * 0.5]
+    for name, first, second in steps:
+        made.append(AFFINE[name](made[first % len(made)], made[second % len(made)]))
+    conditions = [switching_times._condition(node) for node in switching_times.of_time(made, t) if node.op in CONDITIONS]
+    apart = 1e-13  # of ten seconds, as above
+    known, others = affine_changes(conditions, t, 0.0, 10.0, apart)
+    found = np.append(known, switching_times._searched(others, t, 0.0, 10.0, []))
+
+    def changes(place: float) -> bool:
+        time = {t.index: Interval.point(np.array([place - apart, place + apart]))}
+        return any(np.ptp(np.broadcast_to(value.low, 2)) > 0 for value in enclose(conditions, time))
+
+    for place in switching_times._searched(conditions, t, 0.0, 10.0, []):  # lines that only touch change nothing
+        assert np.abs(found - place).min(initial=np.inf) < apart or not changes(place)
+    assert all(changes(place) for place in known)
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import pytest
 import gauss
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning
+from gauss.scene.toml import toml_text
 from gauss.system import State, random_state
 from gauss.system.frames import relative
 from tests.support.mechanisms import four_bar
@@ -176,6 +177,14 @@ def test_limits_become_stops_on_request(tmp_path, upper, expected):
         _load(tmp_path, text, limits="stop")
 
 
+def test_contact_coefficients_of_a_link_are_named(tmp_path):
+    text = _sdf(four_bar("ABCD"))
+    path = tmp_path / "model.sdf"
+    path.write_text(text.replace("<inertial", "<contact><lateral_friction>1</lateral_friction></contact><inertial", 1))
+    with pytest.warns(NotImportedWarning, match="not read: contact coefficients of links"):
+        assert toml_text(gauss.load(path)) == toml_text(_load(tmp_path, text))
+
+
 def test_a_public_robot_with_loops():
     path = next(f for f in _robot_files() if f.name == "cassie_v2.sdf").locate()
     with pytest.warns(NotImportedWarning, match="not read: collisions, plugins, damping and friction of ball joints"):
@@ -199,7 +208,7 @@ REFUSED = {  # the model, what the message says, and the line
     "no number": (LINK + HINGE.format("revolute", "<axis>\n<xyz>0 x 1</xyz></axis>"), "<xyz> needs 3 numbers", 3),
     "an unknown child": (LINK + HINGE.format("ball", "").replace(">b<", ">bb<"), "no link, joint or frame 'bb'. Did you", 2),
     "a pose of itself": ('<link name="a"><pose relative_to="a">0 0 0 0 0 0</pose></link>', "relative to itself", 2),
-    "a name twice": ('<link name="a"/>\n<link name="a"/>', "'a' is missing, reserved or taken", 3),
+    "a name twice": ('<link name="a"/>\n<link name="a"/>', "'a' of <link> is taken by <link>", 3),
     "a nested model without links": (LINK + '\n<model name="n"/>', "no links", 3),
     "an include without a file": ("<include><uri>model://x</uri></include>", "no such model", 2),
     "a screw that does not turn": (

@@ -238,7 +238,7 @@ REFUSED = {
     "a state": (_world(WHOLE, "<state/>"), "<state> is not read"),
     "an unknown part of a world": (_world(WHOLE, "<magic/>"), "<magic> of world 'w' is not modelled"),
     "a name of another scope": (_world(WHOLE, HINGE.format("J", "world", "m::c")), "no link, joint or frame 'c'"),
-    "a model twice": (_world(WHOLE, WHOLE), "'m' is missing, reserved or taken"),
+    "a model twice": (_world(WHOLE, WHOLE), "'m' of <model> is taken by <model>"),
     "a frame of itself": (_model("m", UPPER, '<frame name="f" attached_to="f"/>'), "attached to itself"),
     "a file outside": ("<include><uri>../../secret.sdf</uri></include>", "no such model"),
     "no uri": ("<include/>", "without <uri>"),

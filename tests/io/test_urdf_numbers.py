@@ -224,3 +224,19 @@ def test_other_parsers_agree_with_the_file_as_it_is(tmp_path):
         body = scene.bodies[name]
         assert body.mass == model.inertias[index].mass
         assert (np.array(body.com) == model.inertias[index].lever).all()
+
+
+def test_one_scale_of_a_mesh_is_that_of_all_axes(tmp_path):
+    corners = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\n"
+    (tmp_path / "m.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    box = '<box size="0.1 0.2 0.3"/>'
+    one, three = (
+        _load(tmp_path, ARM.replace(box, f'<mesh filename="m.obj" scale="{scale}"/>'), collisions=True)
+        for scale in ("0.5", "0.5 0.5 0.5")
+    )
+    assert toml_text(one) == toml_text(three)
+
+
+@pytest.mark.parametrize("head", ['\n <?xml version="1.0"?>', "<!-- two -- dashes -->"])
+def test_a_beginning_that_xml_does_not_allow_is_read_as_others_do(tmp_path, head):
+    assert toml_text(_load(tmp_path, head + ARM)) == toml_text(_load(tmp_path, ARM))

@@ -244,6 +244,8 @@ def controlled():
     for kind in ("position", "velocity", "angular_velocity", "acceleration", "accelerometer", "gyroscope"):
         scene.output(f"{kind} of a body", kind, body)
         scene.output(f"{kind} of a point", kind, "tip", at=(0.2, 0.1, 0.0))
+    scene.output("seen from the tip", "velocity", list(scene.bodies)[0], at=(0.2, 0.1, 0.0), relative_to="tip")
+    scene.output("momentum", "angular_momentum", list(scene.bodies)[0])
     return scene
 
 
@@ -256,6 +258,14 @@ def test_inputs_act_and_outputs_measure_the_same(tmp_path):
     for name in scene.outputs:
         expected, found = (motion.output(name)[-1] for motion in motions)
         assert found == pytest.approx(expected, rel=1e-7, abs=1e-7), name  # two motions of relative accuracy 1e-12
+
+
+def test_outputs_seen_from_a_frame_that_moves_in_urdf_are_refused(tmp_path):
+    scene = two_bodies("revolute")
+    for body in scene.bodies:
+        scene.output(f"from {body}", "position", "ground", relative_to=body)
+    with pytest.raises(FileError, match="measure from a named frame"):
+        again(scene, tmp_path)
 
 
 AMBIGUOUS = {

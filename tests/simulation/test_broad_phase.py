@@ -56,7 +56,7 @@ def test_a_grid_finds_the_contacts_of_all_pairs(name, monkeypatch):
         monkeypatch.setattr(near_detection, "MOST_LISTED", most)
         stepper = FreeBodyStepper(system)
         assert (len(stepper.detection.pair) > 0) == (most > 0)
-        bodies = stepper._begin(system.initial_state(), 0.0, 0.0).bodies
+        bodies = stepper.begin(system.initial_state(), 0.0, 0.0).bodies
         found.append([stepper.detection.find(bodies, reach, 0.5) for reach in (0.0, 0.03, 0.3, 100.0)])
     assert any(near.key.size for near, _ in found[0])
     for (listed, one), (gridded, other) in zip(*found, strict=True):
@@ -71,6 +71,6 @@ def test_positions_without_a_number_have_no_contacts(most, monkeypatch):
     monkeypatch.setattr(near_detection, "MOST_LISTED", most)
     system = gauss.compile_scene(CLOUDS["sizes alike"]())
     stepper = FreeBodyStepper(system)
-    bodies = stepper._begin(system.initial_state(), 0.0, 0.0).bodies
+    bodies = stepper.begin(system.initial_state(), 0.0, 0.0).bodies
     assert stepper.detection.find(bodies, 0.1)[0].key.size
     assert not stepper.detection.find(bodies * np.nan, 0.1)[0].key.size

@@ -12,6 +12,7 @@ from gauss.dynamics.contact.free_body_step import FreeBodyStepper, rates
 from gauss.dynamics.gap_functions import gaps, slips
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SceneError, StateError
+from gauss.simulation.moreau.contact_motion import ContactMotion
 from gauss.system import State
 
 STEP = 1e-3  # [s]
@@ -59,7 +60,7 @@ def test_kernels_of_pairs_are_the_gap_functions_of_the_scene(one, other):
             q[k + 3 : k + 7] /= np.linalg.norm(q[k + 3 : k + 7])
         motion = kinematics(system, State(0.0, q, v))
         found, across = gaps(motion), slips(motion)
-        begun = stepper._begin(motion.state, 0.0, 0.0)
+        begun = stepper.begin(motion.state, 0.0, 0.0)
         near, _ = stepper.detection.find(begun.bodies, 10.0)
         places = stepper.table.gap_places(near.key)
         missing = np.setdiff1d(np.arange(found.width.size), places)
@@ -156,7 +157,7 @@ def test_near_contacts_are_all_that_are_nearer():
     scene.contacts_all()
     system = gauss.compile_scene(scene)
     stepper = FreeBodyStepper(system)
-    bodies = stepper._begin(system.initial_state(), 0.0, 0.0).bodies
+    bodies = stepper.begin(system.initial_state(), 0.0, 0.0).bodies
     every = stepper.detection.find(bodies, 10.0)[0]
     for reach in (0.0, 0.05, 0.2):
         near = stepper.detection.find(bodies, reach)[0]
@@ -216,3 +217,14 @@ def test_a_box_that_comes_over_the_rim_of_a_table_slides_on(speed, width):
     motion = moved(scene, 0.5)
     assert motion.q[-1, :3] == pytest.approx([-0.45 + 0.5 * speed, 0.0, 0.1], abs=DEPTH)
     assert motion.v[-1] == pytest.approx([speed, 0, 0, 0, 0, 0], abs=DEPTH)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("h", [1e-3, 5e-4])
+def test_dominoes_with_redundant_contacts_meet_the_laws_in_each_step(h):
+    system = gauss.compile_scene(dominoes(10, push=3.0))
+    motion = ContactMotion(system)
+    motion.begin(system.initial_state())
+    motion.advance(h * np.arange(1.0, round(0.6 / h) + 1.0))
+    assert motion.relaxed == 0
+    assert motion.largest <= LAWS

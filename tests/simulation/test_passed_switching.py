@@ -8,9 +8,11 @@ import pytest
 import gauss
 from gauss import math as gm
 from gauss.errors import SimulationError, SwitchingWarning
+from gauss.integrators import METHODS, FixedStep
 from tests.support.switching import bell, slider
 
 STEP = 0.01
+ROUNDING = 1e-11  # of a rate, relative to a step at full force: of some hundred steps
 LATE = 150.003  # s: beyond ten thousand steps, and at no end of one
 STEPS = 15_200
 
@@ -100,3 +102,68 @@ def test_steps_before_a_late_jump_are_made():
 def test_a_narrow_peak_of_a_prescribed_speed_is_warned_of():
     with pytest.warns(SwitchingWarning, match="pass over a feature"):
         gauss.Simulator(led(bell(1e-3, 3.0)), STEP)
+
+
+FIXED = [name for name, method in METHODS.items() if isinstance(method, FixedStep) and method.order > 1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", ["end", "inside"])
+@pytest.mark.parametrize("name", FIXED)
+def test_a_jump_is_warned_of_where_it_costs_accuracy(name, place):
+    """The right rate after a force of one newton is the time since it began."""
+    begin = 0.33 if place == "end" else 0.3337
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        stepped = gauss.Simulator(slider(lambda t: gm.where(t < begin, 0.0, 1.0)), STEP, name)
+        stepped.step(n=120)
+    error = abs(stepped.coordinates[1].item() - (stepped.t - begin)) / STEP
+    assert [one.category for one in heard] == [SwitchingWarning] * (error > ROUNDING)
+    assert METHODS[name].evaluates_end == (error > ROUNDING) or place == "inside"
+
+
+ROWS = STEP * np.arange(40)
+TABLES = {  # and a method whose steps, which end at its rows, are not of order 1
+    "lines": (lambda t: gm.interp(t, ROWS, np.sin(9.0 * ROWS)), "rk4"),
+    "held values": (lambda t: sum(gm.where(t < row, 0.0, np.sin(row)) for row in ROWS), "gauss4"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_whose_rows_are_ends_of_steps_are_not_warned_of(name):
+    law, method = TABLES[name]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gauss.Simulator(slider(law), STEP, method).step(n=40)
+
+
+def opaque(t):
+    return 1.0 if float(t) > 0.3337 else 0.0
+
+
+ONCE = {  # and steps between two starts
+    "traced": (lambda: slider(lambda t: gm.floor(0.7 * t)), 12_000),
+    "opaque": (lambda: slider(opaque, breaks=[0.3337]), 40),
+    "many jumps": (lambda: slider(lambda t: gm.floor(7.0 * t)), 12_000),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ONCE)
+@pytest.mark.parametrize("make", [gauss.Simulator, lambda *given: gauss.SimulatorBatch(*given, 2)])
+def test_a_jump_is_warned_of_once_however_often_a_motion_begins_anew(make, law):
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        scene, steps = ONCE[law]
+        stepped = make(scene(), STEP)
+        for _ in range(3):
+            stepped.step(n=steps)
+            stepped.reset()
+    assert [one.category for one in heard] == [SwitchingWarning]
+
+
+def test_steps_of_order_one_are_not_warned_of_jumps_that_they_resolve():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gauss.Simulator(slider(lambda t: gm.where(t < 0.3337, 0.0, 1.0)), STEP, "semi_implicit_euler").step(n=120)

@@ -168,7 +168,6 @@ SHORT = {
     "bell": lambda t: gauss.math.exp(-(((t - 5) / 1e-3) ** 2)),
 }
 LASTING = {
-    "pulse": lambda t: 10.0 if 5 <= t < 6 else 0.0,
     "sine": lambda t: gauss.math.sin(20.0 * t),
     "move": gauss.scene.profiles.Move(0.0, 1.0, 1.0, 2.0),
 }

@@ -87,3 +87,38 @@ def test_shapes_that_become_fast_are_warned_of(way):
     scene = replace(thrown("box", 0.0, 0.0), gravity=(0.0, 0.0, -fall))
     with pytest.warns(ContactLawWarning, match="'ball' and 'wall'|'wall' and 'ball'"):
         assert way(scene, 3) < STOPPED
+
+
+MADE = {
+    "one": lambda scene: gauss.Simulator(scene, STEP),
+    "batch": lambda scene: gauss.SimulatorBatch(scene, STEP, 2),
+    "in turn": lambda scene: gauss.SimulatorBatch(_pulled(scene), STEP, 2),
+}
+
+
+def _pulled(scene: gauss.Scene) -> gauss.Scene:
+    """The scene with an opaque law, for which a batch makes its steps one motion after the other."""
+    scene.force("pull", "A", lambda t: (1e-3 * float(t), 0.0, 0.0))
+    return scene
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("made", MADE)
+def test_a_restored_motion_is_watched_as_it_was(made):
+    speed = PASSING * (THICK + 2 * RADIUS) / STEP
+    fast, slow = (MADE[made](thrown("box", 0.0, share * speed)) for share in (1.0, 0.15))
+    begun = fast.snapshot()
+    for _ in range(2):
+        with pytest.warns(ContactLawWarning, match="'ball' and 'wall'|'wall' and 'ball'"):
+            fast.step()
+        after = fast.snapshot()
+        fast.restore(begun)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ContactLawWarning)
+        fast.restore(after)
+        fast.step()
+        fast.restore(slow.snapshot())
+        fast.step(n=3)
+    with pytest.warns(ContactLawWarning):
+        slow.restore(begun)
+        slow.step()

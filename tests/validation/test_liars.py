@@ -17,7 +17,8 @@ from gauss.backends import Answer, make
 from gauss.backends.certificate import TOLERANCE
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.factorisation import factored
-from gauss.backends.programme import FORMS, Outcome, Programmed
+from gauss.backends.programme import FORMS, Outcome
+from gauss.backends.programmed import Programmed
 from gauss.bench.problems import make_problem
 from gauss.system import random_state
 from tests.support import mechanisms

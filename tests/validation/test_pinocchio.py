@@ -19,7 +19,7 @@ from gauss.analysis.crosscheck.pinocchio_dynamics import (
 )
 from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.backends import make
-from gauss.backends.recursion import Factor
+from gauss.backends.closure import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied

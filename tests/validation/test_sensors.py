@@ -22,13 +22,36 @@ def turntable():
     scene.output("turning", "gyroscope", "imu")
     scene.output("felt", "accelerometer", "imu", at=(0.05, 0.0, 0.0))
     scene.output("accelerated", "acceleration", "arm", at=(0.5, 0.0, 0.0))
+    scene.output("moved", "velocimeter", "imu")
+    scene.output("forward", "y_axis", "arm")
+    scene.output("mean", "center_of_mass", "arm")
+    scene.output("mean speed", "center_of_mass_velocity", "ground")
+    scene.output("spin", "angular_momentum", "arm")
+    scene.output("still", "position", "arm", at=(1.0, 2.0, 3.0), relative_to="imu")
+    scene.output("past", "velocity", "ground", at=(1.0, 0.0, 0.0), relative_to="arm")
+    scene.output("free of weight", "proper_acceleration", "ground")
+    scene.output("steady", "angular_acceleration", "arm")
 
     def expected(q, v):
         R, (omega,) = from_rpy(*MOUNTED), v
         place = np.array([0.7, 0.2, 0.1]) + R @ [0.05, 0.0, 0.0]
         inward = -(omega**2) * np.array([place[0], place[1], 0.0])
         outer = -(omega**2) * 0.5 * np.array([np.cos(q[0]), np.sin(q[0]), 0.0])
-        return {"turning": R.T @ [0.0, 0.0, omega], "felt": R.T @ (inward + [0.0, 0.0, G]), "accelerated": outer}
+        c, s, mount = np.cos(q[0]), np.sin(q[0]), np.array([0.7, 0.2, 0.1])
+        return {
+            "turning": R.T @ [0.0, 0.0, omega],
+            "felt": R.T @ (inward + [0.0, 0.0, G]),
+            "accelerated": outer,
+            "moved": R.T @ (omega * np.array([-mount[1], mount[0], 0.0])),
+            "forward": [-s, c, 0.0],
+            "mean": [0.4 * c, 0.4 * s, 0.0],
+            "mean speed": 0.4 * omega * np.array([-s, c, 0.0]),
+            "spin": [0.0, 0.0, 0.3 * omega],
+            "still": R.T @ (np.array([1.0, 2.0, 3.0]) - mount),
+            "past": -omega * np.array([s, c, 0.0]),
+            "free of weight": [0.0, 0.0, G],
+            "steady": np.zeros(3),
+        }
 
     return scene, [0.3], [4.0], expected
 

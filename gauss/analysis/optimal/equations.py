@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from gauss.analysis.tangents import RANK_TOLERANCE, constraint_residuals
+from gauss.analysis.tangents import constraint_residuals
 from gauss.analysis.user_functions import numbers_of
 from gauss.codegen import write
 from gauss.dynamics import compile_scene
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.null_space import RANK_TOLERANCE
 from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
 from gauss.errors import SimulationError, extra

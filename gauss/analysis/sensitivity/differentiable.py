@@ -17,13 +17,7 @@ from gauss.system import System, coordinate_rates
 
 
 class DifferentiableDynamics:
-    """Accelerations of states under the loads of the scene.
-
-    Parameters
-    ----------
-    system : System or Scene
-        The system.
-    """
+    """Accelerations of states under the loads of the scene."""
 
     def __init__(self, system: System | Scene):
         require(system, (System, Scene), "dynamics")

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor
 from gauss.bench.scenes import chain
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble

@@ -122,13 +122,6 @@ class CudaDevice:
 class CudaProgram:
     """Thread code on a GPU.
 
-    Parameters
-    ----------
-    device : CudaDevice
-        The GPU.
-    lowered : Lowered
-        The code.
-
     Attributes
     ----------
     threads_per_block : int

@@ -130,11 +130,6 @@ class CudaView:
 def stream_handle(stream) -> int:
     """Handle of a stream: a whole number, or a stream of cuda.core, torch or CuPy.
 
-    Parameters
-    ----------
-    stream : int or object
-        The stream.
-
     Raises
     ------
     DeviceError

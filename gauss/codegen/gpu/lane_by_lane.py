@@ -73,13 +73,7 @@ class LaneByLane:
 
 
 class HostProgram:
-    """Thread code on this CPU; its frames are on the stack.
-
-    Parameters
-    ----------
-    lowered : Lowered
-        The code.
-    """
+    """Thread code on this CPU; its frames are on the stack."""
 
     memory_bytes = 0
 

@@ -19,7 +19,7 @@ from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function, machine
 from gauss.codegen.kernels.arrays import Array, Routine, Value
-from gauss.codegen.kernels.block_lu import INTEGERS, write_order, write_solve
+from gauss.codegen.kernels.block_lu import INTEGERS, write_solve
 from gauss.codegen.kernels.newton_rounds import LARGEST_RESIDUAL_SUM, Round, write_rounds
 from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH, TwistRows
 
@@ -262,15 +262,12 @@ class BlockContactSolver(machine.CodeCaller):
 
     Parameters
     ----------
-    laws : BlockContactLaws
-        Laws and settings.
+    code : MachineCode
+        Code of a module that holds ``order`` and ``contacts``: that of a step.
     """
 
-    def __init__(self, laws: BlockContactLaws):
-        module = ir.Module(name="gauss")
-        write_order(module)
-        write_block_contacts(laws, module)
-        self.code = machine.load(str(module))
+    def __init__(self, code: machine.MachineCode):
+        self.code = code
         self._bind()
 
     def _bind(self):

@@ -1,7 +1,8 @@
 """Step of free bodies with contacts in machine code: poses, near contacts, block-sparse contact problem, end of the step.
 
 The equations are those of :mod:`gauss.dynamics.contact.free_body_step`, whose Python code repeats the steps that are not
-finished here: where pairs of kinds of shapes are met for the first time, arrays are too short, or laws have no solution.
+finished here: where pairs of kinds of shapes are met for the first time, arrays are too short, laws have no solution, or
+bodies asleep are pushed.
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ from gauss.codegen.kernels.step_memory import (
 )
 from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH
 
-SIZES = ("n_q", "n_v", "n", "bodies", "parts", "pairs", "capacity", "blocks", "laws", "constants")
+SIZES = ("n_q", "n_v", "n", "bodies", "parts", "pairs", "capacity", "blocks", "laws", "constants", "sleepers")
 ADDRESSES = (
     *NEAR_INTEGERS,
     *NEAR_NUMBERS,
@@ -167,7 +168,7 @@ class _FreeBodyStepWriter:
                 self._row(c)
             with r.when(~(self._impact(m) > 0.0)):
                 solved = self.islands.solve()
-                with r.when(solved & (self._speed("added") <= s["margin"] * speed)):
+                with r.when(solved & (self._speed("added") <= s["margin"] * speed)), r.when(~(self._wakes(m) > 0)):
                     self._finish(m)
         return r.done()
 
@@ -278,6 +279,17 @@ class _FreeBodyStepWriter:
         with r.when(found[0] > 0.0):
             self.status[0] = IMPACT
         return found[0]
+
+    def _wakes(self, m: Value) -> Value:
+        """Whether a contact pushes a body asleep; their columns follow those of the moving bodies."""
+        r, at, woken = self.r, self.at, self.r.variable(0, INTEGER)
+        first, found, body = at.n["n"], at.table("found"), at.table("body")
+        with r.when(at.n["sleepers"] > 0), r.each(m) as c, r.when(at["f"][self.islands.contact[c] * 3] > 0.0):
+            for part in parts_of(found[c * 2], at.n["parts"]):
+                column = body[part * BODY]
+                with r.when((column >= first) & (column < first + at.n["sleepers"])):
+                    woken[0] = 1
+        return woken[0]
 
     def _known(self, m: Value):
         """Initial impulses, those of the last step: contacts of both steps come in the same order."""

@@ -190,19 +190,30 @@ def write_near(place: Function, module: ir.Module) -> ir.Function:
     return _NearPairsWriter(place, module).write()
 
 
-class NearPairs(machine.CodeCaller):
-    """Python interface.
+def near_code(place: Function) -> machine.MachineCode:
+    """Machine code of ``near`` alone.
 
     Parameters
     ----------
     place : Function
         (pose, velocities and biases of a body, rotation and centre of a shape in it) → pose and velocities of the shape.
     """
+    module = ir.Module(name="gauss")
+    write_near(place, module)
+    return machine.load(str(module))
 
-    def __init__(self, place: Function):
-        module = ir.Module(name="gauss")
-        write_near(place, module)
-        self.code = machine.load(str(module))
+
+class NearPairs(machine.CodeCaller):
+    """Python interface.
+
+    Parameters
+    ----------
+    code : MachineCode
+        Code of a module that holds ``near``: that of :func:`near_code`, or of a step.
+    """
+
+    def __init__(self, code: machine.MachineCode):
+        self.code = code
         self._bind()
 
     def _bind(self):

@@ -68,6 +68,7 @@ class FreeBodyMemory(CompiledStepMemory):
             "blocks": blocks,
             "laws": len(table.contacts),
             "constants": CONSTANTS,
+            "sleepers": stepper.asleep.size,
         }
         super().__init__(compiled_free_body_step(laws), FREE_BODIES, sizes, {})
         at = self.at

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.backends import Backend
-from gauss.backends.recursion import Factor
+from gauss.backends.closure import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine, StateKernels

@@ -8,17 +8,16 @@ speed before and after the step bounds how fast a gap closes; a step that exceed
 """
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import from_disk
-from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, Round
-from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_memory
+from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, NearPairs, Round
+from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, compiled_free_body_step, first_memory
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
 from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem, contact_solver
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
+from gauss.dynamics.contact.free_body_step_parts import BegunStep, FreeBodyStep
 from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
 from gauss.dynamics.contact.moreau_step import MIDPOINT
@@ -40,55 +39,17 @@ ROUNDS = (
     Round(0, 1e-7, 10),
     Round(100, 1e-2, 30),
     Round(0, 1e-5, 10),
+    # Redundant contacts between which forces move far at small residuals: much regularisation stands still, little cycles.
+    Round(0, 1e-5, 60),
+    Round(0, 3e-6, 60),
+    Round(0, 1e-4, 60),
+    Round(0, 1e-3, 60),
+    Round(0, 1e-5, 60),
 )
 UNSOLVED = 1e-3  # error of the laws, relative: beyond it the convex relaxation is solved
 REACH_MARGIN = 1.5  # of the distance that bodies approach within a step by their speeds before contact
 ATTEMPTS = 8  # steps with ever larger bounds of the speeds
 TWIST = 8  # doubles of a row of velocities
-
-
-class FreeBodyStep(NamedTuple):
-    """Result of one step.
-
-    Attributes
-    ----------
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates and rates at its end.
-    contacts : NearContacts
-        Near contacts.
-    force : ndarray, shape (m, 3)
-        Mean forces with impulses along normals and tangents [N].
-    power : ndarray, shape (3,)
-        Mean power of drives, of forces on bodies, and of dissipation, which is that of contacts [W].
-    error : float or None
-        Error of the laws, relative; None for the convex relaxation.
-    paradoxes : list of Paradox
-        None: contacts of many free bodies are not examined for Painlevé's paradox.
-    modes : ModesOfStep or None
-        Elements that bear a force; None where their modes are those of the last step.
-    """
-
-    q: np.ndarray
-    v: np.ndarray
-    contacts: NearContacts
-    force: np.ndarray
-    power: np.ndarray
-    error: float | None
-    paradoxes: list[Paradox]
-    modes: ModesOfStep | None
-
-
-class _Begun(NamedTuple):
-    """Bodies after the share of a step: columns for bodies, and their velocities before and after it without contacts.
-
-    Coordinates, poses of all bodies with the ground last, velocities, masses, rates of the joints.
-    """
-
-    q: np.ndarray
-    bodies: np.ndarray
-    both: np.ndarray
-    mass: np.ndarray
-    v: np.ndarray
 
 
 class FreeBodyStepper:
@@ -114,7 +75,8 @@ class FreeBodyStepper:
         self.n = len(self.moving)
         self.gravity = np.repeat(np.array(system.scene.gravity, dtype=float)[:, None], self.n, axis=1)
         self._index_bodies()
-        self.detection = NearDetection(self.table, self.n + self.fixed.shape[1], system.scale.length)
+        code = NearPairs(compiled_free_body_step(block_contact_laws()).code)
+        self.detection = NearDetection(self.table, self.n + self.fixed.shape[1], system.scale.length, code)
         self.reach = self._reaches()
         self.shares = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
         self.coefficients = np.unique(self.table.restitution)
@@ -122,14 +84,14 @@ class FreeBodyStepper:
         self.first_set_valued, self.record = len(self.elements), ModeRecord(len(self.elements))
         self.graph: ContactGraph | None = None
         unit = system.scale.length / system.scale.time
-        settings = {
+        self.settings = {
             "margin": REACH_MARGIN,
             "unit": unit,
             "tolerance": LAW_TOLERANCE,
             "unsolved": UNSOLVED,
             "removal": removal,
         }
-        self.memory = first_memory(self, block_contact_laws(), settings)
+        self.memory = first_memory(self, block_contact_laws(), self.settings)
         self.forget()
 
     def _index_bodies(self):
@@ -155,6 +117,7 @@ class FreeBodyStepper:
         return found[: self.n]
 
     inputs = np.zeros(0)
+    asleep = np.zeros(0, dtype=np.int64)  # columns of bodies asleep, as of the stepper of all
     acceleration_error = 0.0  # accelerations of free bodies are Euler's equations themselves
 
     def check(self, state: State):
@@ -184,6 +147,8 @@ class FreeBodyStepper:
     def run(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
         """Steps by machine code, as of :meth:`gauss.dynamics.contact.compiled_step_memory.CompiledStepMemory.advance`."""
         self.memory = self.memory.fitting()
+        if self.asleep.size:
+            self.memory.at["end_q"][:], self.memory.at["end_v"][:] = state.q, state.v  # steps move the others alone
         return self.memory.advance(state, work, ends, rows)
 
     def examined(self, state: State, h: float) -> list[Paradox]:
@@ -199,7 +164,7 @@ class FreeBodyStepper:
             If shapes overlap unseen by their gap functions, or no forces are found.
         """
         for share in self.shares:
-            begun = self._begin(state, h, share)
+            begun = self.begin(state, h, share)
             speed = max(self._speed(begun.both[..., k]) for k in range(2))
             near = self._near(state, begun, speed, h, share)
             known = rates(near, begun.both)
@@ -218,7 +183,7 @@ class FreeBodyStepper:
         else:
             raise SimulationError(f"t = {state.t:.6g} s: contacts make bodies faster and faster; shorten the step.")
         self._keep(near, force, added.T / h if share else np.zeros((6, self.n)))
-        found = np.empty(state.q.size), np.empty(state.v.size)
+        found = state.q.copy(), state.v.copy()  # of bodies asleep, too
         change = (after - begun.both[..., 0])[: self.n, :6].T
         step = np.repeat([[h], [share]], self.n, axis=1)
         end = self.kernels.end(np.concatenate([begun.q, begun.v[self.v_places], self.given, change, step]))
@@ -228,7 +193,9 @@ class FreeBodyStepper:
         modes = self._changed_modes(near, begun, known, force, reached_rates, work, h, share)
         return FreeBodyStep(*found, near, force, np.array([0.0, 0.0, -0.5 * work.sum()]), error, [], modes)
 
-    def _changed_modes(self, near, begun: _Begun, known, force, reached, work, h: float, share: float) -> ModesOfStep | None:
+    def _changed_modes(
+        self, near, begun: BegunStep, known, force, reached, work, h: float, share: float
+    ) -> ModesOfStep | None:
         """Contacts that bear a force in a step; None if their modes are those of the last step."""
         slow = sliding_above(self.system, begun.v)
         modes = modes_of_contacts(self.table, near.law, force, np.hypot(reached[:, 1], reached[:, 2]), slow)
@@ -237,7 +204,8 @@ class FreeBodyStepper:
         pushed, hits = np.flatnonzero(modes), self._impacts(near, begun, known, h, share)
         return ModesOfStep(near.law[pushed], modes[pushed], hits[pushed] > 0.0, -0.5 * h * work[pushed].sum(axis=1))
 
-    def _begin(self, state: State, h: float, share: float) -> _Begun:
+    def begin(self, state: State, h: float, share: float) -> BegunStep:
+        """Bodies after the share of a step of length h."""
         q, v = state.q[self.q_places], state.v[self.v_places]
         step = np.repeat([[h], [share]], self.n, axis=1)
         found = self.kernels.begin(np.concatenate([q, v, self.given, self.gravity, self.known.expected, step]))
@@ -247,29 +215,29 @@ class FreeBodyStepper:
         both[: self.n, :6, 1] = (bodies[12:18] + h * free).T
         mass = np.empty((self.n, 20))
         mass[:, :18], mass[:, 18], mass[:, 19] = inertia.T, self.given[27], 1.0 / self.given[27]
-        return _Begun(at, np.concatenate([bodies, self.fixed], axis=1), both, mass, state.v)
+        return BegunStep(at, np.concatenate([bodies, self.fixed], axis=1), both, mass, state.v)
 
     def _speed(self, twists: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
         turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in (twists[: self.n, :3], twists[: self.n, 3:6]))
         return float((moving + turning * self.reach).max())
 
-    def _near(self, state: State, begun: _Begun, speed: float, h: float, share: float) -> NearContacts:
+    def _near(self, state: State, begun: BegunStep, speed: float, h: float, share: float) -> NearContacts:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         near, overlaps = self.detection.find(begun.bodies, reach, UNSEEN_OVERLAP)
         return confirmed(near, overlaps, self.table, state.t)
 
-    def _impacts(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:
+    def _impacts(self, near: NearContacts, begun: BegunStep, known: np.ndarray, h: float, share: float) -> np.ndarray:
         before, after = known[:, 0].T
         speeds = REST_STEPS * np.abs(after - before + h * near.bias[:, 0]) + self._rest(begun)
         return is_impact(near.gap, before, speeds, h, share)
 
-    def _rest(self, begun: _Begun) -> float:
+    def _rest(self, begun: BegunStep) -> float:
         """Rate below which a gap neither opens nor closes [m/s]."""
         return self.system.scale.length * resting(self.system, begun.v)
 
-    def _solve(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float):
+    def _solve(self, near: NearContacts, begun: BegunStep, known: np.ndarray, h: float, share: float):
         """Forces (m, 3), the velocities (n, 6) that they add, and the error of the laws."""
         m = near.gap.size
         if not m:
@@ -287,14 +255,14 @@ class FreeBodyStepper:
         f, added = self._dense(near, begun, bodies, b / unit, f / unit, friction)
         return f * unit / h, added * unit, None
 
-    def without_forces(self, near: NearContacts, begun: _Begun, known: np.ndarray, h: float, share: float) -> np.ndarray:
+    def without_forces(self, near: NearContacts, begun: BegunStep, known: np.ndarray, h: float, share: float) -> np.ndarray:
         """Relative velocities (m, 3) after a step without contact forces, less the least that gaps may have.
 
         Parameters
         ----------
         near : NearContacts
             The contacts.
-        begun : _Begun
+        begun : BegunStep
             The bodies.
         known : ndarray, shape (m, 3, 2)
             Relative velocities before the step, and after it without contact forces [m/s].
@@ -309,7 +277,7 @@ class FreeBodyStepper:
             b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), *given, closed[mine])
         return b
 
-    def _dense(self, near: NearContacts, begun: _Begun, bodies, b, f, friction):
+    def _dense(self, near: NearContacts, begun: BegunStep, bodies, b, f, friction):
         """Impulses of the problem in one matrix, by the convex relaxation where Coulomb's law has no solution."""
         m = near.gap.size
         rows, M = np.zeros((3 * m, 6 * self.n)), np.zeros((6 * self.n, 6 * self.n))
@@ -368,7 +336,7 @@ class FreeBodyStepper:
 
     def refuse_penetration(self, state: State):
         """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
-        near = self._near(state, self._begin(state, 0.0, 0.0), 0.0, 0.0, 0.0)
+        near = self._near(state, self.begin(state, 0.0, 0.0), 0.0, 0.0, 0.0)
         worst = int(np.argmin(near.gap)) if near.gap.size else 0
         if near.gap.size and near.gap[worst] < -START_OVERLAP * self.system.scale.length:
             name = self.table.contacts[near.law[worst]].name
@@ -386,8 +354,8 @@ def rates(near: NearContacts, twists: np.ndarray) -> np.ndarray:
 
 @cache
 def block_contact_solver() -> BlockContactSolver:
-    """Machine code of the contact problem, made once on a machine."""
-    return from_disk((BlockContactSolver, ROUNDS), lambda: BlockContactSolver(block_contact_laws()))
+    """Machine code of the contact problem: that of the step."""
+    return BlockContactSolver(compiled_free_body_step(block_contact_laws()).code)
 
 
 @cache

@@ -18,9 +18,9 @@ import numpy as np
 from gauss.backends import BACKENDS, solve
 from gauss.backends.active_set import active_rows
 from gauss.backends.backend import Backend
+from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
 from gauss.dynamics.gap_functions import RESTING, gaps, set_valued_rows, stacked_rows

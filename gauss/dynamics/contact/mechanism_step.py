@@ -11,8 +11,9 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from gauss.codegen.kernels import NearPairs
 from gauss.dynamics.conditions import smooth_system
-from gauss.dynamics.contact.compiled_mechanism_step import KnownForces, MechanismMemory
+from gauss.dynamics.contact.compiled_mechanism_step import KnownForces, MechanismMemory, compiled_mechanism_step
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.contact_step import ContactProblem
@@ -26,7 +27,7 @@ from gauss.dynamics.contact.mechanism_rows import MechanismRows, StepRows
 from gauss.dynamics.contact.mechanism_step_parts import FreeStep, MechanismStep, OpenStep
 from gauss.dynamics.contact.moreau_step import MIDPOINT, MISSED_CLOSING_RATE
 from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
-from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.near_detection import NearDetection, near_pairs
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable
@@ -67,10 +68,12 @@ class MechanismStepper:
         self.n = len(carriers)
         places = {body: k for k, body in enumerate(carriers)}
         self.table.body = np.array([places.get(int(body), self.n) for body in self.table.body], dtype=np.int64)
-        self.detection = NearDetection(self.table, self.n + 1, system.scale.length)
         self.reach = np.zeros(self.n + 1)
         np.maximum.at(self.reach, self.table.body, self.table.length)
         self.rows, self.compliance = MechanismRows(system, self.table), Compliance(self.smooth)
+        is_compiled = self.compliance.free_columns is not None
+        code = NearPairs(compiled_mechanism_step().code) if is_compiled else near_pairs()
+        self.detection = NearDetection(self.table, self.n + 1, system.scale.length, code)
         self.shares = (0.0,) if self.smooth.closes or self.rows.restitution.any() else (MIDPOINT, 0.0)
         self.acceleration_error = 0.0
         self.constants = {
@@ -81,7 +84,7 @@ class MechanismStepper:
             "contact_unit": self.rows.contact_unit,
         }
         self.record = ModeRecord(len(self.rows.elements))
-        self.memory = MechanismMemory(self) if self.compliance.free_columns is not None else None
+        self.memory = MechanismMemory(self) if is_compiled else None
         self.forget()
 
     @property

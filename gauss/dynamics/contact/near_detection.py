@@ -7,7 +7,7 @@ import numpy as np
 from gauss.codegen import from_disk
 from gauss.codegen.kernels import NearPairs
 from gauss.codegen.kernels.broad_phase import grid_room
-from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, NEAR_INTEGERS, NEAR_NUMBERS, PART, ROW
+from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, NEAR_INTEGERS, NEAR_NUMBERS, PART, ROW, near_code
 from gauss.codegen.kernels.near_pairs import KINDS as MOST_KINDS
 from gauss.codegen.kernels.patch_rows import POINT
 from gauss.dynamics.contact.free_bodies import place_function
@@ -37,10 +37,12 @@ class NearDetection:
         Number of bodies that its shapes belong to, with the ground.
     length : float
         Length of the scene [m].
+    code : NearPairs
+        The machine code.
     """
 
-    def __init__(self, table: ShapeTable, bodies: int, length: float):
-        self.table, self.length, self.code = table, length, near_pairs()
+    def __init__(self, table: ShapeTable, bodies: int, length: float, code: NearPairs):
+        self.table, self.length, self.code = table, length, code
         self.version = 0  # changes with the addresses of the arrays
         n = len(table.parts)
         self.law = np.ascontiguousarray(table.law)
@@ -142,5 +144,5 @@ class NearDetection:
 
 @cache
 def near_pairs() -> NearPairs:
-    """Machine code, made once on a machine."""
-    return from_disk((NearPairs,), lambda: NearPairs(place_function()))
+    """Machine code of its own, made once on a machine; compiled steps hold the same."""
+    return from_disk((NearPairs,), lambda: NearPairs(near_code(place_function())))

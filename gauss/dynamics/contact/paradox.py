@@ -11,8 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
+from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.gap_functions import closed, gaps, slips
 from gauss.dynamics.kinematics import Kinematics, kinematics

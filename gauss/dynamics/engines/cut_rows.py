@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.backends import Backend
+from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine

@@ -131,13 +131,14 @@ def _all_powers(nodes: list[Expression], known: set[int]) -> dict[int, Counter]:
     """Powers of all products, of sums that are written as quotients, and of exponential functions."""
     powers: dict[int, Counter] = {}
     for node in nodes:
-        x = [powers.get(operand.index) or _base(operand, known) for operand in node.operands]
-        if node.op in FACTORED:
-            powers[node.index] = _combined(node, x)
-        elif node.op == "exp":
+        if node.op == "exp":
             powers[node.index] = Counter({(node.operands[0], True): 1.0})
-        elif node.index not in known and (shared := _over_one_divisor(node, x)):
-            powers[node.index] = shared
+        elif node.op in FACTORED or node.index not in known:
+            x = [powers.get(operand.index) or _base(operand, known) for operand in node.operands]
+            if node.op in FACTORED:
+                powers[node.index] = _combined(node, x)
+            elif shared := _over_one_divisor(node, x):
+                powers[node.index] = shared
     return powers
 
 

@@ -31,7 +31,7 @@ from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.kink_error import kink_error, kink_factor
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
 from gauss.dynamics.laws.products import Products
-from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
+from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, timed_nodes
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
 from gauss.integrators import Point, Tolerance
@@ -77,13 +77,14 @@ class SwitchingFunctions:
 
     def __init__(self, system: System, laws: TracedFunctions):
         self.system, self.laws, outputs = system, laws, laws.outputs
-        timed = {node.index for node in of_time(outputs, self._clock)} if outputs else set()
-        nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
+        every = reachable(outputs)
+        timed = {node.index for node in timed_nodes(every, self._clock)} if outputs else set()
+        nodes = [node for node in every if node.op in CONDITIONS and node.index not in timed]
         self.pairs = self._distinct(_compared(nodes))
         self.noise = self._rounding()
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
         self.jumps = [_jumps(x) for x in (*starmap(sub, self.pairs), *self.steps)]
-        self.peaks, self.phases = (_arguments(outputs, timed, *ops) for ops in (("exp",), ("sin", "cos")))
+        self.peaks, self.phases = (_arguments(every, timed, *ops) for ops in (("exp",), ("sin", "cos")))
         self.products = Products(outputs, timed)
         self.names = _names(laws, {node.index for node in (*nodes, *self.peaks, *self.products.nodes)})
 
@@ -350,12 +351,12 @@ def onward(share: Scalar, shortest: Scalar) -> Scalar:
     return math.maximum(share, 0.5 * shortest)
 
 
-def _arguments(outputs, timed: set[int], *ops: str) -> list[Expression]:
+def _arguments(nodes: list[Expression], timed: set[int], *ops: str) -> list[Expression]:
     """Arguments of functions, other than those of time.
 
     A narrow peak of an exponential function is negligible at every stage outside of it.
     """
-    found = dict.fromkeys(node.operands[0] for node in reachable(outputs) if node.op in ops)
+    found = dict.fromkeys(node.operands[0] for node in nodes if node.op in ops)
     return [x for x in found if x.index not in timed]
 
 

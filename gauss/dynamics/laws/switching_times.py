@@ -1,8 +1,9 @@
 """Laws that depend on time alone: their switching times, and a mesh that bounds the steps that resolve them.
 
 Every comparison, minimum, maximum and floor of expressions of time is a condition; interval bisection finds all times at
-which one changes (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 8). Between these times, a mesh isolates
-narrow features of a law: in each of its cells, the enclosure of the law is little wider than the range of samples.
+which one changes (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 8) that is not known in closed form.
+Between these times, a mesh isolates narrow features of a law: in each of its cells, the enclosure is little wider than
+the range of samples.
 """
 
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.codegen import Expression, forward, reachable
+from gauss.dynamics.laws.affine_conditions import affine_changes
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.step_sampling import LawOfTime, coarse_steps, laws_of_time
 
@@ -138,12 +140,17 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
 
 def of_time(outputs, clock: Expression) -> list[Expression]:
     """Nodes of expressions that depend on the time alone, operands first."""
-    alone: dict[int, bool] = {}
+    return timed_nodes(reachable(outputs), clock)
+
+
+def timed_nodes(nodes: list[Expression], clock: Expression) -> list[Expression]:
+    """Those of some nodes, operands first, that depend on the time alone."""
+    alone: set[int] = {clock.index}
     found = []
-    for node in reachable(outputs):
-        operands = [alone.get(x.index, False) for x in node.operands if not x.is_constant]
-        alone[node.index] = node is clock or (bool(operands) and all(operands) and node.op not in ("call", "item"))
-        if alone[node.index] and node is not clock:
+    for node in nodes:
+        operands = [x.index in alone for x in node.operands if not x.is_constant]
+        if operands and all(operands) and node.op not in ("call", "item"):
+            alone.add(node.index)
             found.append(node)
     return found
 
@@ -174,9 +181,21 @@ def _condition(node: Expression) -> Expression:
 
 def _changes(conditions, clock: Expression, begin: float, end: float, limitations: list[str]) -> np.ndarray:
     """Times in an interval at which a condition changes, to rounding; ``limitations`` reports where they are too many."""
+    close = CLOSE * max(abs(begin), abs(end))
+    known, others = affine_changes(conditions, clock, begin, end, 2.0 * close)
+    times = np.sort(np.append(known, _searched(others, clock, begin, end, limitations)))
+    if not times.size:
+        return times
+    times = times[np.append(True, np.diff(times) > close)]
+    inside = times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
+    return np.append(inside, end) if times[-1] >= end - 4.0 * close else inside
+
+
+def _searched(conditions, clock: Expression, begin: float, end: float, limitations: list[str]) -> np.ndarray:
+    """Times at which a condition changes, by bisection."""
     ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
-    low, high = ends[:-1], ends[1:]
-    while low.size <= MOST_CELLS:
+    low, high = (ends[:-1], ends[1:]) if conditions else (ends[:0], ends[:0])
+    while 0 < low.size <= MOST_CELLS:
         values = enclose(conditions, {clock.index: Interval(low, high)})
         jumping = np.any([np.broadcast_to(value.low != value.high, low.shape) for value in values], axis=0)
         low, high = low[jumping], high[jumping]
@@ -192,12 +211,10 @@ def _changes(conditions, clock: Expression, begin: float, end: float, limitation
         limitations.append(f"{often}: steps do not end at each of these times; simulate a shorter time.")
         return np.zeros(0)
     if not low.size:
-        return np.zeros(0)
+        return low
     first = np.flatnonzero(np.concatenate([[True], low[1:] - high[:-1] > close]))  # adjacent cells hold one change
     last = np.append(first[1:], low.size) - 1
-    times = 0.5 * (low[first] + high[last])
-    inside = times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
-    return np.append(inside, end) if times[-1] >= end - 4.0 * close else inside
+    return 0.5 * (low[first] + high[last])
 
 
 def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, limitations: list[str], monotone: bool) -> np.ndarray:

@@ -11,9 +11,10 @@ from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.motion_step import MotionStep
-from gauss.dynamics.outputs import FORCES, measured
+from gauss.dynamics.outputs import FORCES
 from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
+from gauss.dynamics.sensor_values import measured
 from gauss.errors import SimulationError
 from gauss.export.exported_function import ExportedFunction, Shape, without_calls
 from gauss.export.fmu.unit_parameters import UnitParameters

@@ -22,7 +22,7 @@ KINDS = ("INTEGRATOR", "FILTER", "FILTEREXACT", "MUSCLE")
 INTEGRATOR, FILTER, EXACT, MUSCLE = (int(getattr(mujoco.mjtDyn, f"mjDYN_{name}")) for name in KINDS)
 KNOWN = INTEGRATOR, FILTER, EXACT, MUSCLE
 MUSCLE_GAIN, MUSCLE_BIAS = int(mujoco.mjtGain.mjGAIN_MUSCLE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
-LEAST = 1e-15  # s, m, N: least divisor, as of MuJoCo
+LEAST = mujoco.mjMINVAL  # s, m, N: least divisor
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,17 @@ from gauss.scene import Input, Output
 FRAMES = {
     "position": "framepos",
     "rotation": "framequat",
+    "x_axis": "framexaxis",
+    "y_axis": "frameyaxis",
+    "z_axis": "framezaxis",
     "velocity": "framelinvel",
     "angular_velocity": "frameangvel",
+    "proper_acceleration": "framelinacc",
+    "angular_acceleration": "frameangacc",
 }
+SUBTREES = {"center_of_mass": "subtreecom", "center_of_mass_velocity": "subtreelinvel", "angular_momentum": "subtreeangmom"}
 JOINTS = {"coordinate": ("jointpos", "ballquat"), "rate": ("jointvel", "ballangvel")}  # of one freedom, of a ball
-OWN = {"gyroscope": "gyro", "accelerometer": "accelerometer"}  # in the axes of the site
+OWN = {"gyroscope": "gyro", "accelerometer": "accelerometer", "velocimeter": "velocimeter"}  # in the axes of the site
 
 
 def write_controls(document):
@@ -83,12 +89,19 @@ def _at_joint(document, what: str, joint: str, factor: float, options: dict):
 def _write_output(document, output: Output):
     what, sensors = f"output {output.name!r}", document.section("sensor")
     if output.kind in FRAMES or output.kind in OWN:
-        marked = output.of in document.scene.frames and not any(output.at)  # by a site of its own
-        site = output.of if marked else document.site(f"{what} at {output.of}", output.of, output.at)
+        site = _site_of(document, f"{what} at", output.of, output.at)
         if output.kind in OWN:
             document.add(sensors, OWN[output.kind], "sensor", name=output.name, site=site)
-        else:
-            document.add(sensors, FRAMES[output.kind], "sensor", name=output.name, objtype="site", objname=site)
+            return
+        options = {"objtype": "site", "objname": site}
+        if output.relative_to:
+            options |= {"reftype": "site", "refname": _site_of(document, f"{what} from", output.relative_to)}
+        document.add(sensors, FRAMES[output.kind], "sensor", name=output.name, **options)
+    elif output.kind in SUBTREES:
+        if len(document.limbs) < len(document.scene.joints):
+            raise FileError(f"{what}: what hangs on a body is another in MuJoCo, which cuts loops elsewhere.")
+        body = document.bodies[output.of].get("name", "world")
+        document.add(sensors, SUBTREES[output.kind], "sensor", name=output.name, body=body)
     elif output.kind in JOINTS:
         of_one, of_ball = JOINTS[output.kind]
         if document.scene.joints[output.of].kind == "ball":
@@ -97,6 +110,12 @@ def _write_output(document, output: Output):
             document.add(sensors, of_one, "sensor", name=output.name, joint=document.coordinate(output.of, what))
     else:
         raise FileError(f"{what}: MuJoCo has no sensor of it.")
+
+
+def _site_of(document, called: str, place: str, at=(0.0, 0.0, 0.0)) -> str:
+    """Name of the site of a frame, or of one that is made at a point of a body or frame."""
+    marked = place in document.scene.frames and not any(at)
+    return place if marked else document.site(f"{called} {place}", place, at)
 
 
 def _ball(document, joint: str, what: str) -> str:

@@ -6,10 +6,12 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError
-from gauss.io.guard import MOST_INCLUDES, Source, read_xml, require_inside
+from gauss.io.guard import MOST_INCLUDES, Source, read_xml, require_inside, resolved
+from gauss.io.mjcf.attached import count_attached
 
 ROOTS = ("mujoco", "mujocoinclude")
-FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
+ATTACHED_ROOTS = (*ROOTS, "robot")  # MuJoCo attaches URDF files, too
+FILES = ("file", "filename", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
 FOLDERS = ("meshdir", "texturedir", "assetdir")
 # Attributes of numbers that move a mechanism. MuJoCo takes its default where one is empty or nan, without a word.
 NUMERIC = {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "fromto", "size", "mass", "density", "inertia"}
@@ -39,7 +41,7 @@ LARGEST_GRID = 1e8  # numbers: 10 000 × 10 000, of which each takes memory befo
 
 
 def guarded(path: Path, root_folder: Path | None = None) -> Source:
-    """File that may be parsed, with the files that it includes in their places.
+    """File that may be parsed, with the files that it includes in their places; those that it attaches are checked alike.
 
     Parameters
     ----------
@@ -53,7 +55,20 @@ def guarded(path: Path, root_folder: Path | None = None) -> Source:
     FileError
         If it cannot be read, or holds what is refused; the message says where.
     """
-    source, home = read_xml(path, ROOTS), path.resolve().parent
+    source = _checked(path, root_folder, ROOTS)
+    count_attached(source, root_folder, _attached, {}, (path.resolve(),))
+    return source
+
+
+def _attached(path: Path, root_folder: Path, known: dict[Path, int], seen: tuple[Path, ...]) -> int:
+    """Number of elements of an attached file, after its checks."""
+    source = _checked(path, root_folder, ATTACHED_ROOTS)
+    own = sum(1.0 + _copies(element) for element in source.root.iter())
+    return int(own) + count_attached(source, root_folder, _attached, known, seen)
+
+
+def _checked(path: Path, root_folder: Path | None, roots: tuple[str, ...]) -> Source:
+    source, home = read_xml(path, roots), path.resolve().parent
     _Includes(source, home, root_folder).put(source, (path.resolve(),))
     folders = ["", *(element.get(key, "") for element in source.root.iter("compiler") for key in FOLDERS)]
     _require_few(source)
@@ -147,7 +162,7 @@ class _Includes:
         folders = (self.home, part.path.resolve().parent)
         for folder in folders:
             require_inside(self.whole, include, self.home, str(folder / named), self.root_folder)
-        found = {(folder / named).resolve() for folder in folders}
+        found = {resolved(folder / named, place) for folder in folders}
         included = min(found, key=lambda file: not file.is_file())
         if sum(file.is_file() for file in found) > 1:
             raise FileError(f"{place}: two files are called {named!r}; rename one of them.")

@@ -19,7 +19,7 @@ from gauss.io.mjcf.names import Named
 from gauss.rotations import cross
 from gauss.scene import Scene
 
-LEAST = 1e-15  # kg, kg m², m²/s² …: MuJoCo's mjMINVAL, below which it takes this in place of a divisor
+LEAST = mujoco.mjMINVAL  # kg, kg m², m²/s² …: taken by MuJoCo in place of a smaller divisor
 Law = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # (v, ω) → (F, M)
 
 

@@ -45,8 +45,9 @@ def read_mjcf(
     rope, or a distance, one over several sites and around spheres and cylinders pulls the bodies of all. An activation of an
     actuator is a state of the scene. A key frame called "start", or another that is
     asked for, is where the scene starts. A sensor is an output, named like it, where outputs have its kind: of positions and
-    speeds of joints (positions count like coordinates), of poses and velocities of points in the world (a ``framequat`` is a
-    rotation matrix), accelerometers and gyroscopes; values do not depend on ``noise``.
+    speeds of joints (positions count like coordinates), of poses, velocities and accelerations of points, also relative to
+    another frame (a ``framequat`` is a rotation matrix), of centres of mass and momenta of subtrees, accelerometers,
+    velocimeters and gyroscopes; values do not depend on ``noise``.
 
     Parameters
     ----------

@@ -6,7 +6,6 @@
 A pulley begins another branch, with the divisor of its rope (MuJoCo's documentation, "XML reference: tendon/spatial").
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,13 +13,12 @@ import mujoco
 import numpy as np
 
 from gauss.io.mjcf.names import Named
-from gauss.io.mjcf.tendon_spans import PathPoint, PathSpan, WrapSurface
+from gauss.io.mjcf.tendon_spans import Law, PathPoint, PathSpan, WrapSurface
 from gauss.rotations import from_quaternion
 from gauss.scene import Force, Scene
 
-KINDS = ("JOINT", "SITE", "PULLEY", "SPHERE", "CYLINDER")
-ON_JOINT, ON_SITE, ON_PULLEY, ON_SPHERE, ON_CYLINDER = (int(getattr(mujoco.mjtWrap, f"mjWRAP_{name}")) for name in KINDS)
-Law = Callable  # (t, motion) → number
+KINDS = ("JOINT", "SITE", "PULLEY", "CYLINDER")
+ON_JOINT, ON_SITE, ON_PULLEY, ON_CYLINDER = (int(getattr(mujoco.mjtWrap, f"mjWRAP_{name}")) for name in KINDS)
 
 
 @dataclass(frozen=True)

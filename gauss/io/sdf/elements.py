@@ -24,6 +24,7 @@ STILL |= {"audio_sink", "audio_source", "projector", "particle_emitter", "materi
 STILL |= {"scene", "gui", "audio", "atmosphere", "magnetic_field", "spherical_coordinates", "road"}
 WARNED = {"collision": "collisions", "plugin": "plugins", "physics": "settings of a solver"}
 WARNED |= {"ball": "damping and friction of ball joints, which have no axis", "wind": "wind"}
+WARNED |= {"contact": "contact coefficients of links"}  # of pybullet
 WARNED |= {"actor": "actors, which move along paths of their own"}
 
 

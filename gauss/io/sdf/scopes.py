@@ -38,10 +38,12 @@ class Scope:
         for element in root:
             if element.tag in NAMED:
                 name = element.get("name", "")
-                if not name or name in self.elements or name in (MODEL, WORLD):
-                    raise FileError(
-                        f"{source.place(element)}: the name {name!r} is missing, reserved or taken; give another."
-                    )
+                against = "is reserved" if name in (MODEL, WORLD) else "is missing" if not name else ""
+                if name in self.elements:
+                    against = f"is taken by <{self.elements[name].tag}> ({source.place(self.elements[name])})"
+                if against:
+                    what = f"the name {name!r} of <{element.tag}>"
+                    raise FileError(f"{source.place(element)}: {what} {against}; give another.")
                 self.elements[name] = element
         self.models = {name: Scope(source, one, self) for name, one in self.elements.items() if one.tag == "model"}
         self._origin = MODEL if parent is not None else WORLD

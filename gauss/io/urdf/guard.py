@@ -12,14 +12,14 @@ SCHEMES = ("package://", "model://")  # looked for in the folders above the file
 
 
 def guarded(path) -> Source:
-    """File that may be parsed.
+    """File that may be parsed: by Pinocchio not as it stands, but as what was read here is written down anew.
 
     Raises
     ------
     FileError
         If it cannot be read, or holds what is refused; the message says where.
     """
-    return read_xml(path, ("robot",), limits=("limit",))
+    return read_xml(path, ("robot",), limits=("limit",), loose_comments=True)
 
 
 def place_of(source: Source, message: str) -> str:

@@ -5,6 +5,9 @@ from xml.etree.ElementTree import Element
 from gauss.errors import FileError, did_you_mean, listed
 from gauss.io.guard import Source
 
+DEEPEST_CHAIN = (
+    3000  # links, each on the one before: for 4000 Pinocchio's parser, which calls itself for each, ends the process
+)
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 Tree = dict[str, tuple[str, Element]]  # link → the link that it hangs on, and the joint by which
 
@@ -60,7 +63,7 @@ def _require_one_root(source: Source, links: dict[str, Element], parents: Tree):
     if len(roots) > 1:
         place = source.place(links[roots[1]])
         raise FileError(f"{place}: links {listed(map(repr, roots))} are children of no joint; a URDF has one such link.")
-    hanging = set(roots)
+    hanging = dict.fromkeys(roots, 0)  # number of links below
     for name in links:
         way: dict[str, None] = {}
         while name not in hanging and name not in way:
@@ -69,4 +72,8 @@ def _require_one_root(source: Source, links: dict[str, Element], parents: Tree):
         if name not in hanging:
             place = source.place(parents[name][1])
             raise FileError(f"{place}: links {listed(map(repr, way))} hang on one another in a circle, and not on a root.")
-        hanging.update(way)
+        for link in reversed(way):
+            hanging[link] = hanging[parents[link][0]] + 1
+            if hanging[link] >= DEEPEST_CHAIN:
+                place = source.place(parents[link][1])
+                raise FileError(f"{place}: more than {DEEPEST_CHAIN} links hang on one another; the parser takes no more.")

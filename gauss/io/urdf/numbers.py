@@ -34,6 +34,7 @@ COUNTS = {  # how many numbers an attribute holds, by element
     "color": {"rgba": 4},
     "ratio": {"value": 1},
 }
+UNIFORM = {("mesh", "scale")}  # one number stands for those of all axes, as for Drake
 REQUIRED = {"mass", "inertia", "axis", "sphere", "box", "cylinder", "capsule"}  # elements that need all of these attributes
 EXACT = {"origin", "mass", "inertia", "mimic"}  # elements in which another attribute is a misspelt one
 # What is read here alone, or by nobody; the parser is not given it, but for limits that it insists on.
@@ -79,6 +80,9 @@ def values(source: Source, element: Element, key: str, default: tuple[float, ...
     if text is None and default is not None:
         return default
     found = numbers(text, count)
+    if found is None and (element.tag, key) in UNIFORM:
+        alike = numbers(text, 1)
+        found = None if alike is None else alike * count
     if found is None:
         wanted = "a number such as 0.5 or -2e-3" if count == 1 else f"{count} numbers with blanks between them"
         got = "there is none" if text is None else f"got {_short(text)}"

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from unittest.mock import patch
 
 from gauss.errors import FileError, did_you_mean, extra
-from gauss.io.guard import LARGEST_FILE
+from gauss.scene.file_contents import LARGEST_FILE
 
 CACHE = "~/.cache/robot_descriptions"  # of that package, unless ROBOT_DESCRIPTIONS_CACHE says another
 ENDING = "_description"

@@ -208,6 +208,7 @@ def _axis(joint) -> np.ndarray:
 
 def _couple(scene: Scene, source: Source):
     """Mimic tags as couplings; a mimicked joint that does not move is held as a fixed offset cannot be."""
+    leads: dict[str, str] = {}
     for joint in source.root.findall("joint"):
         tag = joint.find("mimic")
         if tag is None or joint.get("name") not in scene.joints:
@@ -218,5 +219,16 @@ def _couple(scene: Scene, source: Source):
             lack = "which does not move" if exists else "a joint that does not exist"
             remedy = f"mimic=False lets it move by itself. {did_you_mean(driver, scene.joints)}"
             raise SceneError(f"joint {driven!r} mimics {driver!r}, {lack}; {remedy}")
+        leads[driven] = driver
+        if driven in _followed(leads, driver):
+            raise SceneError(f"joint {driven!r} mimics {driver!r}, which mimics it; mimic=False frees both.")
         ratio, offset = (value(source, tag, key, default) for key, default in (("multiplier", 1.0), ("offset", 0.0)))
         scene.couple(f"{driven} mimics {driver}", driven, driver, ratio, offset)
+
+
+def _followed(leads: dict[str, str], joint: str) -> list[str]:
+    """Joint, and those that it mimics, one after the other."""
+    found = [joint]
+    while found[-1] in leads and leads[found[-1]] not in found:
+        found.append(leads[found[-1]])
+    return found

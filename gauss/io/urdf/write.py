@@ -262,7 +262,7 @@ def _measured(document: UrdfDocument, output: Output) -> Output:
     Raises
     ------
     FileError
-        If it measures a joint that becomes a chain in the file.
+        If it measures a joint that becomes a chain in the file, or from a body whose frame is another there.
     """
     if SENSORS[output.kind][0] == "joint":
         rates = document.scene.joints[output.of].pair.rates
@@ -271,6 +271,10 @@ def _measured(document: UrdfDocument, output: Output) -> Output:
                 f"output {output.name!r}: joint {output.of!r} is a chain of joints in URDF; measure one of a body."
             )
         return output
+    if np.any(document.shifts.get(output.relative_to, 0.0)):
+        raise FileError(
+            f"output {output.name!r}: the frame of {output.relative_to!r} moves in URDF; measure from a named frame."
+        )
     shift = document.shifts.get(output.of, np.zeros(3))
     return replace(output, at=_tuple(output.at - shift)) if SENSORS[output.kind][0] == "frame" else output
 

@@ -12,6 +12,7 @@ with extra("usd"):
 
 LARGEST_LAYER = 200_000_000  # bytes: those of scanned environments hold meshes
 MOST_LAYERS = 1000
+LONGEST_REASON = 300  # letters: USD quotes the line of the layer, which may be all of it
 OWN_PLACE = re.compile(r"Error in '.*' at line \d+ in file .* : ")
 
 
@@ -49,6 +50,8 @@ def _layer(path: Path, layer_path: Path) -> Sdf.Layer:
         layer = Sdf.Layer.FindOrOpen(str(layer_path))
     except Tf.ErrorException as error:
         raise FileError(f"{path}: USD refuses layer {layer_path.name!r}: {_reason(error, layer_path)}") from error
+    except UnicodeDecodeError as error:  # USD quotes the line in its message
+        raise FileError(f"{path}: USD refuses layer {layer_path.name!r}, which is no text in UTF-8: {error}") from error
     if layer is None:
         raise FileError(f"{path}: USD cannot read layer {layer_path.name!r}.")
     return layer
@@ -58,9 +61,9 @@ def _reason(error: Exception, layer_path: Path) -> str:
     """Message of USD without the places in its own sources: the one that has the line of the layer, if one has."""
     said = [OWN_PLACE.sub("", line).strip(" \t'") for line in str(error).splitlines()]
     said = [line.replace(f"{layer_path.parent}{os.sep}", "") for line in said if line]
-    return next(
-        (line for line in said if line.startswith(f"{layer_path.name}:")), said[0] if said else "it is no layer of USD"
-    )
+    first = said[0] if said else "it is no layer of USD"
+    found = next((line for line in said if line.startswith(f"{layer_path.name}:")), first)
+    return found if len(found) <= LONGEST_REASON else f"{found[:LONGEST_REASON]}…"
 
 
 def _within(path: Path, layer: Sdf.Layer, name: str, roots: list[Path]) -> Path:

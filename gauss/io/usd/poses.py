@@ -35,13 +35,7 @@ GROUND_POSE = FramePose(np.zeros(3), np.eye(3))
 
 
 class StageUnits:
-    """Units of a stage, and the poses of its prims in the world.
-
-    Parameters
-    ----------
-    stage : Usd.Stage
-        The stage.
-    """
+    """Units of a stage, and the poses of its prims in the world."""
 
     def __init__(self, stage: Usd.Stage):
         self.length, self.mass = UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage)

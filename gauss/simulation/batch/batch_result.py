@@ -12,7 +12,8 @@ from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_receiver import output_kernel
-from gauss.dynamics.outputs import FORCES, INERTIAL, shape_of, split
+from gauss.dynamics.outputs import FORCES, shape_of, split
+from gauss.dynamics.sensor_values import INERTIAL
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean
 from gauss.integrators import FixedStep

@@ -29,9 +29,10 @@ from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
 from gauss.simulation.held_inputs import numbers_in_words
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.memory_limit import refuse_beyond_memory
-from gauss.simulation.moreau.unseen_contacts import MOTIONS, PassingWatch
+from gauss.simulation.moreau.unseen_contacts import MOTIONS, NEVER, PassingWatch
 from gauss.simulation.passed_switching import StepsAhead
-from gauss.simulation.simulator import Simulator, SimulatorState
+from gauss.simulation.simulator import Simulator
+from gauss.simulation.simulator_state import SimulatorState
 from gauss.simulation.tolerances import check_tolerances, checked_count
 from gauss.simulation.undetected_switching import warn_of_passages
 from gauss.system import State, System, retract
@@ -49,7 +50,7 @@ class SimulatorBatchState(NamedTuple):
     kept : tuple
         What the motions continue from.
     flags : tuple
-        Number of steps, whether a warning was given, inputs, marks of motions and their reasons.
+        Number of steps, whether a warning was given, inputs, marks of motions and their reasons, when shapes are looked at.
     """
 
     of: tuple
@@ -122,13 +123,13 @@ class SimulatorBatch:
         if self.integrator not in STEPPED:
             raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(self.integrator, STEPPED)}")
         method = STEPPED[self.integrator]
+        self._ahead = StepsAhead(system, Laws(system), self.step_size, method)
         with one_tier():
             self._begin, self._measure = self._compiled(method)
         self._start, self._size = system.initial_state(), checked_count("batch", batch)
         many = f"batch: {self._size:.3g} motions of {whole.name!r}"
         refuse_beyond_memory(POINT_COPIES * self._size * (1 + system.n_q + system.n_v), many, "give a smaller batch")
         self._passing = PassingWatch(system, self.step_size)
-        self._ahead = StepsAhead(system, Laws(system), self.step_size)
         self._ahead.look(self._start, self._start.t + self.step_size)
         self._u = np.zeros((self._size, 1, len(self.inputs)))
         self._alone: Simulator | None = None
@@ -142,6 +143,7 @@ class SimulatorBatch:
         system, held = self.system, bool(self.inputs)
         if one_by_one(system, method, held):
             alone = Simulator(system, self.step_size, self.integrator)
+            self._ahead.warned_of |= alone.warned_of
             return partial(SimulatorsInTurn, alone), output_kernel(alone.program, system, method.nonsmooth, batch=True)
         ask = smooth_question(Question(system, Laws(system))) if method.nonsmooth else Question(system, Laws(system))
         memory = contact_state_size(system) if method.nonsmooth else 0
@@ -240,8 +242,8 @@ class SimulatorBatch:
         Warns
         -----
         SwitchingWarning
-            Once between resets, if a law of the state may have switched undetected within a step; every ten thousand
-            steps, if a law of time jumps, or has a feature shorter than the step, in the next ones.
+            Once between resets, if a law of the state may have switched undetected within a step; once for all motions, if
+            a law of time jumps, and if it has a feature shorter than the step, in the next ten thousand steps.
         ContactLawWarning
             Once between resets, if shapes may pass through each other unseen at the rates where a call begins or ends.
 
@@ -313,7 +315,7 @@ class SimulatorBatch:
         fresh, end = alone.snapshot(), before.size - len(self.inputs)
         more = len(np.frombuffer(fresh.point)) - before.size  # codes of contact modes, which the points of a batch lack
         point = np.insert(before, end, [UNKNOWN] * more)
-        alone.restore(SimulatorState(point.tobytes(), fresh.control, 0.0, self._steps - n))
+        alone.restore(SimulatorState(point.tobytes(), fresh.control, 0.0, self._steps - n, watched=(NEVER, True)))
         try:
             alone.step(self._u[k, 0] if self.inputs else None, n)
         except SimulationError as error:
@@ -324,7 +326,8 @@ class SimulatorBatch:
 
     def snapshot(self) -> SimulatorBatchState:
         """Present state of all motions, to the last bit; any batch of the same scene, step and size can restore it."""
-        flags = self._steps, self._warned, self._u.copy(), self.diverged.copy(), self.unconfirmed.copy(), dict(self.reasons)
+        marks = self.diverged.copy(), self.unconfirmed.copy(), dict(self.reasons)
+        flags = self._steps, self._warned, self._u.copy(), *marks, self._passing.due
         return SimulatorBatchState(self._options, tuple(map(copy, self._batch.kept())), flags)
 
     def restore(self, snapshot: SimulatorBatchState):
@@ -339,9 +342,8 @@ class SimulatorBatch:
         if snapshot.of != self._options or snapshot.kept[0].shape != self._batch.points.shape:
             raise SimulationError("restore: the snapshot is of another system, step, method or number of motions.")
         self._batch.keep(*snapshot.kept)
-        self._steps, self._warned, u, diverged, unconfirmed, reasons = snapshot.flags
-        self._u[:], self.diverged, self.unconfirmed = u, diverged.copy(), unconfirmed.copy()
-        self.reasons = dict(reasons)
+        self._steps, self._warned, u, diverged, unconfirmed, reasons, self._passing.due = snapshot.flags
+        self._u[:], self.diverged, self.unconfirmed, self.reasons = u, diverged.copy(), unconfirmed.copy(), dict(reasons)
 
     @property
     def t(self) -> float:

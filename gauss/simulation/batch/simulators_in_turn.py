@@ -7,7 +7,8 @@ import numpy as np
 from gauss.codegen.kernels import WORST_RECORD
 from gauss.dynamics.initial_states import constraint_residual
 from gauss.errors import SimulationError
-from gauss.simulation.simulator import Simulator, SimulatorState
+from gauss.simulation.simulator import Simulator
+from gauss.simulation.simulator_state import SimulatorState
 from gauss.system import State
 
 
@@ -33,6 +34,7 @@ class SimulatorsInTurn:
             self.worst[1, k] = constraint_residual(simulator.system, state) if simulator.system.has_closures else 0.0
             simulator.reset(state)
             begun = simulator.snapshot()
+            self.watched = begun.watched
             self.contacts.append(begun.contacts)
             points.append(np.frombuffer(begun.point))
         self.control, self.points = begun.control, np.array(points).T
@@ -64,11 +66,11 @@ class SimulatorsInTurn:
 
     def kept(self) -> tuple:
         """What motions continue from."""
-        return self.points, self.contacts
+        return self.points, self.contacts, self.watched
 
-    def keep(self, points: np.ndarray, contacts: list):
+    def keep(self, points: np.ndarray, contacts: list, watched: tuple):
         """Continue from what another batch of this form kept."""
-        self.points[:], self.contacts = points, list(contacts)
+        self.points[:], self.contacts, self.watched = points, list(contacts), watched
 
     def found_reasons(self) -> dict[int, str]:
         """Why motions could not continue since the last time, and forget it."""
@@ -86,7 +88,8 @@ class SimulatorsInTurn:
         for k in np.flatnonzero(np.isfinite(self.reached).all(axis=0)):
             point, simulator = self.points[:, k].copy(), self.simulator
             point[0] = done * h
-            simulator.restore(SimulatorState(point.tobytes(), self.control, 0.0, done, self.contacts[k]))
+            state = SimulatorState(point.tobytes(), self.control, 0.0, done, self.contacts[k], watched=self.watched)
+            simulator.restore(state)
             try:
                 simulator.step(None if control is None else control[k, 0], n)
             except SimulationError as error:
@@ -94,3 +97,4 @@ class SimulatorsInTurn:
                 continue
             reached = simulator.snapshot()
             self.points[:, k], self.contacts[k] = np.frombuffer(reached.point), reached.contacts
+            self.watched = reached.watched

@@ -37,11 +37,6 @@ def _energy(system: System, q, v) -> Expression:
 class MomentumForm:
     """Momentum form of the equations of motion of a traced system, see :class:`gauss.integrators.step.Mechanics`.
 
-    Parameters
-    ----------
-    program : Program
-        Its functions.
-
     Attributes
     ----------
     n_constraints : int

@@ -19,7 +19,7 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
-from gauss.simulation.handover import finished
+from gauss.simulation.compiled_runs import finished
 from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_size
 from gauss.simulation.moreau.contact_events import ContactEvents

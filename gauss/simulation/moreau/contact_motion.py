@@ -8,7 +8,9 @@ from gauss.codegen.kernels.step_memory import CHANGES_ROOM
 from gauss.dynamics.contact.contact_changes import ModeChange
 from gauss.dynamics.contact.contact_stepper import contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
+from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
+from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_events import event_of
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings
@@ -29,12 +31,15 @@ class ContactMotionState(NamedTuple):
         Forces of the last step.
     modes : ndarray of int
         Modes of the contacts and set-valued elements after it.
+    asleep : object
+        Bodies asleep, in motions that know any.
     """
 
     state: State
     work: np.ndarray
     known: Any
     modes: np.ndarray
+    asleep: Any = None
 
 
 class ContactMotion:
@@ -60,6 +65,8 @@ class ContactMotion:
     events : list of Event
         Changes of the contact mode.
     """
+
+    stepper: FreeBodyStepper | MechanismStepper
 
     def __init__(self, system: System, held: bool = False, stepper: FreeBodyStepper | MechanismStepper | None = None):
         self.system, self.stepper = system, stepper or contact_stepper(system, held)
@@ -130,7 +137,7 @@ class ContactMotion:
 
     def _by_python(self, t: float) -> np.ndarray:
         begin, h = self.state, t - self.state.t
-        found = self.stepper.python_step(begin, h)
+        found = self._python_step(h)
         self.steps += 1
         self.largest, self.relaxed = max(self.largest, found.error or 0.0), self.relaxed + (found.error is None)
         self.paradoxes.warn(found.paradoxes, begin.t)
@@ -139,6 +146,9 @@ class ContactMotion:
         self.state, self.work = self.stepper.projected(State(t, found.q, found.v)), self.work + h * found.power
         return np.concatenate([[t], self.state.q, self.state.v, self.work])
 
+    def _python_step(self, h: float) -> FreeBodyStep | MechanismStep:
+        return self.stepper.python_step(self.state, h)
+
     def _note(self, times, changes: list[ModeChange]):
         """Keep changes of the contact mode as events, each at the end of its step; those that begin closed are none."""
         names, first = self.stepper.elements, self.stepper.first_set_valued
@@ -146,6 +156,10 @@ class ContactMotion:
             begins = not change.before and (change.element >= first or times[change.step] == self.start)
             event = event_of(change, names[change.element], float(times[change.step + 1]), begins)
             self.events += [] if event is None else [event]
+
+    def in_words(self) -> str:
+        """What is to be said of the motion beside its steps; nothing."""
+        return ""
 
     def beside(self, begin: ContactMotionState, t: float) -> tuple[State, np.ndarray]:
         """State and work at a time after a shorter step from what was kept; the motion does not continue from there."""
@@ -165,5 +179,5 @@ class ContactMotion:
 
     def take(self, kept: ContactMotionState):
         """Continue from what was kept."""
-        self.state, self.work, self.stepper.known, modes = kept
+        self.state, self.work, self.stepper.known, modes, _ = kept
         self.stepper.record.take(modes)

@@ -17,6 +17,7 @@ from gauss.simulation.grid import grid_of, with_samples
 from gauss.simulation.moreau.contact_motion import ContactMotion
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, in_words
+from gauss.simulation.moreau.sleeping_motion import SleepingMotion
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
@@ -69,7 +70,8 @@ class PairKernelRun(PythonRun):
 
     def __init__(self, problem: Problem):
         self.held, system = problem.held, problem.system
-        self.motion = ContactMotion(system, self.held is not None)
+        sleeping, held = problem.sleeping, self.held is not None
+        self.motion = ContactMotion(system, held) if sleeping is None else SleepingMotion(system, sleeping)
         self.stepper = self.motion.stepper
         self.engine = PairKernelEngine(self.stepper)
         super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
@@ -143,7 +145,7 @@ class PairKernelRun(PythonRun):
         self.engine.evaluations = motion.steps
         self.events = sorted([*self.events, *motion.events], key=lambda event: event.t)
         whole = super()._trajectory(kept, samples, began)
-        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method)
+        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method) + motion.in_words()
         return replace(whole, stats=whole.stats._replace(method=method), step=self.step)
 
 

@@ -18,6 +18,7 @@ EXAMINED = 4  # samples of a motion with the largest rates that are examined, an
 MOTIONS = 16  # of a batch, those with the largest rates, that are examined
 GROWTH = 2.0  # of the sum of squares of the rates between two looks at a motion that is stepped
 STEPS_BETWEEN = 1000  # of two looks otherwise: a look takes as long as some ten steps
+FIRST, NEVER = (-np.inf, 0.0), (np.inf, np.inf)  # when looks are due: before a motion, and after a warning
 
 
 class StepLimit:
@@ -139,6 +140,8 @@ class PassingWatch:
     ----------
     has_pairs : bool
         Whether the system has shapes that could pass through each other.
+    due : tuple of float
+        Square of the rates, and number of steps, at which the next look is due.
     """
 
     def __init__(self, system: System, step: float):
@@ -147,7 +150,7 @@ class PassingWatch:
 
     def begin(self):
         """Begin a motion, whose first rates are looked at."""
-        self._grown, self._due = -np.inf, 0.0
+        self.due: tuple[float, float] = FIRST
 
     def examine(self, square: float, steps: int, states: Callable[[], Iterable[tuple[str, State]]]):
         """Look at states of motions where that is due, and warn once.
@@ -161,13 +164,15 @@ class PassingWatch:
         states : callable
             () → states of the motions, each after words that say which it is.
         """
-        if square <= self._grown and steps < self._due:
+        grown, due = self.due
+        if square <= grown and steps < due:
             return
         for which, state in states():
             if warn_of_passing(self.system, state, self.step, which):
-                self._grown = self._due = np.inf
+                self.due = NEVER
                 return
-            self._grown, self._due = max(self._grown, GROWTH * float(state.v @ state.v)), steps + STEPS_BETWEEN
+            grown = max(grown, GROWTH * float(state.v @ state.v))
+            self.due = grown, steps + STEPS_BETWEEN
 
 
 def _largest_rates(system: System, v: np.ndarray) -> np.ndarray:

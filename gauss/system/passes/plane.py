@@ -3,6 +3,10 @@
 Nothing leaves the plane, so three of six rows of every joint are 0 = 0, and two of three moments of inertia and the heights
 of the joints above the plane have no influence. Here the mechanism is laid into the plane exactly: its normal is the
 z-axis of every body. Terms without influence are then exact zeros, for which no operation is emitted.
+
+Of a loop in a plane in a mechanism that is none, the links stay in one plane of each other whatever carries it: of the five
+rows of a hinge that closes it, two rotations and the distance along the axis are 0 = 0. Four-bars in the legs of a walking
+robot are the usual case.
 """
 
 from dataclasses import replace
@@ -11,6 +15,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.system.passes.propagation import propagated
+from gauss.system.passes.rigid import loop_of
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
 from gauss.system.subsystem import GROUND, Subsystem
 
@@ -95,3 +100,25 @@ def _upright(R: np.ndarray) -> np.ndarray:
     x = R[:, 0] * [1.0, 1.0, 0.0] if z[2] else NORMAL
     z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
     return np.column_stack([x, rotations.cross(z, x), z])
+
+
+def plane_loops(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
+    """Mark the rows 0 = 0 of the hinges that close loops in a plane as redundant."""
+    rows, reasons = set(), []
+    for index in subsystem.loop_joints:
+        if subsystem.joints[index].pair.kind != "revolute" or not _is_plane(subsystem, index):
+            continue
+        found = {(index, axis) for axis in TRIVIAL_ROWS["revolute"]} - subsystem.redundant
+        rows |= found
+        if found:
+            reasons.append(f"the loop that {subsystem.joints[index].name!r} closes stays in a plane")
+    return [replace(subsystem, redundant=subsystem.redundant | rows) if rows else subsystem], reasons
+
+
+def _is_plane(subsystem: Subsystem, index: int) -> bool:
+    """Whether all hinges of the loop that a hinge closes have one direction, and all sliders lie across it."""
+    joints = [subsystem.joints[k] for k in loop_of(subsystem, index)]
+    if any(joint.pair.kind not in TRIVIAL_ROWS for joint in joints):
+        return False
+    closing = subsystem.joints[index]
+    return propagated(joints, (closing.parent, closing.R_parent[:, 2]), normal_beyond, PARALLEL_NORMALS) is not None
