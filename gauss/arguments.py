@@ -15,7 +15,7 @@ import numpy as np
 from gauss.errors import ArgumentError, did_you_mean
 
 T = TypeVar("T", bound=Callable)
-LARGEST_DOUBLE = sys.float_info.max  # whole numbers beyond it are no doubles
+LARGEST_FLOAT = sys.float_info.max  # bound of numbers that may be integers: no float holds 10**400
 
 
 def named_arguments(target: T) -> T:
@@ -68,6 +68,17 @@ def _misfit(expected: Signature, arguments: tuple, named: dict) -> str:
     return ""
 
 
+def real_numbers(value) -> np.ndarray | None:
+    """Array of real numbers; None of anything else: text, objects, complex or masked numbers, rows of several lengths."""
+    if np.ma.is_masked(value):
+        return None
+    try:
+        found = np.asarray(value)
+    except (ValueError, RuntimeError):  # ragged; a tensor of torch in a graph of gradients
+        return None
+    return found.astype(float) if found.dtype.kind in "biuf" else None
+
+
 def real_array(value, what: str, expected: str = "numbers") -> np.ndarray:
     """Array of real numbers.
 
@@ -83,15 +94,14 @@ def real_array(value, what: str, expected: str = "numbers") -> np.ndarray:
     Raises
     ------
     ArgumentError
-        If it is none: text, objects, complex numbers, rows of several lengths.
+        If it is none: text, objects, complex or masked numbers, rows of several lengths.
     """
-    try:
-        found = np.asarray(value)
-    except (ValueError, RuntimeError):  # rows of several lengths; a tensor of torch in a graph of gradients
-        found = np.asarray(None)
-    if found.dtype.kind not in "biuf" and found.size:
-        raise ArgumentError(f"{what}: expected {expected}, got {value!r:.80}.")
-    return found.astype(float)
+    found = real_numbers(value)
+    if found is not None:
+        return found
+    if isinstance(value, np.ndarray) and not value.size:
+        return np.zeros(value.shape)
+    raise ArgumentError(f"{what}: expected {expected}, got {value!r:.80}.")
 
 
 def table(value, what: str, expected: str) -> dict:

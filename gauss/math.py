@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from gauss.arguments import real_array
 from gauss.codegen import Expression, graph_of
 from gauss.errors import SceneError
 
@@ -234,7 +235,7 @@ def interp(x, xp, fp):
     >>> float(math.interp(0.5, [0.0, 1.0, 2.0], [0.0, 10.0, 0.0]))
     5.0
     """
-    xp, fp = np.asarray(xp, dtype=float), np.asarray(fp, dtype=float)
+    xp, fp = (real_array(entries, "interp", "tables of numbers") for entries in (xp, fp))
     if xp.ndim != 1 or xp.shape != fp.shape or not xp.size or not (np.diff(xp) > 0.0).all():
         raise SceneError(f"interp: expected increasing arguments and as many values, got shapes {xp.shape} and {fp.shape}.")
     if not _traced(x):

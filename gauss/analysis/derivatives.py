@@ -10,6 +10,7 @@ import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.constraint_leak import LARGEST_LEAK, constraint_leak, may_leak
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, on_boundary
 from gauss.dynamics.laws.law_kinks import kinked_laws
@@ -103,7 +104,7 @@ class AccelerationChanges:
         refuse_other_pose(system, state.q)
         if has_joint_modes(system) and not (system.contacts.placed or system.losses):
             system = _of_mode(system, state, load)
-        self.system, self.state, self.load = system, state, load
+        self.system, self.state, self.load = system, state, None if load is None else checked_load(system, load)
         self.laws = Laws(system)
         if not system.n_v:
             return

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.arguments import real_array
 from gauss.backends.closure import Factor
 from gauss.backends.motions import allowed
 from gauss.backends.tree_factor import TreeFactor
@@ -68,7 +69,7 @@ def inverse_dynamics(system: System, state: State, acceleration, drives, weights
         unilateral constraint is closed.
     """
     columns = fixed_columns(system, drives)
-    w = np.ones(len(columns)) if weights is None else np.asarray(weights, dtype=float)
+    w = np.ones(len(columns)) if weights is None else real_array(weights, "weights")
     if not columns or w.shape != (len(columns),) or not (np.isfinite(w).all() and (w > 0).all()):
         raise StateError(
             f"drives and weights: expected names of joints and {len(columns)} weights > 0, got {drives!r}, {weights!r}."

@@ -6,6 +6,7 @@ Each is that of :func:`gauss.linearise`, in the same independent coordinates, wh
 import numpy as np
 
 from gauss.analysis.linear_model import LinearModel, linearise
+from gauss.arguments import real_array
 from gauss.dynamics.state_functions import RESIDUAL_TOLERANCE, distance_of_loops, refused_state
 from gauss.errors import StateError
 
@@ -35,8 +36,8 @@ class LinearModelOfEach:
             If a state does not fit, is off the constraints, or the independent coordinates do not determine the others
             there.
         """
-        given = [np.asarray(part, dtype=float) for part in (q, v, load)]
-        time = np.asarray(t, dtype=float)
+        given = [real_array(part, name) for name, part in (("q", q), ("v", v), ("load", load))]
+        time = real_array(t, "t", "times [s]")
         shape = np.broadcast_shapes(*(part.shape[:-1] for part in given), time.shape)
         rows = [np.broadcast_to(part, (*shape, part.shape[-1])).reshape(-1, part.shape[-1]) for part in given]
         times = np.broadcast_to(time, shape).ravel()

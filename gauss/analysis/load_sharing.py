@@ -5,6 +5,7 @@ L is a basis of the null space of Kᵀ (redundancies), c are the compliances of 
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.backends.closure import Factor
 from gauss.backends.motions import allowed
 from gauss.backends.solution import Solution
@@ -51,8 +52,8 @@ def _weighted(motion: Kinematics, name: str, values, r: int) -> np.ndarray:
     system = motion.system
     if name not in system.scene.joints:
         raise SceneError(f"compliance: no joint {name!r}. {did_you_mean(name, system.scene.joints)}")
-    c = np.asarray(values, dtype=float)
-    if c.shape != (6,) or not np.isfinite(c).all() or (c < 0).any():
+    c = real_numbers(values)
+    if c is None or c.shape != (6,) or not np.isfinite(c).all() or (c < 0).any():
         raise SceneError(f"compliance of joint {name!r}: expected six numbers ≥ 0 [rad/(N m), m/N], got {values!r}.")
     joint = system.joint(name)
     R = motion.R[joint.parent] @ joint.R_parent

@@ -10,6 +10,7 @@ import numpy as np
 
 from gauss.analysis.loop_closure import POSITION_STEPS, position_residuals
 from gauss.analysis.regressor import RegressorModel
+from gauss.arguments import real_numbers
 from gauss.dynamics.projection import fixed_columns, project_positions
 from gauss.errors import StateError, did_you_mean
 from gauss.scene.set_valued import JointFriction
@@ -59,10 +60,9 @@ def measured_motion(model: RegressorModel, q, v, acceleration, forces) -> Measur
 
 def _array(given, what: str, rows: int | None, columns: int) -> np.ndarray:
     """Array (n, columns) of finite numbers."""
-    try:
-        found = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise StateError(f"identify: {what}: expected numbers, got {given!r}.") from None
+    found = real_numbers(given)
+    if found is None:
+        raise StateError(f"identify: {what}: expected numbers, got {given!r}.")
     if found.ndim != 2 or found.shape[1] != columns or rows not in (None, len(found)) or not len(found):
         shape = f"({'n' if rows is None else rows}, {columns})"
         raise StateError(f"identify: {what}: expected shape {shape}, got {found.shape}.")

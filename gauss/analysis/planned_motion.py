@@ -15,7 +15,7 @@ from gauss.analysis.loop_closure import closed, with_rates
 from gauss.analysis.tangents import Tangents
 from gauss.analysis.target_problem import positive_values
 from gauss.analysis.time_scaling import REST, along_lines, extremes, through_points
-from gauss.arguments import LARGEST_DOUBLE, named_arguments
+from gauss.arguments import LARGEST_FLOAT, named_arguments, real_array
 from gauss.codegen import Expression
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble_motion
@@ -141,7 +141,7 @@ class PlannedMotion:
         places = [system.entry(name) for name in self.coordinates]
         state = system.initial_state() if start is None else start
         found = list[State]()
-        for t in np.atleast_1d(np.asarray(times, dtype=float)):
+        for t in np.atleast_1d(real_array(times, "times", "times [s]")):
             q, v = state.q.copy(), np.zeros(system.n_v)
             if system.has_closures and found:
                 q = _predicted(system, state, held, self.position(t) - q[places])
@@ -174,7 +174,7 @@ class PlannedMotion:
         SimulationError, StateError
             As of :meth:`states`.
         """
-        t = np.linspace(self.begin, self.end, SAMPLES) if times is None else np.asarray(times, dtype=float)
+        t = np.linspace(self.begin, self.end, SAMPLES) if times is None else real_array(times, "times", "times [s]")
         states = self.states(system, t, start)
         return Trajectory.from_coordinates(system, t, [state.q for state in states], [state.v for state in states])
 
@@ -353,5 +353,5 @@ def _refuse_beyond(system: System, names: Sequence[str], law: PPoly):
 
 def _refuse_begin(begin):
     """Raise an ArgumentError if the begin of a motion is no finite time."""
-    if isinstance(begin, bool) or not isinstance(begin, float | int) or not abs(begin) <= LARGEST_DOUBLE:
+    if isinstance(begin, bool) or not isinstance(begin, float | int) or not abs(begin) <= LARGEST_FLOAT:
         raise ArgumentError(f"plan_motion: begin: expected a finite time [s], got {begin!r:.80}.")

@@ -8,6 +8,7 @@ Inputs reach the span of B, A B, A² B …; the model on its orthogonal compleme
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.errors import ArgumentError, SimulationError
 
 ZERO = 1e-12  # length of a column of A x, relative to the largest entry of A, that is rounding
@@ -61,10 +62,8 @@ def weights(given, usual: np.ndarray, what: str) -> np.ndarray:
     """
     if given is None:
         return np.diag(usual)
-    try:
-        found = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        found = np.zeros(0)
+    numbers = real_numbers(given)
+    found = np.zeros(0) if numbers is None else numbers
     found = np.diag(found) if found.shape == usual.shape else found
     if found.shape != (usual.size, usual.size) or not np.isfinite(found).all() or not np.allclose(found, found.T):
         raise ArgumentError(

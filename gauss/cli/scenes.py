@@ -29,7 +29,9 @@ def explain(scene: SceneName, root: Root = "fixed", read: Read = None):
     found = load(scene, root, read)
     if isinstance(found, gauss.Scene):
         system = gauss.compile_scene(found)
-        typer.echo(f"{system.explain()}\n\n{gauss.advise(system)}")
+        typer.echo(system.explain())
+        if system.n_v:  # else there is no method to choose
+            typer.echo(f"\n{gauss.advise(system)}")
     else:
         typer.echo(import_module("gauss.servo").explain(found))
 

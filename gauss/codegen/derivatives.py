@@ -78,6 +78,8 @@ def forward(outputs, inputs, directions) -> np.ndarray:
     if any(node.is_constant for node in inputs):
         raise TypeError("cannot differentiate with respect to a constant; give symbols, or expressions of them.")
     graph = _graph(outputs, inputs)
+    if graph is None:  # numbers of no inputs
+        return _map(outputs, lambda number: 0.0)
     zero = graph.constant(0.0)
     rate = {node.index: graph.lift(direction) for node, direction in zip(inputs, directions, strict=True)}
     for node in varying(outputs.ravel()):
@@ -108,8 +110,8 @@ def jacobian(outputs, inputs) -> np.ndarray:
     return np.array(columns, dtype=object).T
 
 
-def _graph(outputs, inputs) -> Graph:
-    return next(node.graph for node in (*inputs, *outputs.ravel()) if isinstance(node, Expression))
+def _graph(outputs, inputs) -> Graph | None:
+    return next((node.graph for node in (*inputs, *outputs.ravel()) if isinstance(node, Expression)), None)
 
 
 def _map(array: np.ndarray, function) -> np.ndarray:

@@ -1,8 +1,9 @@
 """Background thread that optimises quick code, unit by unit.
 
 LLVM runs without Python's global lock, so that motions go on meanwhile. The thread ends when nothing is left to be
-optimised; it is stopped, at the end of its unit, before a fork and at the end of the process. It rests while code is being
-made: the first motion has the processor, and LLVM, for itself. Code whose system is gone is not optimised.
+optimised; it is stopped, at the end of its unit, before a fork and at the end of the process, which does not wait for a
+long one. It rests while code is being made: the first motion has the processor, and LLVM, for itself. Code whose system is
+gone is not optimised.
 """
 
 import atexit
@@ -16,10 +17,12 @@ from threading import Condition, Thread, current_thread
 
 from gauss.codegen import object_cache
 from gauss.codegen.object_code import linked, optimised_objects, packed, unpacked
+from gauss.codegen.process_end import can_skip_destructors, skip_destructors
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, VARIABLE, MachineCode, Run, reset_after_fork, wanted
 
 REST = 0.1  # pause after code was made [s]: the next module of the same motion may follow
 LONGEST_STOP = 30.0  # wait for the end of a unit [s]: one takes some 0.2 s, many times more on a busy machine
+LONGEST_END = 2.0  # the same at the end of a process that may end in the middle of a unit [s]: of 1000 links one takes 20 s
 MOST_FAILURES = 5  # number of failures that are kept
 
 
@@ -125,14 +128,22 @@ class Optimiser:
                     thread.start()
                     self._thread = thread
 
-    def stop(self):
-        """Stop the thread at the end of its unit, until :meth:`go_on`."""
+    def stop(self, longest: float = LONGEST_STOP):
+        """Stop the thread at the end of its unit, until :meth:`go_on`; wait for it no longer than this [s]."""
         with self._changed:
             self._stops += 1
             self._changed.notify_all()
             thread = self._thread
         if thread is not None and thread is not current_thread():
-            thread.join(LONGEST_STOP)
+            thread.join(longest)
+
+    def end(self):
+        """Stop the thread for the end of the process: LLVM must not run while its destructors do."""
+        try:
+            self.stop(LONGEST_END if can_skip_destructors() else LONGEST_STOP)
+        finally:  # also of a wait that Ctrl-C ends
+            if self._thread is not None:
+                skip_destructors()
 
     def go_on(self):
         """Take back a :meth:`stop`."""
@@ -189,6 +200,6 @@ def one_tier(tier: str = AUTO, shown: bool = True) -> Run:
     return Run(tier, shown)
 
 
-atexit.register(OPTIMISER.stop)  # LLVM must not run while the process is taken down
+atexit.register(OPTIMISER.end)
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(before=OPTIMISER.stop, after_in_parent=OPTIMISER.go_on, after_in_child=OPTIMISER.in_child)

@@ -5,6 +5,7 @@ from functools import reduce
 import numpy as np
 
 from gauss import math
+from gauss.arguments import real_numbers
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import Scalar
 from gauss.dynamics.constraint_rows import joint_distance, joint_rate_residual, joint_residual, joint_rows
@@ -192,9 +193,8 @@ def checked_load(system: System, load) -> np.ndarray:
     """
     if load is None:
         return np.zeros(system.n_v)
-    load = np.asarray(load, dtype=float)
-    if load.shape != (system.n_v,) or not np.isfinite(load).all():
-        raise StateError(
-            f"load: expected {system.n_v} finite numbers ({', '.join(system.coordinates)}), got shape {load.shape}."
-        )
-    return load
+    found = real_numbers(load)
+    if found is None or found.shape != (system.n_v,) or not np.isfinite(found).all():
+        got = f"{load!r:.80}" if found is None else f"shape {found.shape}"
+        raise StateError(f"load: expected {system.n_v} finite numbers ({', '.join(system.coordinates)}), got {got}.")
+    return found

@@ -218,7 +218,7 @@ def _function(system: System, requests, columns) -> TracedFunction:
         parts = [result if isinstance(result, tuple) else (result,) for result in found]
         residual, total, *others = error_measures(terms, given, of_loops or columns is not None)
         others += [constraint_leak(system, Mechanism(system, q, v, t))] if leaks else []
-        overflow = sum(_overflow(one.name, own, v) for one, own in zip(requests, parts, strict=True))
+        overflow = np.abs(sum(_overflow(one.name, own, v) for one, own in zip(requests, parts, strict=True)))  # −∞, too
         return *(part for own in parts for part in own), [residual, total + overflow, *others]
 
     name = ", ".join(":".join(filter(None, one[:2])) for one in requests)

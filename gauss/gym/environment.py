@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.dynamics.outputs import split
 from gauss.errors import ArgumentError, SimulationError, extra
 from gauss.gym.task import Task
 from gauss.simulation import Simulator
-from gauss.simulation.held_inputs import real_numbers
 
 with extra("gym"):
     import gymnasium

@@ -75,9 +75,17 @@ def load(source, **options):
     raise FileError(_neither(name, path, [*files, *families(), "robot:panda", "robot:talos", "robot:ur5"]))
 
 
+def _exists(path: Path) -> bool:
+    """Whether there is such a file or folder; none has a name that the system cannot take."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
 def _neither(name: str, path: Path, everything: list[str]) -> str:
     """Message about what is neither a file that can be read nor a model."""
-    if path.suffix or path.exists():
+    if path.suffix or _exists(path):
         what = "it is a folder" if path.is_dir() else f"cannot read a file of type {path.suffix or 'unknown'!r}"
         return f"{name or repr(name)}: {what}; expected {' or '.join(READERS)}."
     return f"{name!r} is neither a file nor a model. {did_you_mean(name, everything)}"

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.errors import LinkageError
 from gauss.linkages.assembly_checks import check_assembled, check_regular
 from gauss.linkages.chain import Chain
@@ -103,10 +104,10 @@ def _pose(moving: LinkMotion) -> np.ndarray:
 
 
 def _numbers(what: str, given) -> np.ndarray:
-    try:
-        array = np.atleast_1d(np.asarray(given, dtype=float))
-    except (OverflowError, TypeError, ValueError) as error:
-        raise LinkageError(f"{what}: expected numbers, got {given!r}.") from error
+    numbers = real_numbers(given)
+    if numbers is None:
+        raise LinkageError(f"{what}: expected numbers, got {given!r}.")
+    array = np.atleast_1d(numbers)
     if array.ndim != 1 or not array.size or not np.isfinite(array).all():
         raise LinkageError(f"{what}: expected one or more finite numbers in a row, got shape {array.shape}.")
     return array

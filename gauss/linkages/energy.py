@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.arguments import LARGEST_DOUBLE, real_array
+from gauss.arguments import LARGEST_FLOAT, real_array
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, end_of_turn
 from gauss.linkages.cycle_result import Cycle
@@ -209,7 +209,7 @@ def flywheel(chain: Chain, fluctuation: float) -> Flywheel:
     LinkageError
         If δ is not positive, or the crank rests.
     """
-    if not isinstance(fluctuation, Real) or not 0 < fluctuation <= LARGEST_DOUBLE or not chain.driver.speed:
+    if not isinstance(fluctuation, Real) or not 0 < fluctuation <= LARGEST_FLOAT or not chain.driver.speed:
         raise LinkageError(
             f"{chain.name}: a flywheel needs a fluctuation δ > 0 and a crank that turns; "
             f"got δ = {fluctuation!r}, speed {chain.driver.speed} rad/s."

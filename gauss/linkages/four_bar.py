@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.codegen import Kernel, forward, write
 from gauss.errors import ArgumentError
 from gauss.linkages.chain import Dyad, Leg
@@ -143,10 +144,8 @@ def numbers(given, shape: tuple, what: str, least: int) -> np.ndarray:
     ArgumentError
         If it is something else, or has fewer rows than ``least``.
     """
-    try:
-        found = np.array(given, dtype=float)
-    except (TypeError, ValueError):
-        found = np.empty(0)
+    numbers = real_numbers(given)
+    found = np.empty(0) if numbers is None else numbers
     if found.shape[1:] != shape or found.ndim != len(shape) + 1 or len(found) < least or not np.isfinite(found).all():
         sizes = ", ".join(["k", *map(str, shape)])
         raise ArgumentError(f"{what}: expected {least} or more finite rows of shape ({sizes}), got {given!r}.")

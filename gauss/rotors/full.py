@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.errors import StateError, did_you_mean
 from gauss.rotors.contract import reduce
 from gauss.rotors.links import GearPair
@@ -117,8 +118,8 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
 
 
 def _checked(values, reduced, what: str) -> np.ndarray:
-    array = np.asarray(values, dtype=float)
-    if array.shape != (len(reduced.names),) or not np.isfinite(array).all():
+    array = real_numbers(values)
+    if array is None or array.shape != (len(reduced.names),) or not np.isfinite(array).all():
         raise StateError(f"{what}: expected {len(reduced.names)} finite numbers, one for each shaft, got {values!r}.")
     return array
 

@@ -6,9 +6,10 @@ from numbers import Real
 
 import numpy as np
 
-from gauss.arguments import LARGEST_DOUBLE, named_arguments
+from gauss.arguments import LARGEST_FLOAT, named_arguments
 from gauss.codegen import one_tier
 from gauss.errors import SimulationError, SwitchingWarning, did_you_mean, user_level
+from gauss.interruption import interruption_keeps
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import NetworkEquations
@@ -18,7 +19,7 @@ from gauss.rotors.reduced import ReducedNetwork
 from gauss.rotors.run import METHODS, RotorRun
 from gauss.rotors.stops import stops
 from gauss.rotors.switching import switching
-from gauss.simulation.arguments import check_breaks
+from gauss.simulation.arguments import check_breaks, numbers
 from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 CHOICES = ("auto", *METHODS)
@@ -26,6 +27,7 @@ DEFAULT_ATOL = 1e-9  # rad, and relative to the slow speed of the network
 
 
 @named_arguments
+@interruption_keeps("trajectory")
 @one_tier()
 def simulate(
     network: Network,
@@ -121,7 +123,7 @@ def _checked(duration: float, times, rtol: float, atol: float | None, method: st
             isinstance(value, bool)
             or not isinstance(value, Real)
             or not value > 0
-            or (name != "max_step" and not value <= LARGEST_DOUBLE)
+            or (name != "max_step" and not value <= LARGEST_FLOAT)
         ):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if method not in CHOICES:
@@ -131,7 +133,7 @@ def _checked(duration: float, times, rtol: float, atol: float | None, method: st
 
 def _sample_times(times, duration: float) -> np.ndarray:
     """Times of samples as an array, checked [s]."""
-    samples = np.asarray(times, dtype=float)
+    samples = numbers(times, "times: expected increasing times [s]")
     inside = samples.ndim == 1 and samples.size and (np.diff(samples) > 0).all()
     if not inside or samples[0] < 0 or samples[-1] > duration:
         raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh, null_space
 
+from gauss.arguments import real_array
 from gauss.errors import SceneError
 from gauss.rotors.contract import reduce
 from gauss.rotors.links import GearPair, TorsionSpring
@@ -198,7 +199,7 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
     >>> [tuple(round(float(x), 3) for x in crossing) for crossing in diagram.crossings]
     [(1.0, 48.99, 7.797), (2.0, 24.495, 7.797)]
     """
-    name, speeds = network.require_shaft(shaft), np.asarray(speeds, dtype=float)
+    name, speeds = network.require_shaft(shaft), real_array(speeds, "speeds", "speeds [rad/s]")
     if speeds.ndim != 1 or not np.isfinite(speeds).all() or not speeds.all():
         raise SceneError(f"speeds: expected a list of finite speeds [rad/s] other than 0, got {speeds!r}.")
     reduced = reduce(network)

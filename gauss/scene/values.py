@@ -27,15 +27,20 @@ def keep(element, **checked):
         object.__setattr__(element, field, value)
 
 
+def as_float(value) -> float:
+    """Float of a real number; ±∞ of one that no float holds, as of 10**400."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
 def number(value, what: str, unit: str, *, positive=False, non_negative=False) -> float:
     """Finite float, or a SceneError with what was expected."""
     sign = "a positive " if positive else "a non-negative " if non_negative else "a "
     if type(value) is not float and (isinstance(value, bool) or not isinstance(value, Real)):
         raise SceneError(f"{what}: expected {sign}number in [{unit}], got {value!r} ({type(value).__name__}).")
-    try:
-        value = float(value)
-    except OverflowError:  # a whole number beyond all doubles
-        value = math.inf
+    value = as_float(value)
     if not math.isfinite(value) or (positive and value <= 0) or (non_negative and value < 0):
         raise SceneError(f"{what}: expected {sign}finite number in [{unit}], got {value!r}.")
     return value
@@ -47,7 +52,7 @@ def vector(value, what: str, unit: str, size: int = 3) -> tuple[float, ...]:
         entries = np.asarray(value, dtype=object).reshape(-1).tolist()
     except ValueError:
         entries = []
-    if isinstance(value, str) or len(entries) != size:
+    if isinstance(value, str) or np.ma.is_masked(value) or len(entries) != size:
         raise SceneError(f"{what}: expected {size} numbers in [{unit}], got {value!r}.")
     return tuple(number(entry, what, unit) for entry in entries)
 
@@ -157,6 +162,8 @@ def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
     if size == 1 and type(value) in FLOATS:  # the usual case, quickly
         return np.array([value])
     entries = _entries(value)
+    if entries.dtype != float and all(isinstance(entry, Real) for entry in entries):  # fractions, very large integers
+        entries = np.array([as_float(entry) for entry in entries])
     if entries.size == size and (entries.dtype == float or all(map(is_scalar, entries))):
         return entries
     raise _refused(what, given[0], value, size)
@@ -174,7 +181,7 @@ def is_scalar(entry) -> bool:
 def _entries(value) -> np.ndarray:
     """Flat array of floats, or of objects where something else is among them."""
     try:
-        array = np.asarray(value)
+        array = np.asarray(None if np.ma.is_masked(value) else value)
     except ValueError:  # lists of several lengths
         array = np.asarray([None], dtype=object)
     return np.ravel(array.astype(float) if array.dtype.kind in "fiub" else array.astype(object))

@@ -11,6 +11,7 @@ from gauss.dynamics.laws.constraint_modes import refuse_surfaces
 from gauss.dynamics.laws.switching import Switching
 from gauss.errors import SimulationError, require
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
+from gauss.interruption import interruption_keeps
 from gauss.servo.dynamics import AVOID, ServoEngine
 from gauss.servo.instant import number
 from gauss.servo.plan import RelationPlan
@@ -34,6 +35,7 @@ JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the r
 
 
 @named_arguments
+@interruption_keeps("trajectory")
 @one_tier()
 def simulate(
     servo: Servo,

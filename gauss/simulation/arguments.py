@@ -5,6 +5,7 @@ from numbers import Real
 import numpy as np
 
 from gauss import integrators
+from gauss.arguments import real_numbers
 from gauss.backends import Backend, ready
 from gauss.dynamics.conditions import named
 from gauss.dynamics.laws.switching import Switching, switching
@@ -151,21 +152,18 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
     """
     if isinstance(breaks, tuple) and not breaks:
         return NO_TIMES.switches
-    times = start + _numbers(breaks, "breaks: expected times [s]").reshape(-1)
+    times = start + numbers(breaks, "breaks: expected times [s]").reshape(-1)
     if not np.isfinite(times).all():
         raise SimulationError(f"breaks: expected finite times [s], got {breaks!r}.")
     return np.unique(times[(times > start) & (times <= start + duration)])
 
 
-def _numbers(value, expected: str) -> np.ndarray:
-    """Array of numbers, or a SimulationError with what was expected; text is no number."""
-    try:
-        found = np.asarray(value)
-    except (ValueError, RuntimeError):  # ragged; a tensor of torch in a graph of gradients
-        found = np.asarray(None)
-    if found.size and found.dtype.kind not in "iuf":
-        raise SimulationError(f"{expected}, got {value!r}.")
-    return found.astype(float)
+def numbers(value, expected: str) -> np.ndarray:
+    """Array of numbers, or a SimulationError with what was expected; truth values are none."""
+    found = real_numbers(value)
+    if found is None or (found.size and np.asarray(value).dtype == bool):
+        raise SimulationError(f"{expected}, got {value!r:.200}.")
+    return found
 
 
 def chosen(integrator: str | Integrator) -> Integrator:
@@ -215,7 +213,7 @@ def sample_times(times, start: float, duration: float):
     """Times of the samples [s], checked; None for every accepted step."""
     if times is None:
         return None
-    samples = start + _numbers(times, "times: expected increasing numbers [s]")
+    samples = start + numbers(times, "times: expected increasing numbers [s]")
     end = start + duration
     increasing = samples.ndim == 1 and samples.size > 0 and bool((samples[1:] > samples[:-1]).all())
     if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # False for NaN, too

@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from gauss.arguments import LARGEST_DOUBLE
+from gauss.arguments import LARGEST_FLOAT, real_numbers
 from gauss.codegen import Scalar
 from gauss.dynamics.inputs import driven_scene
 from gauss.dynamics.scene_compilation import compile_scene
@@ -51,7 +51,7 @@ class HeldInputs:
         self.system, self.names = system, tuple(system.scene.inputs)
         if not self.names:
             raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
-        if not isinstance(rate, int | float) or not 0.0 < rate <= LARGEST_DOUBLE:
+        if not isinstance(rate, int | float) or not 0.0 < rate <= LARGEST_FLOAT:
             raise SimulationError(f"rate: expected a positive number of samples in a second [Hz], got {rate!r}.")
         asked = (end - start) * rate
         refuse_beyond_memory(SAMPLE_NUMBERS * asked, f"rate: {rate:.3g} Hz are {asked:.2g} samples that", SHORTER)
@@ -146,17 +146,6 @@ def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     return found
 
 
-def real_numbers(value) -> np.ndarray | None:
-    """Array of numbers; None of anything else."""
-    if np.ma.is_masked(value):
-        return None
-    try:
-        found = np.asarray(value)
-    except (ValueError, RuntimeError):  # ragged; a tensor of torch in a graph of gradients
-        return None
-    return found.astype(float) if found.dtype.kind in "biuf" else None
-
-
 def numbers_in_words(numbers: np.ndarray | None) -> str:
     """What stands in place of finite numbers of a shape, for a message; None: no numbers."""
     if numbers is None:
@@ -180,13 +169,3 @@ def _called(law: Callable) -> Callable:
     except ValueError:  # a builtin that hides its signature
         pass
     return law
-
-
-def as_floats(u) -> np.ndarray | None:
-    """Array of numbers of any kind; None where they are none, or masked."""
-    if np.ma.is_masked(u):
-        return None
-    try:
-        return np.asarray(u, dtype=float)
-    except (OverflowError, TypeError, ValueError, RuntimeError):  # the last of torch
-        return None

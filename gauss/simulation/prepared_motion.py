@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gauss.arguments import named_arguments
+from gauss.arguments import named_arguments, real_numbers
 from gauss.codegen import one_tier
 from gauss.codegen.kernels import Control, LoopStatus, address
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
@@ -21,7 +21,6 @@ from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
 from gauss.simulation.compiled_runs import adaptive_run
 from gauss.simulation.drivers import DRIVERS
-from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.problem import Problem
 from gauss.simulation.simulate import simulate
 from gauss.simulation.step_limits import BUDGET, lasting

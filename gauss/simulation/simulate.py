@@ -18,6 +18,7 @@ from gauss.dynamics.stabilisation import Baumgarte
 from gauss.dynamics.store import is_first_use
 from gauss.errors import SimulationError, judged_later, require
 from gauss.integrators import FixedStep, Integrator
+from gauss.interruption import interruption_keeps
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, described, held_inputs
 from gauss.simulation.constraint_surfaces import across_surfaces
@@ -36,6 +37,7 @@ SLEEPING_PLAN = Plan("time stepping", "pair kernels")  # of motions whose bodies
 
 
 @named_arguments
+@interruption_keeps("trajectory")
 def simulate(
     scene: Scene | System,
     duration: float,

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from gauss.arguments import named_arguments
+from gauss.arguments import named_arguments, real_numbers
 from gauss.codegen import one_tier
 from gauss.codegen.kernels import LoopStatus
 from gauss.dynamics.laws.switching import Switching
@@ -26,7 +26,7 @@ from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, random_changes
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.compiled_runs import fixed_run
-from gauss.simulation.held_inputs import FLOAT, HeldInputs, as_floats, checked_inputs
+from gauss.simulation.held_inputs import FLOAT, HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
@@ -252,7 +252,7 @@ class Simulator:
         self._watch.look(self._rates, self._steps, lambda: self.state)
 
     def _set(self, u):
-        given = u if type(u) is np.ndarray and u.dtype is FLOAT else as_floats(u)
+        given = u if type(u) is np.ndarray and u.dtype is FLOAT else real_numbers(u)
         if given is None or given.shape != self._u.shape or not isfinite(sum(given.tolist())):
             given = checked_inputs(u, self.inputs, self.t)
         try:

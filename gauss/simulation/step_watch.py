@@ -61,7 +61,7 @@ class StepWatch:
         return self._passing.due, self._warned
 
     def go_on(self, t: float, kept: tuple):
-        """Go on with a motion that began at a time [s], and what was kept of it; shapes are looked at before its first step."""
+        """Go on with a motion that began at a time [s], and what was kept of it; shapes are looked at before it steps."""
         self._passing.due, self._warned = kept
         begins = self.has_pairs and self._passing.due == FIRST
         self.seen = 0.0 if begins else self._ahead.seen_from(t)

@@ -1,11 +1,12 @@
 """Local error tolerances given for all coordinates, for a kind of them, or for a joint, as the tolerance of a system."""
 
+import sys
 from collections.abc import Mapping
 from numbers import Integral
 
 import numpy as np
 
-from gauss.arguments import LARGEST_DOUBLE
+from gauss.arguments import LARGEST_FLOAT, real_numbers
 from gauss.errors import ArgumentError, SimulationError, did_you_mean
 from gauss.integrators import Tolerance
 from gauss.system import System, rate_units
@@ -97,8 +98,10 @@ def step_count(duration, step, what: str) -> int:
 
 def _pair(value, what: str) -> tuple[float, float]:
     """Absolute tolerance of coordinates, and of rates."""
-    is_pair = type(value) not in SCALARS and np.ndim(value) > 0
-    if is_pair and np.shape(value) != (2,):
+    found = None if type(value) in SCALARS else real_numbers(value)
+    size = () if found is None else found.shape
+    is_pair = bool(size)
+    if is_pair and size != (2,):
         raise SimulationError(f"{what}: expected a number, or a pair for coordinates and rates, got {value!r}.")
     if not _is_positive(value):
         raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
@@ -107,12 +110,11 @@ def _pair(value, what: str) -> tuple[float, float]:
 
 def _is_positive(value) -> bool:
     if type(value) in SCALARS:
-        return 0.0 < value <= LARGEST_DOUBLE
-    try:
-        given = np.asarray(value)
-    except ValueError:  # rows of several lengths
+        return 0.0 < value <= LARGEST_FLOAT
+    given = real_numbers(value)
+    if given is None or np.asarray(value).dtype == bool:
         return False
-    return given.dtype.kind in "iuf" and bool(np.isfinite(given).all() and (given > 0).all())
+    return bool(np.isfinite(given).all() and (given > 0).all())
 
 
 def checked_count(name: str, value) -> int:
@@ -123,6 +125,6 @@ def checked_count(name: str, value) -> int:
     SimulationError
         If it is none.
     """
-    if not isinstance(value, Integral) or value < 1:
-        raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
+    if not isinstance(value, Integral) or not 1 <= int(value) <= sys.maxsize:
+        raise SimulationError(f"{name}: expected a positive whole number, got {value!r:.80}.")
     return int(value)

@@ -11,14 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from gauss import rotations
+from gauss.arguments import real_numbers
 from gauss.codegen import content_key, trace
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.outputs import FORCES, OF_JOINTS, joint_forces, shape_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.sensor_values import INERTIAL, measured
 from gauss.dynamics.state_functions import distance_of_loops
-from gauss.errors import RecordedMotionWarning, StateError, did_you_mean
+from gauss.errors import RecordedMotionWarning, StateError, did_you_mean, require
 from gauss.shapes import Shaped
+from gauss.simulation.held_inputs import numbers_in_words
 from gauss.simulation.motion_records import EnergyRecord, Event, Stats
 from gauss.system import State, System
 
@@ -127,20 +129,15 @@ class Trajectory:
         RecordedMotionWarning
             If coordinates do not meet the loop constraints at one of some samples.
         """
-        try:
-            times, samples = np.array(t, dtype=float), np.array(q, dtype=float)
-        except (OverflowError, TypeError, ValueError):
-            raise StateError(f"from_coordinates: expected numbers t (k,) and q (k, {system.n_q}), got others.") from None
-        if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0).all() or len(samples) != len(times):
-            raise StateError(
-                f"from_coordinates: expected at least two increasing times t (k,) and coordinates q (k, {system.n_q}), got "
-                f"shapes {times.shape} and {samples.shape}."
-            )
+        require(system, (System,), "from_coordinates")
+        times, samples = _recorded_samples(system, t, q)
         states = [system.state(here) for here in samples]
         samples = np.array([state.q for state in states])
-        rates = spline_rates(system, times, samples) if v is None else np.array(v, dtype=float)
-        if rates.shape != (len(times), system.n_v) or not np.isfinite(rates).all():
-            raise StateError(f"from_coordinates: expected finite rates v ({len(times)}, {system.n_v}), got {rates.shape}.")
+        rates = spline_rates(system, times, samples) if v is None else real_numbers(v)
+        if rates is None or rates.shape != (len(times), system.n_v) or not np.isfinite(rates).all():
+            raise StateError(
+                f"from_coordinates: expected finite rates v ({len(times)}, {system.n_v}), got {numbers_in_words(rates)}."
+            )
         _warn_of_loops(system, times, samples)
         work = np.full((len(times), 3), np.nan)
         return cls(system, times, samples, rates, work, Stats(0, 0, 0, 0, 0.0, np.nan, "recorded"))
@@ -318,6 +315,31 @@ def spline_rates(system: System, t: np.ndarray, q: np.ndarray) -> np.ndarray:
             turning = [2.0 * rotations.multiply(rotations.conjugate(Q), rate)[1:] for Q, rate in pairs]
             rates[:, joint.v.start + plain : joint.v.stop] = turning
     return rates
+
+
+def _recorded_samples(system: System, t, q) -> tuple[np.ndarray, np.ndarray]:
+    """Times (k,) and coordinates (k, n_q) of the user, checked but for their size and units.
+
+    Raises
+    ------
+    StateError
+        If they are no numbers, do not fit, or times do not increase.
+    """
+    times, samples = real_numbers(t), real_numbers(q)
+    if times is None or samples is None:
+        raise StateError(f"from_coordinates: expected numbers t (k,) and q (k, {system.n_q}), got others.")
+    if samples.shape != (times.size, system.n_q) or times.ndim != 1 or len(times) < 2:
+        raise StateError(
+            f"from_coordinates: expected at least two times t (k,) and coordinates q (k, {system.n_q}), got shapes "
+            f"{times.shape} and {samples.shape}."
+        )
+    late = np.flatnonzero(~(np.diff(times) > 0) | ~np.isfinite(np.diff(times)))
+    if late.size:
+        raise StateError(
+            f"from_coordinates: expected finite, increasing times, got t[{late[0]}] = {times[late[0]]}, "
+            f"t[{late[0] + 1}] = {times[late[0] + 1]}."
+        )
+    return times, samples
 
 
 def _warn_of_loops(system: System, times: np.ndarray, samples: np.ndarray):

@@ -51,7 +51,7 @@ class NamedPlaces:
         StateError
             If there is neither.
         """
-        found = self._coordinates_by_name.get(name)
+        found = self._coordinates_by_name.get(name) if isinstance(name, str) else None
         return (self.joint(name), None) if found is None else found
 
     def column(self, name: str) -> int:

@@ -35,6 +35,7 @@ degrees of freedom: v = N ẏ for their rates ẏ, and terms are projected on th
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
+from gauss.arguments import name_list
 from gauss.errors import ArgumentError
 
 LOCAL_WORLD_ALIGNED = "local_world_aligned"
@@ -244,6 +245,7 @@ class StateFunctions:
         DeviceError, MissingPackageError
             If there is no such device, no driver or no cuda-bindings, or a function has no code for a GPU.
         """
+        names = name_list(names, "function: names", "names of functions")
         return self.mechanics.function(self, names, reference, independent, device)  # type: ignore[attr-defined]  # of System
 
     def evaluate(
@@ -272,4 +274,5 @@ class StateFunctions:
             As of :meth:`function`.
         """
         given = {"q": q, "v": v, "acceleration": acceleration, "load": load}
+        names = name_list(names, "evaluate: names", "names of functions")
         return self.mechanics.evaluate(self, names, given, t, reference, independent)  # type: ignore[attr-defined]

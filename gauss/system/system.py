@@ -11,6 +11,7 @@ from math import isfinite
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.backends.structure import Structure
 from gauss.codegen import IS_CONTENT, Scalar
 from gauss.errors import StateError, require
@@ -205,7 +206,7 @@ class System(NamedPlaces, StateFunctions):
             q[place] /= length
         try:
             time = float(t)  # type: ignore[arg-type]  # a traced time is refused by float()
-        except (OverflowError, TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise StateError(f"t: expected a time [s], got {t!r}.") from error
         if not isfinite(time):
             raise StateError(f"t: expected a finite time [s], got {time}.")
@@ -214,10 +215,9 @@ class System(NamedPlaces, StateFunctions):
     def _array(self, given, default, name: str, what: str) -> np.ndarray:
         if given is None:
             return default
-        try:
-            array = np.array(given, dtype=float)
-        except (OverflowError, TypeError, ValueError) as error:
-            raise StateError(f"{name}: expected {default.size} numbers ({what}), got {given!r}.") from error
+        array = real_numbers(given)
+        if array is None:
+            raise StateError(f"{name}: expected {default.size} numbers ({what}), got {given!r}.")
         if array.shape != default.shape or not np.isfinite(array).all():
             raise StateError(
                 f"{name}: expected {default.size} finite numbers ({what} of {', '.join(self.coordinates)}), "
@@ -279,6 +279,7 @@ class System(NamedPlaces, StateFunctions):
         StateError
             If the state does not fit the system.
         """
+        require(state, (State,), "projected")
         return self.mechanics.projected(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: Scalar = 0.0) -> State:

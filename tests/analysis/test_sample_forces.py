@@ -107,12 +107,14 @@ def test_a_recorded_motion_has_the_rates_and_forces_of_the_simulated_one():
 @pytest.mark.parametrize(
     "t, q, v, words",
     [
-        ([0.0], [[0.0, 0.0]], None, "at least two increasing times"),
-        ([0.0, 0.0], np.zeros((2, 2)), None, "at least two increasing times"),
+        ([0.0], [[0.0, 0.0]], None, "at least two times"),
+        ([0.0, 0.0], np.zeros((2, 2)), None, "increasing times, got t"),
+        ([0.0, np.inf], np.zeros((2, 2)), None, "finite, increasing times, got t"),
+        ([0.0, 1.0], np.ma.masked_array(np.zeros((2, 2)), mask=np.eye(2)), None, "expected numbers t"),
         ([0.0, 1.0], np.zeros((3, 2)), None, r"coordinates q \(k, 2\), got shapes \(2,\) and \(3, 2\)"),
         ([0.0, 1.0], "ab", None, "expected numbers t"),
-        ([0.0, 1.0], np.zeros((2, 3)), None, "q: expected 2 finite numbers"),
-        ([0.0, 1.0], np.zeros((2, 2)), np.zeros((2, 1)), r"finite rates v \(2, 2\), got \(2, 1\)"),
+        ([0.0, 1.0], np.zeros((2, 3)), None, r"coordinates q \(k, 2\), got shapes \(2,\) and \(2, 3\)"),
+        ([0.0, 1.0], np.zeros((2, 2)), np.zeros((2, 1)), r"finite rates v \(2, 2\), got shape \(2, 1\)"),
     ],
 )
 def test_recordings_that_do_not_fit_are_refused(t, q, v, words):

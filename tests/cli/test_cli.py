@@ -39,6 +39,14 @@ def test_events_are_counted_by_their_kind():
     assert "4 × slips, 1 × holds" in result.output  # at the half swings of 0.1 π s, until it sticks
 
 
+def test_a_scene_in_which_nothing_moves_is_explained(tmp_path):
+    scene = gauss.Scene("still")
+    scene.fixed("base", "ground", scene.body("post", mass=1.0))
+    gauss.save(scene, tmp_path / "still.toml")
+    said = call("explain", tmp_path / "still.toml")
+    assert said.exit_code == 0 and "post" in said.output
+
+
 def test_starts_from_the_command_line(tmp_path):
     motion = tmp_path / "motion.npz"
     arguments = ("--start", "A=0.3", "--speed", "A=-2", "--speed", "B=1", "--duration", 0.01, "--output", motion)

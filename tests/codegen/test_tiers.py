@@ -16,6 +16,7 @@ from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.object_code import FUNCTION, ModuleUnits
 from gauss.codegen.optimiser import OPTIMISER
+from gauss.codegen.process_end import can_skip_destructors
 from gauss.errors import ArgumentError
 from gauss.io.catalog import shipped
 
@@ -220,6 +221,28 @@ sys.exit(status)
         timeout=PATIENCE,
     )
     assert ran.returncode == 0, ran.stderr
+
+
+LONG_UNIT = """
+import atexit, sys, time
+atexit.register(lambda: print("last words"))  # those of Python are called
+from gauss.codegen import optimiser
+optimiser.REST, optimiser.LONGEST_END, optimiser.Job.advance = 0.0, 0.1, lambda job: time.sleep(1e3)
+import gauss
+gauss.simulate(gauss.load("pendulum"), 0.01, progress=False)
+assert optimiser.OPTIMISER.left()
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not can_skip_destructors(), reason="the library of C has no on_exit here")
+@pytest.mark.parametrize(("end", "code"), [("", 0), ("sys.exit(7)", 7), ("raise ValueError", 1)])
+def test_the_end_of_a_process_does_not_wait_for_a_long_unit(end, code):
+    """Its exit code, and what is written in its last functions, are kept."""
+    command = [sys.executable, "-c", LONG_UNIT + end]
+    quick = os.environ | {"GAUSS_TIER": "auto", "GAUSS_CACHE": ""}
+    ran = subprocess.run(command, cwd=ROOT, env=quick, capture_output=True, text=True, timeout=PATIENCE)
+    assert ran.returncode == code and ran.stdout == "last words\n" and "thread" not in ran.stderr
 
 
 def test_waiting_ends_at_its_limit():

@@ -1,6 +1,7 @@
 """Arguments of functions of a state: batches of states, arrays of other libraries, quaternions, mistakes."""
 
 import copy
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -184,6 +185,16 @@ def test_results_that_overflow_are_refused(arm, name):
             )
 
 
+@pytest.mark.parametrize("power", np.arange(153.0, 156.0, 0.25))
+@pytest.mark.parametrize("name", ["bias_forces", "kinetic_energy", "inverse_dynamics"])
+def test_no_result_is_infinite(arm, name, power):
+    """Of either sign, where squares of rates begin to overflow."""
+    (q,), (v,) = states(arm, 1)
+    for rates in (10.0**power * v, -(10.0**power) * v):
+        with suppress(StateError):
+            assert np.isfinite(arm.function(name)(q, rates, *([0.0 * v] if name == "inverse_dynamics" else []))).all()
+
+
 @pytest.mark.slow
 def test_a_number_that_is_not_finite_is_found_wherever_it_stands(arm):
     (q,), (v,) = states(arm, 1)
@@ -200,3 +211,12 @@ def test_a_number_that_is_not_finite_is_found_wherever_it_stands(arm):
 def test_results_that_are_linear_in_the_rates_do_not_overflow(arm, name):
     (q,), (v,) = states(arm, 1)
     np.testing.assert_allclose(arm.function(name)(q, 1e200 * v) / 1e200, arm.function(name)(q, v), rtol=1e-12, atol=1e-12)
+
+
+def test_a_scene_in_which_nothing_moves_has_functions_of_its_state():
+    scene = gauss.Scene("still")
+    scene.fixed("base", "ground", scene.body("post", mass=1.0, inertia=(0.1, 0.1, 0.1), com=(0.0, 0.0, 0.5)))
+    system, none = gauss.compile_scene(scene), np.zeros(0)
+    assert system.jacobian(none, "post").shape == system.jacobian_rate(none, none, "post").shape == (6, 0)
+    np.testing.assert_array_equal(system.center_of_mass(none), [0.0, 0.0, 0.5])
+    assert not system.momentum(none, none).any() and system.inverse_dynamics(none, none, none).shape == (0,)

@@ -146,6 +146,7 @@ def test_any_text_is_a_scene_or_a_clear_error(text, tmp_path_factory):
     [
         ("four_baar", {}, "Did you mean 'four_bar'"),
         ("robot:pandda", {}, "Did you mean 'panda'"),
+        ("x" * 5000, {}, "neither a file nor a model"),  # longer than a name of a file may be
         ("missing.toml", {}, "missing.toml: no such file"),
         ("missing.urdf", {}, "no such file"),
         ("scene.step", {}, "cannot read a file of type '.step'"),

@@ -13,6 +13,7 @@ import pytest
 
 import gauss
 from gauss import rotors, servo
+from gauss.interruption import Interruptible
 
 WORKING = 0.5  # seconds after which it is interrupted
 SOON = 5.0  # seconds within which it must be over, on a machine with much else to do
@@ -207,6 +208,55 @@ def test_a_motion_of_rotors_is_kept():
     rotors.simulate(network, 0.001)
     found = _interrupted(lambda: rotors.simulate(network, LONG, times=np.linspace(0.0, LONG, 20_001))).trajectory
     assert isinstance(found, rotors.RotorMotion) and 0.0 < found.t[-1] < LONG
+
+
+def _pressed(*_):
+    raise KeyboardInterrupt
+
+
+def _rotors():
+    network = rotors.Network("fan")
+    network.torque(network.shaft("fan", 1.0), rotors.TorqueFunction(_pressed))
+    return network
+
+
+def _driven():
+    scene = gauss.load("pendulum")
+    scene.drive(next(iter(scene.joints)), torque=_pressed)
+    return scene
+
+
+PREPARED = {
+    "simulate": ("trajectory", lambda: gauss.simulate(_driven(), 1.0)),
+    "rollout": ("rollout", lambda: gauss.rollout(gauss.compile_scene(_driven()), [[0.0]], [[0.0]], steps=2, step=0.1)),
+    "sweep": ("dataset", lambda: gauss.sweep(lambda k: _driven(), {"k": [1.0, 2.0]}, 1.0)),
+    "sweep of a maker": ("dataset", lambda: gauss.sweep(lambda k: _pressed(), {"k": [1.0, 2.0]}, 1.0)),
+    "rotors": ("trajectory", lambda: rotors.simulate(_rotors(), 1.0)),
+}
+
+
+@pytest.mark.slow  # xarray is imported
+@pytest.mark.parametrize("name", PREPARED)
+def test_an_interruption_of_the_preparation_says_that_there_is_nothing(name):
+    attribute, make = PREPARED[name]
+    with pytest.raises(KeyboardInterrupt) as caught:
+        make()
+    found = getattr(caught.value, attribute)
+    assert found is None or not len(getattr(found, "t", ()))  # a sweep has its empty dataset
+
+
+def test_a_library_that_swallows_an_interruption_does_not_hide_it():
+    def solver():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            return "failed"
+
+    with pytest.raises(KeyboardInterrupt), Interruptible():
+        assert solver() == "failed"
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with Interruptible():
+        pass
 
 
 def test_before_the_first_step_there_is_nothing(monkeypatch):

@@ -7,6 +7,7 @@ import numpy as np
 
 from gauss.analysis.optimal.problem import MotionProblem, MotionValues, Solved
 from gauss.analysis.optimal.transcription import Transcription
+from gauss.interruption import Interruptible
 
 TOLERANCE = 1e-9  # of IPOPT, on its scaled problem
 RESOLVED = 1e-3  # of the cost of inputs at their sizes: of this size are changes that count
@@ -48,7 +49,8 @@ class CollocationProgramme:
         solver = casadi.nlpsol("motion", "ipopt", names, {"print_time": False, "ipopt": options})
         lowest, highest = map(np.concatenate, zip(*(part.bounds for part in self.parts), strict=True))
         low, high = map(np.concatenate, zip(*(part.row_bounds for part in self.parts), strict=True))
-        answer = solver(x0=start, lbx=lowest, ubx=highest, lbg=low, ubg=high)
+        with Interruptible():  # which IPOPT takes for a failure of a function
+            answer = solver(x0=start, lbx=lowest, ubx=highest, lbg=low, ubg=high)
         x, stats = np.array(answer["x"]).ravel(), solver.stats()
         rows = np.array(answer["g"]).ravel()
         residual = np.maximum(np.maximum(low - rows, rows - high), 0.0).max(initial=0.0)

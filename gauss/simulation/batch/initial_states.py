@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import StateError
-from gauss.simulation.held_inputs import numbers_in_words, real_numbers
+from gauss.simulation.held_inputs import numbers_in_words
 from gauss.system import UNIT_QUATERNION, State, System
 
 CONSISTENT = 1e-9  # largest residual, relative to the sizes of the constraints and to the rates, of a consistent state

@@ -6,7 +6,7 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.arguments import named_arguments
+from gauss.arguments import named_arguments, real_numbers
 from gauss.codegen import one_tier
 from gauss.codegen.gpu.devices import double_precision
 from gauss.codegen.tiers import AUTO, OPTIMISED
@@ -18,7 +18,8 @@ from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, ExplicitPair, FixedStep
-from gauss.simulation.arguments import sample_times
+from gauss.interruption import interruption_keeps
+from gauss.simulation.arguments import numbers, sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.batch_result import Rollout, kept_on_interruption
 from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
@@ -28,10 +29,9 @@ from gauss.simulation.batch.machine_code import STEPPED, batch_program, fixed_st
 from gauss.simulation.batch.repeated_motions import repeat, tell_of_divergence
 from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
-from gauss.simulation.held_inputs import real_numbers
 from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts_of_many
-from gauss.simulation.tolerances import check_tolerances, tolerance
+from gauss.simulation.tolerances import check_tolerances, checked_count, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
 from gauss.system import State, System, refuse_changed
 
@@ -42,6 +42,7 @@ ADAPTIVE_STEPS = 100  # number of steps that an adaptive motion is taken to make
 
 
 @named_arguments
+@interruption_keeps("rollout")
 def rollout(
     system: System,
     q0,
@@ -279,7 +280,7 @@ def _adaptive(
     if times is None:
         raise SimulationError(f"integrator {method.name!r} chooses its steps: give times= [s] of the samples.")
     check_tolerances(rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
-    t = np.asarray(times, dtype=float)
+    t = numbers(times, "times: expected increasing numbers [s]")
     t = sample_times(t, 0.0, t.ravel()[-1] if t.size else 0.0)
     if t[-1] <= 0.0:
         raise SimulationError("times: expected the last one to be after the start, 0 s.")
@@ -361,5 +362,4 @@ def _check_counts(counts: dict):
     for name, value in counts.items():
         if name == "threads" and value is None:
             continue
-        if not isinstance(value, Integral) or value <= 0:
-            raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
+        checked_count(name, value)

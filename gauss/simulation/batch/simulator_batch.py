@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.arguments import named_arguments
+from gauss.arguments import named_arguments, real_numbers
 from gauss.codegen import one_tier
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
@@ -26,7 +26,7 @@ from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, batch_program, contact_state_size, fixed_step_code, one_by_one
 from gauss.simulation.batch.simulators_in_turn import SimulatorsInTurn
-from gauss.simulation.held_inputs import numbers_in_words, real_numbers
+from gauss.simulation.held_inputs import numbers_in_words
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.unseen_contacts import MOTIONS, NEVER, PassingWatch

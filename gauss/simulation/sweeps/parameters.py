@@ -6,6 +6,7 @@ from math import prod
 
 import numpy as np
 
+from gauss.arguments import real_numbers
 from gauss.errors import SceneError
 from gauss.simulation.memory_limit import refuse_beyond_memory
 
@@ -65,10 +66,8 @@ def members(vary: Mapping[str, Sequence[float] | np.ndarray], together: bool) ->
         raise SceneError(f"vary: expected names with their values, e.g. {{'crank.mass': [1.0, 1.5, 2.0]}}, got {vary!r}.")
     found = []
     for name, given in vary.items():
-        try:
-            values = np.atleast_1d(np.asarray(given, dtype=float))
-        except (TypeError, ValueError):
-            values = np.zeros((0, 0))
+        numbers = real_numbers(given)
+        values = np.zeros((0, 0)) if numbers is None else np.atleast_1d(numbers)
         if values.ndim != 1 or not values.size or not np.isfinite(values).all():
             raise SceneError(f"vary: {name!r}: expected finite numbers, e.g. np.linspace(0.5, 2.0, 50), got {given!r:.80}.")
         found.append(values)

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -14,6 +15,7 @@ from gauss.dynamics import compile_scene
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
 from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
+from gauss.interruption import interruption_keeps
 from gauss.scene import Scene
 from gauss.scene.named_numbers import scene_of
 from gauss.simulation import INTEGRATORS, Trajectory
@@ -35,6 +37,7 @@ DEFAULT_ATOL = 1e-9  # relative to the scale of the scene
 
 
 @named_arguments
+@interruption_keeps("dataset")
 def sweep(
     scene: Scene | Callable[..., Scene],
     vary: Mapping[str, Sequence[float] | np.ndarray],
@@ -113,7 +116,7 @@ def sweep(
     MissingPackageError
         If an optional package is not installed, such as cuda-bindings of device "cuda".
     KeyboardInterrupt
-        On Ctrl-C; its ``dataset`` holds the members that are done, the others have ``status`` 0.
+        On Ctrl-C; its ``dataset`` holds the members that are done, the others have ``status`` 0; None before the first one.
     """
     _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers)
     library("xarray")
@@ -193,8 +196,8 @@ def _check(scene, duration, samples, integrator, step, rtol, atol, measure, work
     if not isinstance(integrator, str):
         raise SimulationError(f"integrator: expected a name, got {integrator!r}. {did_you_mean('', INTEGRATORS)}")
     refuse_without_step(check_arguments(duration, integrator, step, rtol, atol), step, "a sweep")
-    if not isinstance(samples, int) or samples < 2:
-        raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r}.")
+    if not isinstance(samples, int) or not 2 <= samples <= sys.maxsize:
+        raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r:.80}.")
     _check_workers(workers)
     for name, function in (measure or {}).items():
         if not callable(function):
