@@ -152,10 +152,12 @@ def _refused(_: _Encoder, thing) -> Sequence:
 def _object(encoder: _Encoder, thing) -> Sequence:
     """Attributes of an object, and what its classes hold: it is told within this process only."""
     classes = type(thing).__mro__[:-1]
-    if not encoder.in_process or any(not kind.__flags__ & HEAP_TYPE or "__slots__" in vars(kind) for kind in classes):
+    own = getattr(thing, "__dict__", None)
+    opaque = any(not kind.__flags__ & HEAP_TYPE or "__slots__" in vars(kind) for kind in classes)
+    if not encoder.in_process or type(own) is not dict or opaque:
         return _refused(encoder, thing)
     held = [{name: _behind(value) for name, value in vars(kind).items() if name not in UNCALLED} for kind in classes]
-    return encoder.sequence(b"o%d" % id(type(thing)), (vars(thing), *held))
+    return encoder.sequence(b"o%d" % id(type(thing)), (own, *held))
 
 
 def _behind(value):
