@@ -3,7 +3,7 @@
 Active unilateral and sticking elements become bilateral constraints, slipping ones loads; inactive ones are dropped.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -40,6 +40,11 @@ class ContactMode:
     def but(self, **parts) -> "ContactMode":
         """Copy with some entries changed: set_valued, power_flow, trains or backlash_sides by name."""
         return replace(self, **{key: getattr(self, key) | change for key, change in parts.items()})
+
+    def without(self, names: Collection[str]) -> "ContactMode":
+        """Copy without some set-valued elements."""
+        left = {name: sign for name, sign in self.set_valued.items() if name not in names}
+        return replace(self, set_valued=left)
 
 
 FREE = 2  # a gear train at rest that its losses do not hold

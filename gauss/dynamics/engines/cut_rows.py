@@ -1,9 +1,10 @@
 """Accelerations with rows R q̇ = 0 whose forces are found apart: M q̈ + h = τ + W Q with R q̈ = 0, affine in Q.
 
-A closed stop of a joint is such a row, with the ideal reaction W = Rᵀ: the phases of a motion that differ by closed stops
-alone share the machine code of the system without them. A link with losses has a reaction W Q that is not Rᵀ Q: a force
-Q on the driven joint, −f Q on the driver (Rotor chains, section 6). With the rows in the system, that is the minimum of the
-compulsion with the further load (W − Rᵀ) Q, where Q = −λ is the multiplier.
+A closed stop of a joint and sticking dry friction are such rows, with the ideal reaction W = Rᵀ: the phases of a motion that
+differ by them alone, and by constant forces of sliding joints, share the machine code of the system without them. A link
+with losses has a reaction W Q that is not Rᵀ Q: a force Q on the driven joint, −f Q on the driver (Rotor chains, section 6).
+With the rows in the system, that is the minimum of the compulsion with the further load (W − Rᵀ) Q, where Q = −λ is the
+multiplier.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,12 +22,12 @@ from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
+from gauss.dynamics.engines.held_joints import HeldJoint, held_rows
 from gauss.dynamics.engines.tiering import tiered_kernels
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
-from gauss.scene import ClosedGap, Stop
 from gauss.scene.losses import joint_factors
 from gauss.system import ContactMode, State, System
 
@@ -35,56 +36,26 @@ CONVERGED_RESIDUAL = 1e-12  # residual of a force relative to the largest multip
 LEAST_CONTRACTION = 0.1  # of Newton steps: an affine problem converges much faster
 ROUNDOFF_STEP = 1e-8  # Newton step relative to the largest force by round-off, above all of QP solvers
 MOST_ROUNDS = 20  # of Newton's method
-NOT_CONVERGED = "the forces of the links with losses and of closed stops did not converge."
-
-
-class ClosedStop(NamedTuple):
-    """Closed stop of a joint of one freedom: the row ± q̇ = 0.
-
-    Attributes
-    ----------
-    name : str
-        Name of the gap.
-    sign : float
-        The gap is sign · (q − bound).
-    bound : float
-        Coordinate of the stop [rad, m].
-    q, v : int
-        Places of the joint in q and v.
-    """
-
-    name: str
-    sign: float
-    bound: float
-    q: int
-    v: int
-
-
-def closed_stop(system: System, gap: ClosedGap) -> ClosedStop | None:
-    """Closed stop of a gap; None if its row is not constant."""
-    if not isinstance(gap.whole, Stop):
-        return None
-    placed, rate = system.coordinate(gap.whole.joint)
-    if rate is not None or placed.v.stop - placed.v.start != 1 or placed.q.stop - placed.q.start != 1:
-        return None
-    return ClosedStop(gap.name, *gap.whole.bounds[gap.index], placed.q.start, placed.v.start)
+NOT_CONVERGED = "the forces of the links with losses, of closed stops and of sticking joints did not converge."
 
 
 class CutRows(NamedTuple):
-    """Constraint rows of a phase whose forces are found apart: links with losses, closed stops of joints.
+    """Constraint rows of a phase whose forces are found apart: links with losses, held joints; and forces of sliding joints.
 
     Attributes
     ----------
     names : tuple of str
-        Names of the m links and stops.
+        Names of the m links and held joints.
     rows : ndarray of int, shape (m,)
         Their rows.
     R, W : ndarray, shape (m, n_v)
         Jacobian of the rows, and generalised forces for Q = 1.
     units : ndarray, shape (m,)
         Forces of the scene along the driven joints [N m, N].
-    stops : tuple of ClosedStop
-        The closed stops among them.
+    held : tuple of HeldJoint
+        The held joints among them.
+    braking : ndarray, shape (n_v,)
+        Generalised forces of sliding joints, which the cut system lacks, too.
     """
 
     names: tuple[str, ...]
@@ -92,7 +63,8 @@ class CutRows(NamedTuple):
     R: np.ndarray
     W: np.ndarray
     units: np.ndarray
-    stops: tuple[ClosedStop, ...]
+    held: tuple[HeldJoint, ...]
+    braking: np.ndarray
 
     @property
     def ideal(self) -> bool:
@@ -100,17 +72,19 @@ class CutRows(NamedTuple):
         return np.array_equal(self.R, self.W)
 
 
-def cut_rows(system: System, whole: System, stops: Sequence[ClosedStop], mode: ContactMode) -> CutRows:
-    """Rows of a phase to be cut: links with losses, with the directions of power flow of its mode, and closed stops."""
+def cut_rows(
+    system: System, whole: System, held: Sequence[HeldJoint], mode: ContactMode, braking: np.ndarray | None = None
+) -> CutRows:
+    """Rows of a phase to be cut: links with losses, with the directions of power flow of its mode, and held joints."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if mode.power_flow.get(name) and name in places}
-    names = (*links, *(stop.name for stop in stops))
-    held = [{stop.v: stop.sign} for stop in stops]
-    R = _matrix(system, [_places(system, link.acts_on) for link in links.values()] + held)
-    W = _matrix(system, [_places(system, joint_factors(link, mode.power_flow[name])) for name, link in links.items()] + held)
-    columns = [*(system.column(link.driven) for link in links.values()), *(stop.v for stop in stops)]
+    names, rows = (*links, *(joint.name for joint in held)), held_rows(held)
+    R = _matrix(system, [_places(system, link.acts_on) for link in links.values()] + rows)
+    W = _matrix(system, [_places(system, joint_factors(link, mode.power_flow[name])) for name, link in links.items()] + rows)
+    columns = [*(system.column(link.driven) for link in links.values()), *(joint.v for joint in held)]
     units = system.scale.energy / system.scale.coordinates[columns]
-    return CutRows(names, np.array([places[name] for name in names], dtype=int), R, W, units, tuple(stops))
+    found = np.array([places[name] for name in names], dtype=int)
+    return CutRows(names, found, R, W, units, tuple(held), np.zeros(system.n_v) if braking is None else braking)
 
 
 def _places(system: System, factors: Mapping[str, float]) -> dict[int, float]:
@@ -239,9 +213,15 @@ class CutRowEngine(Engine):
     def rates(self, system: System, state: State, load=None) -> Rates:
         """Accelerations, and the power of the loads; losses of the links count as dissipation."""
         self._compile()
-        found = self._solved(state)[0] if self.compiled is None else self._compiled(self.compiled, state)
-        lost = self.Q @ (self.links.W @ state.v)
-        return Rates(found.acceleration, found.power - np.array([0.0, 0.0, lost]))
+        if self.compiled is None:
+            found, forces = self._solved(state)[0], self.Q @ self.links.W
+        else:
+            found, forces = self._compiled(self.compiled, state), self._forces(self.Q)
+        return Rates(found.acceleration, found.power - np.array([0.0, 0.0, forces @ state.v]))
+
+    def _forces(self, Q: np.ndarray) -> np.ndarray:
+        """Generalised forces (n_v,) that the cut system lacks."""
+        return Q @ self.links.W + self.links.braking
 
     def _compile(self):
         """Compile the system without the rows once the evaluations reach the threshold."""
@@ -265,12 +245,14 @@ class CutRowEngine(Engine):
 
     def _compiled(self, engine: CompiledEngine, state: State) -> Rates:
         found: Rates
+        if not self.links.names:
+            return engine.rates(self.cut, state, self.links.braking)
         if self.links.ideal:
             return self._affine(engine, state)
 
         def residual(Q):
             nonlocal found
-            found = engine.rates(self.cut, state, Q @ self.links.W)
+            found = engine.rates(self.cut, state, self._forces(Q))
             return self.links.R @ found.acceleration
 
         self.Q = piecewise_affine_root(residual, self.Q, self.links.units)
@@ -279,17 +261,19 @@ class CutRowEngine(Engine):
     def _affine(self, engine: CompiledEngine, state: State) -> Rates:
         """Rates with ideal rows: forces and accelerations are affine, and are corrected once for rounding."""
         R, W, units = self.links.R, self.links.W, self.links.units
-        before, *changed = engine.accelerations(state, self.Q @ W + np.vstack([np.zeros_like(W[:1]), W * units[:, None]]))
+        before, *changed = engine.accelerations(
+            state, self._forces(self.Q) + np.vstack([np.zeros_like(W[:1]), W * units[:, None]])
+        )
         responses = (np.array(changed) - before).T / units
         if not np.isfinite(responses).all():
             raise SimulationError(NOT_CONVERGED)
         inverse = np.linalg.pinv(R @ responses)
         self.Q = self.Q - inverse @ (R @ before)
-        found = engine.rates(self.cut, state, self.Q @ W)
+        found = engine.rates(self.cut, state, self._forces(self.Q))
         correction = -inverse @ (R @ found.acceleration)
         self.Q = self.Q + correction
         acceleration = found.acceleration + responses @ correction
-        acceleration[[stop.v for stop in self.links.stops]] = 0.0  # without rounding, joints at stops stay there
+        acceleration[[joint.v for joint in self.links.held]] = 0.0  # without rounding, held joints stay where they are
         return found._replace(acceleration=acceleration)
 
     def solution(self, state: State) -> tuple[Solution, np.ndarray]:
@@ -298,11 +282,13 @@ class CutRowEngine(Engine):
 
     def project(self, system: System, state: State) -> State:
         """State after a step, projected onto the constraints."""
-        if self.compiled is None or self.cut.closes or len(self.links.stops) < len(self.links.names):
+        if self.compiled is None or self.cut.closes or len(self.links.held) < len(self.links.names):
             return project(self.system, state)
         q, v = state.q.copy(), state.v.copy()
-        for stop in self.links.stops:
-            q[stop.q], v[stop.v] = stop.bound, 0.0
+        for joint in self.links.held:
+            v[joint.v] = 0.0
+            if joint.stop is not None:
+                q[joint.stop[0]] = joint.stop[1]
         same = np.array_equal(q, state.q) and np.array_equal(v, state.v)
         return state if same else replace(state, q=q, v=v)
 
@@ -318,7 +304,7 @@ class CutRowEngine(Engine):
             return
         self._compiled(self.compiled, point.state)
         try:
-            self.compiled.check(point, last, self.Q @ self.links.W)
+            self.compiled.check(point, last, self._forces(self.Q))
         except DistrustError:
             self.hand_over(point.state.t)
             raise

@@ -17,8 +17,9 @@ from gauss.dynamics.contact.mode_selection import ModeSelector
 from gauss.dynamics.contact.mode_trial import forces_of
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
-from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, closed_stop, cut_rows
+from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, cut_rows
 from gauss.dynamics.engines.engine import Engine
+from gauss.dynamics.engines.held_joints import braking, closed_stop, held_frictions, shared_frictions
 from gauss.dynamics.engines.tiering import tiered_kernels
 from gauss.dynamics.gap_functions import margin_kernel
 from gauss.dynamics.laws.switching_functions import SwitchingFunctions, watch_of
@@ -39,9 +40,9 @@ class PhaseParts(NamedTuple):
     system : System
         Smooth system of the contact mode; active constraints are rows.
     links : CutRows
-        Links with losses, and closed stops of joints.
+        Links with losses, held joints, and forces of sliding ones.
     cut : System or None
-        The same system without their rows, if there are any; phases that differ by closed stops share it.
+        The same system without them, if there are any; phases that differ by held and sliding joints share it.
     margins : Kernel or None
         Margins of the features in contact, where a body has several.
     """
@@ -58,11 +59,14 @@ def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places
     def make() -> PhaseParts:
         system = build(phase_scene(whole.scene, names, mode, places), SystemDynamics())
         found = [closed_stop(whole, gap) for gap in sides(whole.scene) if gap.name in names]
-        stops = [stop for stop in found if stop is not None]
-        links = cut_rows(system, whole, stops, mode)
+        frictions = shared_frictions(whole)
+        held = [stop for stop in found if stop is not None] + held_frictions(whole, mode, frictions)
+        links = cut_rows(system, whole, held, mode, braking(whole, mode, frictions))
         cut = None
-        if stops:
-            others = phase_parts(whole, tuple(name for name in names if name not in links.names), mode, places)
+        if held or any(mode.set_valued.get(name) for name in frictions):
+            others = phase_parts(
+                whole, tuple(name for name in names if name not in links.names), mode.without(frictions), places
+            )
             cut = others.cut or others.system
         elif links.names:
             cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics())
@@ -114,7 +118,7 @@ class Phase:
     @property
     def solver(self) -> Engine:
         """Source of accelerations: machine code, or numpy up to a threshold of evaluations."""
-        if not self.links.names and len(self.solvers) == 1:
+        if isinstance(self.solvers[-1], CertifiedEngine):
             kernels = tiered_kernels(self.system, self.plan, self.laws, self.solvers[0].evaluations)
             if kernels is not None:
                 self.solvers.append(CompiledEngine(self.system, kernels))
