@@ -68,9 +68,14 @@ def _misfit(expected: Signature, arguments: tuple, named: dict) -> str:
     return ""
 
 
+def is_masked(value) -> bool:
+    """Whether a value has masked entries."""
+    return "numpy.ma" in sys.modules and bool(np.ma.is_masked(value))  # its import takes long
+
+
 def real_numbers(value) -> np.ndarray | None:
     """Array of real numbers; None of anything else: text, objects, complex or masked numbers, rows of several lengths."""
-    if np.ma.is_masked(value):
+    if is_masked(value):
         return None
     try:
         found = np.asarray(value)

@@ -126,7 +126,7 @@ def swept(vary, **settings):
 
 MISTAKES = {
     "family of nothing": (lambda: gauss.load("n_pendulum", n=0), SceneError, "n = 0.*at least 1"),
-    "wrong path": (lambda: gauss.load("models/four_bra.toml"), FileError, "No such file"),
+    "wrong path": (lambda: gauss.load("models/four_bra.toml"), FileError, "no such file"),
     "wrong path of a robot": (lambda: gauss.load("nowhere.urdf"), FileError, "no such file"),
     "wrong name": (lambda: gauss.load("fourbar"), FileError, "Did you mean 'four_bar'"),
     "wrong robot": (lambda: gauss.load("robot:pandas"), FileError, "Did you mean 'panda'"),

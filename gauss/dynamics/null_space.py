@@ -3,7 +3,6 @@
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import qr
 
 from gauss.backends.rank import COARSEST_LOOP_RANK, numerical_rank
 
@@ -56,6 +55,8 @@ class RowSpace:
     @cached_property
     def null_space(self) -> np.ndarray:
         """Null space (n, k), with unit rows at the places that pivoting in the units chooses as independent."""
+        from scipy.linalg import qr  # takes long to import
+
         N, n = self.Vt[self.rank :].T, self.units.size
         if not N.shape[1]:
             return N

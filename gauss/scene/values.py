@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from gauss import rotations
+from gauss.arguments import is_masked
 from gauss.codegen import Expression, Graph, branches
 from gauss.errors import SceneError
 from gauss.math import piecewise
@@ -52,7 +53,7 @@ def vector(value, what: str, unit: str, size: int = 3) -> tuple[float, ...]:
         entries = np.asarray(value, dtype=object).reshape(-1).tolist()
     except ValueError:
         entries = []
-    if isinstance(value, str) or np.ma.is_masked(value) or len(entries) != size:
+    if isinstance(value, str) or is_masked(value) or len(entries) != size:
         raise SceneError(f"{what}: expected {size} numbers in [{unit}], got {value!r}.")
     return tuple(number(entry, what, unit) for entry in entries)
 
@@ -181,7 +182,7 @@ def is_scalar(entry) -> bool:
 def _entries(value) -> np.ndarray:
     """Flat array of floats, or of objects where something else is among them."""
     try:
-        array = np.asarray(None if np.ma.is_masked(value) else value)
+        array = np.asarray(None if is_masked(value) else value)
     except ValueError:  # lists of several lengths
         array = np.asarray([None], dtype=object)
     return np.ravel(array.astype(float) if array.dtype.kind in "fiub" else array.astype(object))

@@ -3,13 +3,13 @@
 They change from phase to phase; what they act on does not, and its machine code is shared by all phases.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.scene import ClosedGap, JointFriction, Stop
-from gauss.system import ContactMode, System
+from gauss.system import ContactMode, System, sides
 
 LEAST_FRICTIONS = 3  # elements with more modes (3^n) than are worth machine code of their own
 
@@ -55,9 +55,14 @@ def shared_frictions(whole: System) -> dict[str, JointFriction]:
     return found if shares else {}
 
 
-def held_frictions(whole: System, mode: ContactMode, frictions: Mapping[str, JointFriction]) -> list[HeldJoint]:
-    """Joints at which frictions stick in a mode."""
-    return [HeldJoint(name, whole.column(one.joint)) for name, one in frictions.items() if mode.set_valued.get(name) == 0]
+def held_joints(
+    whole: System, names: Collection[str], mode: ContactMode, frictions: Mapping[str, JointFriction]
+) -> list[HeldJoint]:
+    """Joints that are held in a mode: at the stops among closed gaps of these names, and where frictions stick."""
+    stops = [closed_stop(whole, gap) for gap in sides(whole.scene) if gap.name in names]
+    sticking = [name for name in frictions if mode.set_valued.get(name) == 0]
+    found = [HeldJoint(name, whole.column(frictions[name].joint)) for name in sticking]
+    return [stop for stop in stops if stop is not None] + found
 
 
 def braking(whole: System, mode: ContactMode, frictions: Mapping[str, JointFriction]) -> np.ndarray:

@@ -19,7 +19,7 @@ from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.cut_rows import CutRowEngine, CutRows, cut_rows
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.held_joints import braking, closed_stop, held_frictions, shared_frictions
+from gauss.dynamics.engines.held_joints import braking, held_joints, shared_frictions
 from gauss.dynamics.engines.tiering import tiered_kernels
 from gauss.dynamics.gap_functions import margin_kernel
 from gauss.dynamics.laws.switching_functions import SwitchingFunctions, watch_of
@@ -27,7 +27,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import MODES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.system_dynamics import SystemDynamics
-from gauss.system import ContactMode, State, System, build, phase_scene, sides
+from gauss.system import ContactMode, State, System, build, phase_scene
 
 REVERSED_FORCE = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
 
@@ -58,15 +58,12 @@ def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places
 
     def make() -> PhaseParts:
         system = build(phase_scene(whole.scene, names, mode, places), SystemDynamics())
-        found = [closed_stop(whole, gap) for gap in sides(whole.scene) if gap.name in names]
         frictions = shared_frictions(whole)
-        held = [stop for stop in found if stop is not None] + held_frictions(whole, mode, frictions)
+        held = held_joints(whole, names, mode, frictions)
         links = cut_rows(system, whole, held, mode, braking(whole, mode, frictions))
-        cut = None
-        if held or any(mode.set_valued.get(name) for name in frictions):
-            others = phase_parts(
-                whole, tuple(name for name in names if name not in links.names), mode.without(frictions), places
-            )
+        cut, left = None, tuple(name for name in names if name not in links.names)
+        if held or links.braking.any():
+            others = phase_parts(whole, left, mode.without(frictions), places)
             cut = others.cut or others.system
         elif links.names:
             cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics())
