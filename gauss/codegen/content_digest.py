@@ -150,7 +150,7 @@ def _refused(_: _Encoder, thing) -> Sequence:
 
 
 def _object(encoder: _Encoder, thing) -> Sequence:
-    """Attributes of an object, and what its classes hold: it is told within this process only."""
+    """Attributes of an object, and what its classes hold: known within this process only."""
     classes = type(thing).__mro__[:-1]
     own = getattr(thing, "__dict__", None)
     opaque = any(not kind.__flags__ & HEAP_TYPE or "__slots__" in vars(kind) for kind in classes)

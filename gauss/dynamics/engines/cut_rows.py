@@ -55,7 +55,7 @@ class CutRows(NamedTuple):
     held : tuple of HeldJoint
         The held joints among them.
     braking : ndarray, shape (n_v,)
-        Generalised forces of sliding joints, which the cut system lacks, too.
+        Generalised forces of sliding joints, which are not in the cut system either.
     """
 
     names: tuple[str, ...]
@@ -220,7 +220,7 @@ class CutRowEngine(Engine):
         return Rates(found.acceleration, found.power - np.array([0.0, 0.0, forces @ state.v]))
 
     def _forces(self, Q: np.ndarray) -> np.ndarray:
-        """Generalised forces (n_v,) that the cut system lacks."""
+        """Generalised forces (n_v,) that are not in the cut system."""
         return Q @ self.links.W + self.links.braking
 
     def _compile(self):

@@ -1,8 +1,8 @@
 """Searches of opaque laws for jumps: while a law, the interval and the start are the same, one is not repeated.
 
 A law is the same if its code, what it closes over, its attributes, defaults and globals have the content of before
-(:func:`gauss.codegen.content_digest`), and its values at a few times are those of before. A law whose content cannot be
-told, such as one that calls a function of another library, is searched for every motion.
+(:func:`gauss.codegen.content_digest`), and its values at a few times are those of before. A law whose content is not
+known, such as one that calls a function of another library, is searched for every motion.
 """
 
 from collections.abc import Callable, Hashable
