@@ -14,7 +14,7 @@ from gauss.backends.backend import BACKENDS, Backend, Factored
 from gauss.backends.certificate import certify, conclude
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.factorisation import factors
-from gauss.backends.foreign import call, kind, real_array, truth, whole_number
+from gauss.backends.foreign import ForeignCode, call, kind, real_array, truth, whole_number
 from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.solution import Answer, Solution, failure
 from gauss.errors import BackendError
@@ -55,19 +55,27 @@ def _ways(compulsion: Compulsion, backend: Backend) -> Iterator[Callable[[], tup
         for factor in factors(compulsion):
             yield partial(_factored_answer, compulsion, cast(Factored, backend), factor)
     else:
-        given = compulsion if type(backend).__module__.startswith(OURS) else compulsion.read_only()
-        yield lambda: (checked_answer(compulsion, call(backend, given)),)
+        yield partial(_answer, compulsion, backend)
 
 
 def _refuse(backend: Backend):
     raise BackendError(f"backend {backend.name!r} takes no inequality rows; use a QP backend such as 'daqp'.")
 
 
+def _answer(compulsion: Compulsion, backend: Backend) -> tuple[Answer]:
+    given = compulsion if type(backend).__module__.startswith(OURS) else compulsion.read_only()
+    with ForeignCode():
+        said = backend(given)
+    return (checked_answer(compulsion, said),)
+
+
 def _factored_answer(
     compulsion: Compulsion, backend: Factored, make: Callable[..., KKTFactor]
 ) -> tuple[Answer, KKTFactor, Correction]:
     factor = make(compulsion)
-    answer, correction = checked_refinement(factor, call(backend.solve_with, factor))
+    with ForeignCode():
+        said = backend.solve_with(factor)
+    answer, correction = checked_refinement(factor, said)
     return answer, factor, correction
 
 

@@ -12,22 +12,30 @@ DOUBLE = np.dtype(float)
 REAL_KINDS = "fiu"  # kinds of arrays of real numbers; others might be converted, but hardly mean these numbers
 
 
-def call(method: Callable, *given):
-    """Result of a foreign method.
+class ForeignCode:
+    """Context of a call of somebody else's code: whatever it raises is a BackendError.
 
     Raises
     ------
     BackendError
-        If it raises anything.
+        At its end, in place of any other error; not of Ctrl-C.
     """
-    try:
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if error is None or isinstance(error, KeyboardInterrupt | SystemExit | BackendError):
+            return
+        if isinstance(error, np.linalg.LinAlgError):  # numpy's message names the fault of the matrix
+            raise BackendError(str(error)) from error
+        raise BackendError(f"failed: {raised(error)}") from error  # panics of Rust code are no Exceptions
+
+
+def call(method: Callable, *given):
+    """Result of a foreign method, called as :class:`ForeignCode`."""
+    with ForeignCode():
         return method(*given)
-    except (KeyboardInterrupt, SystemExit, BackendError):
-        raise
-    except np.linalg.LinAlgError as error:  # numpy's message names the fault of the matrix
-        raise BackendError(str(error)) from error
-    except BaseException as error:  # panics of Rust code are no Exceptions
-        raise BackendError(f"failed: {raised(error)}") from error
 
 
 def raised(error: BaseException) -> str:

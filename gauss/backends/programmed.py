@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.foreign import call, real_array, truth, whole_number
+from gauss.backends.foreign import ForeignCode, call, real_array, truth, whole_number
 from gauss.backends.forms import massless
 from gauss.backends.programme import FORMS, Outcome, Programme, Solver, compressed, dense
 from gauss.backends.solution import Answer, failure
@@ -53,7 +53,9 @@ class Programmed:
 def attempt(solver: Solver, programme: Programme) -> Outcome:
     """Outcome of a QP solver; whatever it raises or wrongly returns becomes the message of a failed one."""
     try:
-        return checked_outcome(call(solver, programme), programme)
+        with ForeignCode():
+            said = solver(programme)
+        return checked_outcome(said, programme)
     except BackendError as error:
         return Outcome(None, None, None, False, f"{solver.name}: {error}")
 

@@ -14,7 +14,7 @@ from gauss.codegen import callbacks_are_available
 from gauss.dynamics.composite_bodies import CompositeBodies
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rnea import KinematicTree
-from gauss.dynamics.rules import Question
+from gauss.dynamics.rules import Question, named
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError
 from gauss.integrators import ExplicitPair, FixedStep
@@ -137,11 +137,6 @@ def own_backend(ask: Question) -> list[str]:
     """No backend was named: a named one solves every state."""
     automatic = isinstance(ask.backend, str) and ask.backend == "auto"
     return [] if automatic else [f"backend {named(ask.backend)!r} is asked for, which solves state by state"]
-
-
-def named(backend) -> str:
-    """Name of a backend."""
-    return backend if isinstance(backend, str) else getattr(backend, "name", type(backend).__name__)
 
 
 def compilable(ask: Question) -> list[str]:

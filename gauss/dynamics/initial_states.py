@@ -27,12 +27,14 @@ def scene_start(system: System) -> State:
         return find()
     found: list[State] = []
 
-    def make() -> tuple[State, bool]:
+    def make() -> tuple[State, bool, tuple[str, ...]]:
         found.append(find())
         given = within_limits(system, system.start())
-        return found[0], not (violations(system, found[0]) or changed_starts(system, given, found[0], system.scene.starts))
+        is_met = not (violations(system, found[0]) or changed_starts(system, given, found[0], system.scene.starts))
+        return found[0], is_met, system.rigid_joints
 
-    state, is_met = cached_on_disk(system, (scene_start,), make)
+    state, is_met, rigid_joints = cached_on_disk(system, (scene_start,), make)
+    vars(system).setdefault("rigid_joints", rigid_joints)  # its own property, which would reduce the system to find them
     if not (found or is_met):
         return find()
     return State(state.t, state.q.copy(), state.v.copy())  # the caller may write to it

@@ -33,7 +33,7 @@ recursion" for large trees, "embedded loops" for loops, "compiled", and "certifi
 
 from collections.abc import Callable, Hashable
 
-from gauss.codegen import IdentityKey, content_key
+from gauss.codegen import content_key
 from gauss.dynamics.conditions import (
     callbacks,
     closed_form_contacts,
@@ -52,7 +52,6 @@ from gauss.dynamics.conditions import (
     large_loops,
     large_tree,
     located_contacts,
-    named,
     narrow,
     no_held_inputs,
     own_backend,
@@ -65,15 +64,15 @@ from gauss.dynamics.conditions import (
 )
 from gauss.dynamics.front_rank import has_loops, independent_fronts, regular_fronts
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
-from gauss.dynamics.store import cached
+from gauss.dynamics.rules import Plan, Question, Rule, RuleTable, named
+from gauss.dynamics.store import cached, cached_on_disk
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Library, Taylor
 from gauss.system import System
 
 Condition = Callable[[Question], list[str]]  # question → violations in words
 
 
-_KEYS: dict[int, IdentityKey] = {}  # of built-in methods, by their address
+_KEYS: dict[int, str] = {}  # names of built-in methods, by their address
 
 
 def is_time_stepping(ask) -> bool:
@@ -297,7 +296,7 @@ def motion_plan(system: System) -> Plan:
 
 
 def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
-    """Plan of a motion, cached with the system.
+    """Plan of a motion, cached with the system; of a plain one on disk, for its conditions reduce the system.
 
     Raises
     ------
@@ -308,15 +307,15 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
     if ask.system.dynamics is None or ask.laws.called:
         return make()
     key = plan_of, method_key(ask.method), ask.stabilisation, ask.drift, named(ask.backend), ask.laws.key, ask.held, wanted
-    return cached(ask.system, key, make)
+    return (cached_on_disk if ask.system.is_plain and wanted is None else cached)(ask.system, key, make)
 
 
 def method_key(method) -> Hashable:
-    """Cache key of a method: the identity of a built-in one, the content of another."""
-    key = _KEYS.get(id(method))
+    """Cache key of a method: the name of a built-in one, the content of another, which is never a text."""
+    key: Hashable = _KEYS.get(id(method))
     if key is None:
         known = (*LIBRARIES, *IMPLICIT) if isinstance(method, Library) else (METHODS.get(method.name),)
         if not any(method is one for one in known):
             return content_key(method)
-        key = _KEYS[id(method)] = IdentityKey(method)  # immutable: identity stands for content
+        key = _KEYS[id(method)] = method.name  # the object stays in its table: no other one takes its address
     return key

@@ -8,33 +8,19 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.dynamics.store import cached
 from gauss.errors import StateError
 from gauss.system import System, coordinate_units
 
 OTHER_POSE = 1e-3  # difference of coordinates, relative to the units of the scene, above the accuracy of assembled loops
 
 
-def rigid_joints(system: System) -> list[str]:
-    """Joints of loops that cannot move: those whose coordinates belong to no subsystem; without those of couplings."""
-    return cached(system, (rigid_joints,), lambda: _rigid_joints(system))
-
-
-def _rigid_joints(system: System) -> list[str]:
-    moving = np.zeros(system.n_v, dtype=bool)
-    for one in system.subsystems:
-        moving[one.v] = True
-    coupled = {name for coupling in system.scene.couplings.values() for name in (coupling.driver, coupling.driven)}
-    return [one.name for one in system.joints if one.pair.n_v and not moving[one.v].any() and one.name not in coupled]
-
-
 def pose_difference(system: System, q) -> Scalar:
-    """Sum of the squared differences of the coordinates of :func:`rigid_joints` to the reference configuration, relative.
+    """Sum of the squared relative differences of coordinates of :attr:`System.rigid_joints` to the reference configuration.
 
     Of coordinates (n_q,), or of many states in columns (n_q, k).
     """
     total, reference, units = 0.0, system.reference.q, list(coordinate_units(system).values())
-    for name in rigid_joints(system):
+    for name in system.rigid_joints:
         joint = system.joint(name)
         turned = system.quaternions.get(name, slice(0))
         if turned.stop:
@@ -53,12 +39,12 @@ def is_in_other_pose(system: System, q):
 
 def refused_in_other_pose(system: System, q, values: np.ndarray) -> np.ndarray:
     """Values of the reduced system, numbers or symbols; NaN where a rigid loop has another pose than it has there."""
-    return math.where(is_in_other_pose(system, q), np.nan, values) if rigid_joints(system) else values
+    return math.where(is_in_other_pose(system, q), np.nan, values) if system.rigid_joints else values
 
 
 def refuse_other_pose(system: System, q):
     """Raise a StateError if a rigid loop has another pose than in the reference configuration, in any column of q."""
-    joints = rigid_joints(system)
+    joints = system.rigid_joints
     if joints and np.any(is_in_other_pose(system, q)):
         raise StateError(
             f"joints {', '.join(map(repr, joints))} cannot move, and their loops are rigid bodies in the pose of the scene; "

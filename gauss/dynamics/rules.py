@@ -144,6 +144,11 @@ class Question(NamedTuple):
     held: bool = False
 
 
+def named(backend) -> str:
+    """Name of a backend."""
+    return backend if isinstance(backend, str) else getattr(backend, "name", type(backend).__name__)
+
+
 class Asked(Protocol):
     """Facts that every table of rules needs."""
 

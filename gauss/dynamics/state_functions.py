@@ -21,7 +21,7 @@ from gauss.dynamics.mobility import mobility
 from gauss.dynamics.null_space_terms import null_space_terms
 from gauss.dynamics.parameter_terms import size_of
 from gauss.dynamics.projection import fixed_columns
-from gauss.dynamics.rigid_loops import is_in_other_pose, refuse_other_pose, rigid_joints
+from gauss.dynamics.rigid_loops import is_in_other_pose, refuse_other_pose
 from gauss.dynamics.state_terms import REFERENCES, StateTerms
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.term_table import TERMS, Term, traced_loads
@@ -317,7 +317,7 @@ def error_measures(terms: StateTerms, given, of_loops: bool) -> list:
     """
     system, unit = terms.system, terms.system.scale.coordinates
     residual, total = off_unit(system, terms.q), absolute_sum(*given)
-    if of_loops and rigid_joints(system):
+    if of_loops and system.rigid_joints:
         residual = residual + math.where(is_in_other_pose(system, terms.q), np.inf, 0.0)
     if not isinstance(terms, ConstrainedTerms):
         return [residual, total]

@@ -32,7 +32,7 @@ from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.point_layout import PointLayout
-from gauss.dynamics.rigid_loops import is_in_other_pose, rigid_joints
+from gauss.dynamics.rigid_loops import is_in_other_pose
 from gauss.dynamics.shared_elimination import SharedElimination
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.store import cached_on_disk
@@ -354,7 +354,7 @@ class Program:
 def constraint_residual(system: System, state: State):
     """Constraint residual of a state, in position and velocity, relative; see :meth:`Program.residual`."""
     residual = off_unit(system, state.q)
-    if rigid_joints(system):
+    if system.rigid_joints:
         residual = residual + math.where(is_in_other_pose(system, state.q), np.inf, 0.0)
     if system.has_closures:
         residual = residual + state_residual(kinematics(system, state))

@@ -1,5 +1,10 @@
-"""Arguments of a motion, checked: from what a user gives to the initial value problem that drivers solve."""
+"""Arguments of a motion, checked: from what a user gives to the initial value problem that drivers solve.
 
+What a scene does not have is not asked for: a plain system (:attr:`gauss.System.is_plain`) has no functions that may have
+changed, nothing that switches, and takes every method.
+"""
+
+from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -7,10 +12,10 @@ import numpy as np
 from gauss import integrators
 from gauss.arguments import real_numbers
 from gauss.backends import Backend, ready
-from gauss.dynamics.conditions import named
-from gauss.dynamics.laws.switching import Switching, switching
+from gauss.dynamics.laws.switching import NO_SWITCHING, Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.rules import named
 from gauss.dynamics.scene_compilation import compile_scene
 from gauss.dynamics.stabilisation import Baumgarte, drift
 from gauss.dynamics.store import cached
@@ -59,12 +64,11 @@ def checked_problem(
         backend = backend if isinstance(backend, str) else made
     system = scene if isinstance(scene, System) else compile_scene(scene)
     method = check_arguments(duration, integrator, step, rtol, atol)
-    refuse_changed(system)
-    start = _start(system) if state is None else system.projected(state)
+    start = _start(system, state)
     samples = sample_times(times, start.t, duration)
     known_breaks = check_breaks(breaks, start.t, duration)
     _refuse_beyond_memory(system, method, duration, step, samples)
-    constraint_drift, laws, end = drift(system, stabilisation, start), Laws(system), start.t + duration
+    constraint_drift, laws, end = drift(system, stabilisation, start), _laws(system), start.t + duration
     problem = Problem(
         system,
         laws,
@@ -80,12 +84,20 @@ def checked_problem(
         samples,
         progress,
     )
-    if system.n_v:
-        refuse(problem)
+    _refuse_misfits(problem)
     if stabilisation == "ggl" and system.closes:
         problem = problem._replace(method=integrators.RadauGGL())
-    warn_of_times(system, problem.switching.times)
+    if problem.switching is not NO_SWITCHING:
+        warn_of_times(system, problem.switching.times)
     return problem
+
+
+def _refuse_misfits(problem: Problem):
+    """Refuse a method or a start that does not apply; every smooth method fits smooth scenes that are projected."""
+    system = problem.system
+    nonsmooth = system.nonsmooth or getattr(problem.method, "nonsmooth", False)
+    if system.n_v and (problem.stabilisation != "projection" or nonsmooth or system.rigid_joints):
+        refuse(problem)
 
 
 def _refuse_beyond_memory(system: System, method: Integrator, duration: float, step: float | None, samples):
@@ -94,6 +106,8 @@ def _refuse_beyond_memory(system: System, method: Integrator, duration: float, s
     asked = "times"
     if samples is None and step is not None and isinstance(method, FixedStep):
         count, asked = duration / step, f"step: each step of {step:.3g} s"
+    if not count:
+        return
     numbers = count * (SAMPLE_NUMBERS + system.n_q + system.n_v)
     refuse_beyond_memory(
         numbers, f"{asked}: {count:.3g} samples of {system.scene.name!r}", f"give fewer times=, or {SHORTER}"
@@ -129,17 +143,26 @@ def described(problem: Problem, duration: float, integrator: str | Integrator, r
     }
 
 
+def _laws(system: System) -> Laws:
+    """Loads of a system: traced anew, for their functions may have changed; cached where they have none."""
+    return cached(system, (Laws,), partial(Laws, system)) if system.is_plain else Laws(system)
+
+
 def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.ndarray) -> Switching:
     """Switching of a motion, cached for motions over the same time; opaque laws are sampled anew."""
+    if system.is_plain and not breaks.size:
+        return NO_SWITCHING
     make = lambda: switching(system, laws, start, end, breaks)  # noqa: E731
     if system.dynamics is None or laws.called:
         return make()
     return system.dynamics.on_demand((switching, laws.key, start.t, end, tuple(breaks)), make)
 
 
-def _start(system: System) -> State:
-    """Initial state of the scene, cached."""
-    return cached(system, (_start,), system.initial_state)
+def _start(system: System, state: State | None) -> State:
+    """Consistent initial state: that of the scene, cached, or a given one, projected."""
+    if system.written:
+        refuse_changed(system)
+    return cached(system, (_start,), system.initial_state) if state is None else system.projected(state)
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:

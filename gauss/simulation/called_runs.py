@@ -12,11 +12,9 @@ import numpy as np
 
 from gauss.codegen.kernels import LAST_STEP_SHARE, CallingLoop, Control, Loop, LoopStatus
 from gauss.codegen.tiers import EntryPoint
-from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT
 from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.load_receiver import LoadReceiver
-from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Rates
 from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
@@ -46,12 +44,12 @@ class CalledRun(CompiledRun):
     ----------
     problem : Problem
         Initial value problem.
-    program : type
-        Makes the functions of the system.
+    dynamics : str
+        Of its plan, from which the functions of the system come.
     """
 
-    def __init__(self, problem: Problem, program: type[Program] = CalledProgram):
-        super().__init__(problem, program)
+    def __init__(self, problem: Problem, dynamics: str = "callbacks"):
+        super().__init__(problem, dynamics)
         self._receive()
 
     def _receive(self):

@@ -1,6 +1,7 @@
 """A motion by a compiled loop of adaptive steps, which end at the switching times of the laws."""
 
 import ctypes
+from collections.abc import Iterator
 from operator import is_
 from types import SimpleNamespace
 from typing import cast
@@ -10,7 +11,6 @@ import numpy as np
 from gauss.codegen.kernels import Loop, LoopStatus, address
 from gauss.dynamics.laws.switching import endless
 from gauss.dynamics.laws.switching_times import APART, NO_TIMES, Timetable
-from gauss.dynamics.plan import method_key
 from gauss.dynamics.point_layout import PointLayout
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, Taylor, Tolerance, crossed_time
@@ -22,7 +22,6 @@ from gauss.simulation.step_limits import (
     PROGRESS_TRIALS,
     SLIDING_CROSSINGS,
     lasting,
-    steps_per_check,
 )
 
 SLIDING_PROGRESS = 1e-5  # relative to the duration, per PROGRESS_TRIALS, below which a sliding motion is refused
@@ -68,11 +67,11 @@ class CompiledAdaptiveRun(CompiledRun):
         """Machine code of the steps; the control record has the settings of the method."""
         control, tolerance = self.control, self.problem.tolerance
         method = cast("Controlled | Taylor", self.problem.method)
-        loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, tolerance.shares))
-        control.every = steps_per_check(method.evaluations)
+        loop = self._loop_of((self.method_key, tolerance.key), lambda: single(self.program, method, tolerance.shares))
+        control.every = self.common.every
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if self.problem.step is None else self.problem.step
-        control.order = method.order_for(tolerance) if isinstance(method, Taylor) else method.order
+        control.order = method.order_for(tolerance) if isinstance(method, Taylor) else self.common.order
         return loop
 
     def run(self):
@@ -93,9 +92,7 @@ class CompiledAdaptiveRun(CompiledRun):
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
         out = np.empty((grid.size if control.samples else 2 * self.budget, self.layout.row))
-        samples = NO_TIMES if self.held is None else Timetable(NO_TIMES.switches, self.held.times[1:])
-        times = self.switching.times.join(samples) if samples else self.switching.times
-        stops = iter(times.stops(self.start.t, self.end)) if times else iter([(self.end,) * 2])
+        stops = self._stops()
         control.end, self.after = next(stops)
         self.trials, self.measured_from, self.next_sample = 0.0, self.start.t, 1
 
@@ -117,6 +114,13 @@ class CompiledAdaptiveRun(CompiledRun):
                     return
 
         self._drive(advance, out)
+
+    def _stops(self) -> Iterator[tuple[float, float]]:
+        """Ends of steps at switching times and samples of a control law, each with the start of the next step."""
+        times = self.switching.times
+        if self.held is not None:
+            times = times.join(Timetable(NO_TIMES.switches, self.held.times[1:]))
+        return iter([(self.end,) * 2] if times is NO_TIMES else times.stops(self.start.t, self.end))
 
     def _steps(self, grid: np.ndarray, out: np.ndarray):
         """Make the steps of one budget."""

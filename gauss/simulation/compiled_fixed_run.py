@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 
 from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus, address
-from gauss.dynamics.plan import method_key
 from gauss.integrators import FixedStep, Point
 from gauss.simulation.compiled_run import HELD_SAMPLES, CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import fixed
 from gauss.simulation.grid import grid_of, with_samples
-from gauss.simulation.step_limits import steps_per_check
 from gauss.system import State
 
 PAIR_BYTES = 16  # of a time of the grid and its :class:`Due`
@@ -36,7 +34,7 @@ class CompiledFixedRun(CompiledRun):
 
     def prepared(self) -> Loop:
         """Machine code of the steps."""
-        return self._loop_of(method_key(self.method), lambda: self._functions().compile())
+        return self._loop_of(self.method_key, lambda: self._functions().compile())
 
     def prepared_steps(self) -> Any:
         """Machine code of the steps, or what is called as it is: ``call(*arrays(…), n)``."""
@@ -70,7 +68,7 @@ class CompiledFixedRun(CompiledRun):
             self.inputs = self.held.at(0, self.start.t, self.start.q.copy(), self.start.v.copy())
         point = self._pack(Point(self.start, np.zeros(3), self.evaluated(self.start), self.method_state))
         self._begin(point, loop.evaluate("check", point))
-        self.control.every = steps_per_check(method.evaluations)
+        self.control.every = self.common.every
         pairs = grid_of(method, self.start.t, self.end, step, self.samples, self.switching)
         out = self._room()
         self.crossings: dict[int, float] = {}

@@ -8,7 +8,9 @@ steps: :mod:`gauss.simulation.compiled_fixed_run`.
 
 import time
 from collections.abc import Callable, Hashable, Sequence
+from functools import cached_property
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +19,8 @@ from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.inputs import InputForces
+from gauss.dynamics.plan import method_key
+from gauss.dynamics.programs import program_of
 from gauss.dynamics.store import cached_on_disk, is_noted_on_disk, note_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
@@ -27,7 +31,7 @@ from gauss.simulation.motion_records import EnergyRecord, Event, Stats
 from gauss.simulation.prescribed import AfterJump, crossed
 from gauss.simulation.problem import Problem
 from gauss.simulation.progress import Progress
-from gauss.simulation.step_limits import BUDGET, smallest_step
+from gauss.simulation.step_limits import BUDGET, smallest_step, steps_per_check
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
@@ -40,6 +44,33 @@ BUDGET_WORK = 16 * 16 * 12
 UNTRUSTED = (LoopStatus.UNCONFIRMED, LoopStatus.OFF_CONSTRAINTS, LoopStatus.TOO_SMALL)
 
 
+class MethodOnSystem(NamedTuple):
+    """What all runs of one method on one system have in common, beside their machine code.
+
+    Attributes
+    ----------
+    program : Program
+        Functions of the system.
+    method_state : ndarray or None
+        Initial method state; the accelerations where None.
+    budget : int
+        Steps of one call of the loop.
+    every : int
+        Steps between two checks of the accelerations.
+    order : float
+        Order of the method.
+    checks_bodies : bool
+        Whether accelerations are checked body by body.
+    """
+
+    program: Program
+    method_state: np.ndarray | None
+    budget: int
+    every: int
+    order: float
+    checks_bodies: bool
+
+
 class CompiledRun:
     """One motion in machine code.
 
@@ -47,30 +78,42 @@ class CompiledRun:
     ----------
     problem : Problem
         Initial value problem whose loads are all traced.
-    program : type
-        Makes the functions of the system.
+    dynamics : str
+        Of its plan, from which the functions of the system come.
     """
 
-    def __init__(self, problem: Problem, program: type[Program] = Program):
+    def __init__(self, problem: Problem, dynamics: str = "compiled"):
         self.began = time.perf_counter()
         self.problem, self.system, self.start, self.end = problem, problem.system, problem.start, problem.end
         self.samples, self.switching, self.drift = problem.samples, problem.switching, problem.drift
         self.events: list[Event] = []
         self.rows: list[np.ndarray] = []
         self.held = problem.held
-        self.certified = CertifiedEngine("auto", self.drift.gains)
-        self.key: tuple[Hashable, ...] = (program.__name__, self.drift, problem.laws.key, self.held is not None)
-        self.method_state, size = self._initial_method_state()
-        make = lambda: program(self.system, problem.laws, self.drift, size, inputs=self.held is not None)  # noqa: E731
-        self.program = self._on_demand((Program, size), make)
+        self.dynamics, self.method_key = dynamics, method_key(problem.method)
+        self.key: tuple[Hashable, ...] = (dynamics, self.drift, problem.laws.key, self.held is not None)
+        self.common: MethodOnSystem = self._on_demand((MethodOnSystem, self.method_key), self._on_system)
+        self.program, self.method_state, self.budget, *_ = self.common
         self.layout = self.program.layout
         self.inputs = np.zeros(len(self.layout.parameters))
         self.input_forces = InputForces(self.system) if self.held else None
         duration = self.end - self.start.t
-        work = max(1, self.system.n_v) ** 2 * problem.method.evaluations
-        self.budget = max(1, int(BUDGET * min(1.0, BUDGET_WORK / work)))
         limits = {"smallest": smallest_step(duration, self.end), "largest": duration}
         self.control = Control(end=self.end, acceleration_tolerance=ACCELERATION_TOLERANCE, **limits)
+
+    @cached_property
+    def certified(self) -> CertifiedEngine:
+        """Engine that confirms accelerations; most runs need none."""
+        return CertifiedEngine("auto", self.drift.gains)
+
+    def _on_system(self) -> MethodOnSystem:
+        """What depends on the method and the system alone."""
+        system, laws, evaluations = self.system, self.problem.laws, self.problem.method.evaluations
+        method_state, size = self._initial_method_state()
+        held, kind = self.held is not None, program_of(self.dynamics)
+        program = self._on_demand((Program, size), lambda: kind(system, laws, self.drift, size, inputs=held))
+        budget = max(1, int(BUDGET * min(1.0, BUDGET_WORK / (max(1, system.n_v) ** 2 * evaluations))))
+        every, order = steps_per_check(evaluations), self.problem.method.order
+        return MethodOnSystem(program, method_state, budget, every, order, program.checks_bodies)
 
     def _initial_method_state(self) -> tuple[np.ndarray | None, int]:
         """Initial method state, the accelerations where None, and its size."""
@@ -157,20 +200,20 @@ class CompiledRun:
 
     def _drive(self, advance: Callable[[], None], out: np.ndarray):
         """Call the loop until it stops, and collect its rows."""
-        control = self.control
-        bar = Progress(self.end - self.start.t, self.problem.progress)
+        control, bar, began = self.control, None, time.perf_counter()
         try:
             control.status = LoopStatus.PAUSED
             while control.status == LoopStatus.PAUSED:
                 control.rows = 0.0
                 advance()
                 self._gather(out)
-                bar.update(self.point[0] - self.start.t)
+                if control.status == LoopStatus.PAUSED:  # longer motions than most
+                    bar = bar or Progress(self.end - self.start.t, self.problem.progress, began=began)
+                    bar.update(self.point[0] - self.start.t)
             if control.status == LoopStatus.DONE and not self._is_confirmed():
                 control.status, self.confirmed = LoopStatus.UNCONFIRMED, self._certified_start()
             if control.status in UNTRUSTED:
-                self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
-                self.events = [event for event in self.events if event.t <= self.confirmed[0]]
+                self._forget_unconfirmed()
         except KeyboardInterrupt as error:  # stays a KeyboardInterrupt: no handler of errors may swallow it
             self._gather(out)
             error.trajectory = self.trajectory()  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the motion so far
@@ -182,7 +225,13 @@ class CompiledRun:
                 found = self.trajectory()
             raise SimulationError(str(error), found) from error
         finally:
-            bar.close()
+            if bar is not None:
+                bar.close()
+
+    def _forget_unconfirmed(self):
+        """Keep the samples and events up to the last confirmed point."""
+        self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
+        self.events = [event for event in self.events if event.t <= self.confirmed[0]]
 
     def _gather(self, out: np.ndarray):
         """Keep the rows that the loop has written."""
@@ -196,11 +245,11 @@ class CompiledRun:
         this machine code, which is noted on disk, and later where the check fails. Other systems are checked body by body in
         machine code, at their last point, too.
         """
-        if self.program.checks_bodies:
+        if self.common.checks_bodies:
             return True
         packed = self.point
         checked: Sequence | np.ndarray = (self.control.constraint_residual,)  # the error by which the loop decides
-        if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
+        if not self.drift.projects and self.system.closes:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
             packed = self._pack(Point(state, point.work, self.evaluated(state), point.method_state))
@@ -226,7 +275,7 @@ class CompiledRun:
 
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
-        known = self.program.checks_bodies or self._is_certified()
+        known = self.common.checks_bodies or self._is_certified()
         return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECK_ERRORS])
 
     def _is_certified(self) -> bool:
@@ -242,16 +291,17 @@ class CompiledRun:
 
     def trajectory(self) -> Trajectory:
         """Motion so far."""
-        control, n_q, n_v = self.control, self.system.n_q, self.system.n_v
+        control, n_q, n_v, engine = self.control, self.layout.n_q, self.layout.n_v, vars(self).get("certified")
+        asked, worst = (0, 0.0) if engine is None else (engine.evaluations, engine.error)
         rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self.layout.row))
         q, v, work = rows[:, 1 : 1 + n_q], rows[:, 1 + n_q : 1 + n_q + n_v], rows[:, 1 + n_q + n_v :]
         stats = Stats(
-            int(control.evaluations) + self.certified.evaluations,
+            int(control.evaluations) + asked,
             int(control.steps),
             int(control.rejected),
             int(control.factorisations),
             time.perf_counter() - self.began,
-            max(control.worst, self.certified.error),
+            max(control.worst, worst),
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
             unseen=int(control.unseen),
         )

@@ -11,7 +11,6 @@ import numpy as np
 
 from gauss.codegen.kernels import LoopStatus
 from gauss.dynamics.conditions import smooth_question
-from gauss.dynamics.programs import program_of
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Point
 from gauss.simulation.compiled_run import CompiledRun
@@ -35,10 +34,10 @@ def fixed_run(problem: Problem, dynamics: str) -> "CompiledFixedRun":
     if problem.laws.called:
         from gauss.simulation.called_runs import CalledFixedRun
 
-        return CalledFixedRun(problem, program_of(dynamics))
+        return CalledFixedRun(problem, dynamics)
     from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 
-    return CompiledFixedRun(problem, program_of(dynamics))
+    return CompiledFixedRun(problem, dynamics)
 
 
 def adaptive_run(problem: Problem, dynamics: str) -> "CompiledAdaptiveRun":
@@ -46,10 +45,10 @@ def adaptive_run(problem: Problem, dynamics: str) -> "CompiledAdaptiveRun":
     if problem.laws.called:
         from gauss.simulation.called_runs import CalledAdaptiveRun
 
-        return CalledAdaptiveRun(problem, program_of(dynamics))
+        return CalledAdaptiveRun(problem, dynamics)
     from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
 
-    return CompiledAdaptiveRun(problem, program_of(dynamics))
+    return CompiledAdaptiveRun(problem, dynamics)
 
 
 def moreau_run(problem: Problem, removal: float = 0.0) -> "CompiledMoreauRun":

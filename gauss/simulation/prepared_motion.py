@@ -13,7 +13,7 @@ from gauss.codegen import one_tier
 from gauss.codegen.kernels import Control, LoopStatus, address
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.plan import plan_of
-from gauss.dynamics.rigid_loops import refuse_other_pose, rigid_joints
+from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.dynamics.rules import Plan
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import FixedStep
@@ -48,7 +48,7 @@ class PreparedMotion:
                 scene, duration, integrator, step, rtol, atol, "auto", stabilisation, None, end, (), False
             )
             self.system, self.duration, plan = problem.system, float(duration), plan_of(problem.question)
-            self._rigid = rigid_joints(self.system)
+            self._rigid = self.system.rigid_joints
             name = self.system.scene.name
             if plan.driver != "compiled loop" or isinstance(problem.method, FixedStep):
                 fixed = "the integrator has fixed steps, which gauss.Simulator makes"

@@ -17,12 +17,14 @@ class Progress:
         Whether a bar may appear.
     counted : str
         Unit of the total.
+    began : float, optional
+        When the run began, by :func:`time.perf_counter`; now when not given.
     """
 
-    def __init__(self, total: float, shown: bool, counted: str = "s simulated"):
+    def __init__(self, total: float, shown: bool, counted: str = "s simulated", began: float | None = None):
         self.total, self.shown, self.counted = total, shown, counted
         self.bar: Any = None  # of tqdm
-        self.began = time.perf_counter()
+        self.began = time.perf_counter() if began is None else began
 
     def update(self, done: float):
         """Set the progress."""

@@ -11,6 +11,7 @@ from gauss.codegen import gc_pause, one_tier
 from gauss.codegen.tiers import AUTO, Run
 from gauss.dynamics.conditions import own_backend
 from gauss.dynamics.evaluation_cost import warn_of_slow_route
+from gauss.dynamics.laws.switching import NO_SWITCHING
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
@@ -163,20 +164,47 @@ def simulate(
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
-        problem = problem._replace(held=held_inputs(problem, control, rate))
-        problem = problem._replace(sleeping=checked_sleeping(sleeping, problem))
-        settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
-        if not isinstance(problem.method, FixedStep):
-            history.refuse_random(problem.system, problem.start)
+        if control is not None or rate is not None or sleeping is not False:
+            problem = _held_or_sleeping(problem, control, rate, sleeping)
+        settings, history = described(problem, duration, integrator, rtol, atol), _history(problem)
         wanted = SLEEPING_PLAN if problem.sleeping is not None and plan is None else plan
         found = _simulated(problem, plan_of(problem.question, wanted), settings, verify, run)
-    watch_balance(found, problem.start)
-    warn_of_switching(found, problem.method)
-    history.warn(found)
-    chosen = found.stats.plan
-    if plan is None and chosen is not None and chosen.rejected and not own_backend(problem.question):
-        warn_of_slow_route(problem.system, chosen, found.stats.evaluations)
+    _watch(found, problem, history)
+    if plan is None:
+        _warn_of_plan(found, problem)
     return found
+
+
+def _held_or_sleeping(problem: Problem, control, rate: float | None, sleeping: bool | Sleeping) -> Problem:
+    """Problem with the inputs of a control law, and with bodies that sleep."""
+    problem = problem._replace(held=held_inputs(problem, control, rate))
+    return problem._replace(sleeping=checked_sleeping(sleeping, problem))
+
+
+def _history(problem: Problem) -> History | None:
+    """State of the opaque laws before a motion, none of which may be random in adaptive steps; None without such laws."""
+    if not problem.laws.called:
+        return None
+    history = History(problem.laws)
+    if not isinstance(problem.method, FixedStep):
+        history.refuse_random(problem.system, problem.start)
+    return history
+
+
+def _watch(found: Trajectory, problem: Problem, history: History | None):
+    """Warn where a motion may be wrong: by its energy balance, and by its laws where there are any."""
+    watch_balance(found, problem.start)
+    if found.stats.unseen or found.stats.opaque:
+        warn_of_switching(found, problem.method)
+    if history is not None:
+        history.warn(found)
+
+
+def _warn_of_plan(found: Trajectory, problem: Problem):
+    """Warn of a plan that is slow because of an element of the scene."""
+    chosen = found.stats.plan
+    if chosen is not None and chosen.rejected and not own_backend(problem.question):
+        warn_of_slow_route(problem.system, chosen, found.stats.evaluations)
 
 
 def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: Run) -> Trajectory:
@@ -195,6 +223,9 @@ def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
     """Trajectory of a problem by the driver of a plan, in pieces where constraints jump between modes."""
+    if problem.switching is NO_SWITCHING:  # nor has it constraints that might
+        with judged_later():
+            return DRIVERS[plan.driver](problem, plan)
 
     def drive(piece: Problem) -> Trajectory:
         return _beside_jumps(plan if piece.system is problem.system else _plan_of_mode(piece, plan), piece)

@@ -49,11 +49,15 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     if scene.set_valued:
         system = replace(system, set_valued=place_relations(system, scene.set_valued.values()))
     _check_gap_functions(system)
+    if system.is_plain:
+        return system
     return replace(system, written=written) if (written := written_laws(system)) else system
 
 
 def _check_gap_functions(system: System):
     """Trace the gap functions of the user; those of shapes and joints are traced when they are asked for."""
+    if not system.scene.contacts:
+        return
     own = [side for side in sides(system.scene) if isinstance(side.whole, OneSidedConstraint)]
     if own:
         place_relations(system, own)

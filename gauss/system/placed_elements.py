@@ -9,6 +9,7 @@ from gauss.errors import StateError
 from gauss.scene import Drive, ElasticLink, Force, Input, JointSpring, Pair, Slipping, Spring
 
 SceneLoad = Drive | ElasticLink | Force | Input | JointSpring | Slipping | Spring
+LAW_FIELDS = ("effort", "force", "moment")  # fields of loads that hold laws
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,11 @@ class BoundLoad:
 
     load: SceneLoad
     laws: tuple[Callable, ...] = ()
+
+    @property
+    def functions(self) -> list[Callable]:
+        """Laws that are functions of the user."""
+        return [law for law in (getattr(self.load, field, None) for field in LAW_FIELDS) if callable(law)]
 
     @property
     def on_coordinates(self) -> bool:

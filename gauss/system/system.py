@@ -121,6 +121,12 @@ class System(NamedPlaces, StateFunctions):
         return tuple(self.scene.nonsmooth)
 
     @cached_property
+    def is_plain(self) -> bool:
+        """Whether nothing in it switches, jumps or may change: joints, couplings, and loads without functions or breaks."""
+        given = any(bool(bound.functions) or hasattr(bound.load, "breaks") and bound.load.breaks for bound in self.loads)
+        return not (given or self.scene.relations or self.nonsmooth)
+
+    @cached_property
     def is_flat(self) -> bool:
         """Whether no coordinate is part of a quaternion: rates are then derivatives of coordinates."""
         return not self.quaternions
@@ -161,6 +167,18 @@ class System(NamedPlaces, StateFunctions):
         """Reduced subsystems in joint coordinates, which move independently."""
         return self.reduction[-1].subsystems
 
+    @cached_property
+    def rigid_joints(self) -> tuple[str, ...]:
+        """Joints of loops that cannot move: those whose coordinates belong to no subsystem; without those of couplings."""
+        if not self.has_closures:
+            return ()
+        moving = np.zeros(self.n_v, dtype=bool)
+        for one in self.subsystems:
+            moving[one.v] = True
+        coupled = {name for coupling in self.scene.couplings.values() for name in (coupling.driver, coupling.driven)}
+        still = (one for one in self.joints if one.pair.n_v and not moving[one.v].any())
+        return tuple(one.name for one in still if one.name not in coupled)
+
     parts = FormerAttribute("subsystems")
     grips = FormerAttribute("set_valued")
 
@@ -169,7 +187,7 @@ class System(NamedPlaces, StateFunctions):
         """Whether no joint closes a loop; couplings and relations may bind the joints."""
         return len(self.structure.tree) == len(self.joints)
 
-    @property
+    @cached_property
     def closes(self) -> bool:
         """Whether integration can drift off constraints: some subsystem has loops, couplings or relations."""
         return any(subsystem.loop_joints or subsystem.couplings or subsystem.relations for subsystem in self.subsystems)
@@ -253,7 +271,8 @@ class System(NamedPlaces, StateFunctions):
         InconsistentConstraintsWarning
             If redundant constraints contradict each other by up to 1e-6 of the size of the mechanism.
         """
-        refuse_changed(self)
+        if self.written:
+            refuse_changed(self)
         given = q is not None or v is not None
         if not given and t == 0.0 and keep is None and not least_violation:
             return self.mechanics.scene_start(self)

@@ -65,6 +65,9 @@ class Switching(NamedTuple):
         return self.peaks is not None and self.peaks.oscillates(begin, end)
 
 
+NO_SWITCHING = Switching()
+
+
 def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
     """Switching times, switching functions and velocity jumps of a motion.
 

@@ -18,7 +18,6 @@ AGREEMENT = 1e-6  # relative: traced functions may have other round-off
 PROBE_ROUNDOFF = 1e-12  # of the values at all probes, relative to the largest: poses at the end of a chain sum up round-off
 ASIDE = 0.3  # distance of another state from the reference, in units of the coordinates
 UNTRACEABLE = ("TypeError: ", "TracerError: ")
-FIELDS = ("effort", "force", "moment")  # fields of loads that hold laws
 Probe = Callable[[State], Kinematics]  # kinematics of a state at which laws are compared
 
 
@@ -58,7 +57,7 @@ class Laws:
         self.motion: Kinematics | None = None
         self.probed: dict[tuple[float, bytes, bytes], Kinematics] = {}
         for number, bound in enumerate(system.loads):
-            found = [self._traced(law) for law in _laws(bound.load)]
+            found = [self._traced(law) for law in bound.functions]
             functions = [function for function in found if isinstance(function, Function)]
             if len(functions) == len(found):
                 self.traced.append(bound)
@@ -96,12 +95,7 @@ class Laws:
 
 def needs_poses(load) -> bool:
     """Whether a law of a load takes the kinematics, and may depend on poses of bodies."""
-    return any(arguments(law) > 1 for law in _laws(load))
-
-
-def _laws(load) -> list:
-    """Laws of a load that are functions."""
-    return [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
+    return any(arguments(law) > 1 for law in BoundLoad(load).functions)
 
 
 def symbols(system: System) -> Kinematics:

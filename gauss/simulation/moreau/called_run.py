@@ -1,6 +1,5 @@
 """Moreau–Jean time stepping in machine code that calls opaque laws, one evaluation a step."""
 
-from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.simulation.called_runs import CalledFixedRun
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
@@ -21,5 +20,5 @@ class CalledMoreauRun(CalledFixedRun, CompiledMoreauRun):
     """
 
     def __init__(self, problem: Problem, laws: Laws, removal: float = 0.0):
-        CompiledMoreauRun.__init__(self, problem, laws, CalledProgram, removal)
+        CompiledMoreauRun.__init__(self, problem, laws, "callbacks", removal)
         self._receive()

@@ -13,9 +13,7 @@ from gauss.codegen.kernels import Due, Fixed, Loop, LoopStatus
 from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.contact.step_modes import UNKNOWN
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import method_key
 from gauss.dynamics.stabilisation import Drift
-from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
@@ -40,25 +38,25 @@ class CompiledMoreauRun(CompiledFixedRun):
         Initial value problem of a system with unilateral or set-valued elements, from a start without penetration.
     laws : Laws
         Loads of the system without these elements.
-    program : type
-        Makes the functions of that system.
+    dynamics : str
+        From which the functions of that system come.
     removal : float
         Least time in which penetration is removed [s]; zero: within a step.
     """
 
-    def __init__(self, problem: Problem, laws: Laws, program: type[Program] = Program, removal: float = 0.0):
+    def __init__(self, problem: Problem, laws: Laws, dynamics: str = "compiled", removal: float = 0.0):
         self.whole, self.stepper = problem, moreau_stepper(problem.system, removal=removal)
         self.stepper.refuse_penetration(problem.start)
         self.contacts, self.forces = ContactEvents(self.stepper.modes), self.stepper.lossy.size
         self.codes = self.stepper.modes.codes
-        super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()), program)
+        super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()), dynamics)
 
     def _beside(self) -> tuple:
         return (self.whole.system,)  # with the elements that the stepper adds
 
     def prepared(self) -> Loop:
         """Machine code of the steps."""
-        return self._loop_of((method_key(self.method), self.stepper.removal), lambda: self._functions().compile())
+        return self._loop_of((self.method_key, self.stepper.removal), lambda: self._functions().compile())
 
     def collect(self) -> Trajectory:
         """Trajectory to the end.
