@@ -57,10 +57,7 @@ def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figu
 def widths_figure(names: Sequence[str], values, half_widths) -> "Figure":
     """Half widths of confidence intervals as shares of the values, on a logarithmic scale.
 
-    Raises
-    ------
-    MissingPackageError
-        If matplotlib is not installed.
+    MissingPackageError if matplotlib is not installed.
     """
     with extra("view"):
         from matplotlib.figure import Figure

@@ -46,10 +46,7 @@ class SampleForces:
     def of(self, trajectory: Trajectory, name: str):
         """Constraint of this name, its multipliers (k, m), and which of them are not unique (m,).
 
-        Raises
-        ------
-        SimulationError
-            If those of some sample are not certified.
+        SimulationError if those of some sample are not certified.
         """
         constraints = trajectory.system.structure.constraints
         place = next(i for i, constraint in enumerate(constraints) if constraint.name == name)
@@ -62,10 +59,7 @@ class SampleForces:
 def sample_forces(trajectory: Trajectory, backend) -> SampleForces:
     """Multipliers of all constraints at every sample, found once for each backend that is given by its name.
 
-    Raises
-    ------
-    SimulationError
-        If a sample has no certified solution.
+    SimulationError if a sample has no certified solution.
     """
     return kept_with(trajectory, "multipliers", backend, lambda: _found(trajectory, backend))
 

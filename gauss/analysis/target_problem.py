@@ -25,10 +25,6 @@ class TargetProblem:
 
     Parameters
     ----------
-    system : System
-        The system.
-    targets : Target or sequence of Target
-        The targets.
     limits : dict, optional
         Lowest and highest coordinates (2,) [rad, m] by name, instead of those of joints and stops.
     """
@@ -134,10 +130,7 @@ def named_values(system: System, given, what: str) -> Iterator[tuple[int, object
 def positive_values(system: System, given, what: str) -> np.ndarray:
     """Bounds (n_v,): infinite where none is given; of one number, in the unit of each coordinate.
 
-    Raises
-    ------
-    ArgumentError
-        If a value is no positive number.
+    ArgumentError if a value is no positive number.
     """
     found = np.full(system.n_v, np.inf)
     if given is None:

@@ -42,13 +42,7 @@ class Measurement:
 
 
 def chosen(names: Iterable[str] | None, existing: Iterable[str], what: str) -> tuple[str, ...]:
-    """Return the names, each once, or all if none is given.
-
-    Raises
-    ------
-    BackendError
-        If one does not exist.
-    """
+    """Return the names, each once, or all if none is given; BackendError if one does not exist."""
     existing, names = tuple(existing), tuple(names or ())
     for name in names:
         if name not in existing:

@@ -29,12 +29,8 @@ class MechanismProblem:
 
     Parameters
     ----------
-    name : str
-        Its name.
     note : str
         What it is, and what is hard about it.
-    compulsion : Compulsion
-        The problem.
     system, state : System, State, optional
         Where it comes from, if the compulsion is that of a system in a state and nothing else.
     load : ndarray, shape (n_v,), optional
@@ -75,13 +71,7 @@ def selected(name: str, verdict: str = SOLVABLE) -> Callable:
 
 
 def make_problem(name: str) -> MechanismProblem:
-    """Problem of the selection by name.
-
-    Raises
-    ------
-    BackendError
-        If there is none.
-    """
+    """Problem of the selection by name; BackendError if there is none."""
     if name not in SELECTION:
         raise BackendError(f"no problem {name!r}. {did_you_mean(name, SELECTION)}")
     return SELECTION[name].make()

@@ -61,10 +61,6 @@ def assembled(system: System, guess: State, held, restart: bool) -> AssembledPos
 
     Parameters
     ----------
-    system : System
-        The system.
-    guess : State
-        The guess.
     held : sequence of int
         Entries of v whose coordinates are fixed.
     restart : bool

@@ -30,8 +30,6 @@ class RecordedSystem:
 
     Parameters
     ----------
-    system : System
-        The system.
     sections : RecordedSections
         Its recursions, recorded.
     sizes : ndarray, shape (m,)

@@ -44,8 +44,6 @@ class ConstrainedArticulatedBody:
 
     Parameters
     ----------
-    subsystem : Subsystem
-        The subsystem.
     q, v : ndarray, shape (n_q,), (n_v,)
         Its coordinates and rates; floats or expressions.
     relations : sequence of Rows

@@ -54,8 +54,6 @@ def with_alike_bodies(system: System, pattern: System | None = None) -> tuple[Su
 
     Parameters
     ----------
-    system : System
-        The system.
     pattern : System, optional
         A system of numbers, where those of this one are symbols.
     """

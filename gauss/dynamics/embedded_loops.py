@@ -81,10 +81,6 @@ class EmbeddedLoops(ArticulatedBody):
 
     Parameters
     ----------
-    tree : KinematicTree
-        The tree.
-    rows : sequence of LoopRow
-        Its loop constraints.
     hubs : dict
         Roots of the fronts of hubs, {hub: root}.
     """

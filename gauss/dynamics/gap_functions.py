@@ -133,10 +133,7 @@ def closed(system: System, found: Gaps, v: np.ndarray) -> np.ndarray:
 def with_contacts(motion: Kinematics, compulsion: Compulsion) -> Compulsion:
     """Compulsion with the rows G x ≤ h of the closed gaps.
 
-    Raises
-    ------
-    SceneError
-        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: these are no rows.
+    SceneError if there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: these are no rows.
     """
     system = motion.system
     if system.slips.placed or system.set_valued.placed or system.losses:

@@ -63,8 +63,6 @@ def with_moved_joint(subsystem: Subsystem, index: int, body: int, shift) -> Give
 
     Parameters
     ----------
-    subsystem : Subsystem
-        The subsystem.
     index, body : int
         The joint, and the body on which it moves.
     shift : ndarray, shape (3,)

@@ -88,8 +88,6 @@ def driven_scene(scene: Scene, laws: Mapping[str, Callable]) -> Scene:
 
     Parameters
     ----------
-    scene : Scene
-        Scene with inputs.
     laws : mapping of str to callable
         Input → law t ↦ value [N m, N], cut off at the limits of the input.
     """

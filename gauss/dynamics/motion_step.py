@@ -36,8 +36,6 @@ class MotionStep:
 
     Parameters
     ----------
-    system : System
-        The system.
     integrator : str
         Explicit Runge–Kutta method: "rk4", "dopri5" or "dop853", with fixed steps.
     parameters : sequence of str

@@ -46,10 +46,10 @@ class NullSpaceKernels(NamedTuple):
 class NullSpaceDynamics:
     """Accelerations of a system with loops in one state of numbers, and their changes.
 
+    SimulationError if too few digits are left.
+
     Parameters
     ----------
-    system : System
-        The system.
     laws : Laws
         Its loads; the traced ones are included.
     state : State
@@ -61,11 +61,6 @@ class NullSpaceDynamics:
     ----------
     rates : ndarray, shape (n_v,)
         Accelerations.
-
-    Raises
-    ------
-    SimulationError
-        If too few digits are left.
     """
 
     def __init__(self, system: System, laws: Laws, state: State, load):

@@ -20,21 +20,16 @@ from gauss.system import State, System
 def null_space_terms(system: System, requests: Sequence, state: State, given: dict) -> list[np.ndarray]:
     """Results of requests for functions of accelerations, and of others beside them, one after the other.
 
+    SimulationError if too few digits are left.
+
     Parameters
     ----------
-    system : System
-        The system.
     requests : sequence of Request
         Functions of a state.
     state : State
         State that meets the constraints.
     given : dict
         Rates, accelerations and generalised forces (n_v,), by their names.
-
-    Raises
-    ------
-    SimulationError
-        If too few digits are left.
     """
     laws, load, found = traced_loads(system), given["load"], list[np.ndarray]()
     dynamics = NullSpaceDynamics(system, laws, state, load)

@@ -299,10 +299,7 @@ def motion_plan(system: System) -> Plan:
 def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
     """Plan of a motion, cached with the system.
 
-    Raises
-    ------
-    SimulationError
-        If the conditions of no rule hold, or not those of the wanted one.
+    SimulationError if the conditions of no rule hold, or not those of the wanted one.
     """
     make = lambda: MOTIONS.plan(ask, wanted)  # noqa: E731
     if ask.system.dynamics is None or ask.laws.called:

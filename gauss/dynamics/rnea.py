@@ -43,8 +43,6 @@ class KinematicTree:
 
     Parameters
     ----------
-    subsystem : Subsystem
-        The subsystem.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
 
@@ -161,8 +159,6 @@ def kinematics_of_joint(
 
     Parameters
     ----------
-    pair : Pair
-        Kinematics of the joint.
     forward : bool
         Whether the link is the child of the joint.
     link : Link

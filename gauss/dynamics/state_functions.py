@@ -93,10 +93,7 @@ def traced_function(
 
     The last outputs of the trace are error measures, one for each limit of the interface.
 
-    Raises
-    ------
-    ArgumentError, StateError, SimulationError
-        As of :func:`state_function`.
+    ArgumentError, StateError, SimulationError as of :func:`state_function`.
     """
     found = _function(system, *_requested(system, names, reference, independent))
     return found.trace(), found.interface
@@ -120,10 +117,7 @@ def _requested(system: System, names: Sequence[str], reference: str, independent
 def evaluate(system: System, names, given: dict, t, reference: str, independent) -> dict:
     """Results of several functions of a state, by their names; see :meth:`gauss.System.evaluate`.
 
-    Raises
-    ------
-    StateError
-        If an argument is missing or does not fit.
+    StateError if an argument is missing or does not fit.
     """
     names = (names,) if isinstance(names, str) else tuple(names)
     function = state_function(system, names, reference, independent)
@@ -336,10 +330,7 @@ def distance_of_loops(system: System, state: State) -> float:
 def refused_state(system: System, state: State, name: str, columns) -> str:
     """Why a state with unit quaternions and finite numbers is refused.
 
-    Raises
-    ------
-    StateError
-        If a loop that cannot move has another pose than in the scene.
+    StateError if a loop that cannot move has another pose than in the scene.
     """
     if distance_of_loops(system, state) <= RESIDUAL_TOLERANCE:
         refuse_other_pose(system, state.q)

@@ -147,13 +147,7 @@ def folder_of(folder) -> Path:
 
 
 def identifier(name: str) -> str:
-    """Name with underscores for all that is neither letter nor digit.
-
-    Raises
-    ------
-    ArgumentError
-        If it is no text.
-    """
+    """Name with underscores for all that is neither letter nor digit; ArgumentError if it is no text."""
     if not isinstance(name, str):
         raise ArgumentError(f"export: name: expected a text, got {name!r:.80}.")
     found = re.sub(r"\W", "_", name, flags=re.ASCII)
@@ -198,10 +192,7 @@ def _loaded(system: System, name: str) -> ExportedFunction:
 def without_calls(function: Function) -> Function:
     """The same function with the operations of called functions in their places.
 
-    Raises
-    ------
-    SimulationError
-        If it calls a function that is machine code and has no graph.
+    SimulationError if it calls a function that is machine code and has no graph.
     """
     if not any(node.op == "call" for node in function.nodes):
         return function

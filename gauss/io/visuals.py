@@ -44,17 +44,14 @@ class Visual:
 def read_visuals(source, root: str = "fixed") -> list[Visual]:
     """Meshes of a robot; none if the source is no URDF file.
 
+    FileError if a mesh cannot be read.
+
     Parameters
     ----------
     source : str or Path
         A .urdf file or "robot:NAME", as for :func:`gauss.load`.
     root : str
         As for :func:`gauss.load`.
-
-    Raises
-    ------
-    FileError
-        If a mesh cannot be read.
     """
     name = str(source)
     path = robot(name.removeprefix("robot:")) if name.startswith("robot:") else Path(source)

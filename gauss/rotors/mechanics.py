@@ -87,8 +87,6 @@ def evaluate(reduced: ReducedNetwork, t, theta, w, conditions: Conditions) -> Ne
 
     Parameters
     ----------
-    reduced : ReducedNetwork
-        The network.
     t : Scalar
         Time [s].
     theta, w : array_like, shape (n_g,)

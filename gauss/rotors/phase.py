@@ -43,15 +43,7 @@ class Lock(NamedTuple):
 
 
 class NetworkPhase:
-    """Equations of a network in a mode.
-
-    Parameters
-    ----------
-    equations : NetworkEquations
-        Equations of the network.
-    mode : Mode
-        Mode.
-    """
+    """Equations of a network in a mode."""
 
     def __init__(self, equations: NetworkEquations, mode: Mode):
         reduced = equations.reduced

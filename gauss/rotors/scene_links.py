@@ -16,8 +16,6 @@ class SlippingLink(JointLink):
 
     Parameters
     ----------
-    ratio : float
-        Of the link.
     link : ShaftLink
         Link that determines its torques.
     ends : callable

@@ -29,10 +29,6 @@ class CornerOnBox(FeaturePair):
     ----------
     shape : Collider
         The shape.
-    index : int
-        Which of its corners.
-    box : Box
-        The box.
     face : tuple of int, optional
         Axis and side, −1 or 1, of the face that counts; the nearest feature when not given.
     """
@@ -109,8 +105,6 @@ class Edges(FeaturePair):
 
     Parameters
     ----------
-    first, second : Box
-        The boxes.
     axis, other : int
         Axes of the two boxes along which the edges lie.
     pair, other_pair : int

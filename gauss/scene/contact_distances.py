@@ -148,10 +148,6 @@ class OnEdge(FeaturePair):
 
     Parameters
     ----------
-    capsule : Capsule
-        The capsule.
-    box : Box
-        The box.
     axis : int
         Along which of its axes the edge lies.
     sides : tuple of int

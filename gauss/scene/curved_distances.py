@@ -41,8 +41,6 @@ class RimOnHalfSpace(FeaturePair):
     ----------
     shape : Cylinder or Cone
         The solid.
-    ground : HalfSpace
-        The half-space.
     side : int
         On which end of its axis the rim lies, −1 or 1.
     direction : tuple of float

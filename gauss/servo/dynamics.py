@@ -52,8 +52,6 @@ class ServoEngine(Engine):
 
     Parameters
     ----------
-    servo : Servo
-        The servo.
     plan : RelationPlan
         Rows by which its relations are held.
 
@@ -150,10 +148,7 @@ class ServoEngine(Engine):
     def check(self, point: Point, last: bool = False):
         """Compare with the saddle system in maximal coordinates, an independent formulation.
 
-        Raises
-        ------
-        DistrustError
-            If the two differ by more than the conditioning explains; then the saddle system is used.
+        DistrustError if the two differ by more than the conditioning explains; then the saddle system is used.
         """
         found = saddle(self.servo, point.state, self.plan)
         exact = found.solve("saddle")

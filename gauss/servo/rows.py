@@ -47,10 +47,7 @@ class ServoRows(NamedTuple):
 def scalars(relations, symbols: MotionSymbols) -> list[ScalarRelation]:
     """Entries of relations, by calling each residual once with symbols.
 
-    Raises
-    ------
-    SceneError
-        If a residual is no function of the motion that can be differentiated; the message says why.
+    SceneError if a residual is no function of the motion that can be differentiated; the message says why.
     """
     return [scalar for relation in relations for scalar in _scalars(relation, symbols)]
 
@@ -73,13 +70,7 @@ def _scalars(relation: ServoRelation, symbols: MotionSymbols) -> list[ScalarRela
 
 
 def _check(name: str, entry, level: str, symbols: MotionSymbols) -> None:
-    """Check that a residual depends on the motion at its level.
-
-    Raises
-    ------
-    SceneError
-        If it does not.
-    """
+    """Check that a residual depends on the motion at its level; SceneError if it does not."""
     what = f"relation {name!r}"
     if not isinstance(entry, Expression):
         raise SceneError(f"{what}: its residual is {entry!r}, whatever the motion; it must depend on what moves.")

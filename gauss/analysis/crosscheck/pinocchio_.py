@@ -115,13 +115,7 @@ class Twin:
 
 
 def twin(system: System) -> Twin:
-    """Pinocchio model of a system.
-
-    Raises
-    ------
-    GaussError
-        If Pinocchio has no counterpart of some joint.
-    """
+    """Pinocchio model of a system; GaussError if Pinocchio has no counterpart of some joint."""
     model = pin.Model()
     model.gravity = pin.Motion(np.array(system.scene.gravity), np.zeros(3))
     placements, tree_joints = {GROUND: BodyPlacement(0, pin.SE3.Identity())}, []

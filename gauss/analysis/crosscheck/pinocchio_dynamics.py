@@ -83,10 +83,7 @@ def _wrenches(twin: Twin, data: pin.Data, applied: Applied) -> list:
 def articulated_accelerations(now: PinocchioInstant) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of a tree by the articulated-body algorithm ``aba``.
 
-    Raises
-    ------
-    GaussError
-        If a joint moves no inertia.
+    GaussError if a joint moves no inertia.
     """
     return _to_gauss(now, _aba(now))
 
@@ -98,10 +95,7 @@ def refined_accelerations(now: PinocchioInstant) -> np.ndarray:
     the articulated inertia behind free and ball joints and loses digits: 3e-10 relative was seen with 40 bodies, where
     the refined answer kept 13 digits.
 
-    Raises
-    ------
-    GaussError
-        If a joint moves no inertia.
+    GaussError if a joint moves no inertia.
     """
     a, (model, q, v, tau, external) = _aba(now), _reduced(now)
     short = tau - pin.rnea(model, model.createData(), q, v, a, external)

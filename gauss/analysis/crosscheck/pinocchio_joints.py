@@ -28,8 +28,6 @@ class JointMap:
 
     Parameters
     ----------
-    model : pinocchio.JointModel
-        The joint.
     configuration : callable
         q (n_q,) ↦ q_pin.
     T : callable

@@ -94,21 +94,16 @@ def value_range(name: str, given, what: str) -> tuple[float, float]:
 def end_of(system: System, given, what: str, near: State) -> MotionEnd:
     """Conditions at an end.
 
+    ArgumentError, StateError if names or values do not fit, or constraints contradict them.
+
     Parameters
     ----------
-    system : System
-        The system.
     given : State, mapping of str to float or pair, or None
         The whole state, conditions by name, or none.
     what : str
         "start" or "end", for messages.
     near : State
         What is not given is sought near this state.
-
-    Raises
-    ------
-    ArgumentError, StateError
-        If names or values do not fit, or constraints contradict them.
     """
     if given is None:
         return MotionEnd((), near)
@@ -133,19 +128,14 @@ def end_of(system: System, given, what: str, near: State) -> MotionEnd:
 def increments(system: System, given, start: State) -> tuple[EndCondition, ...]:
     """Conditions of a periodic motion: increases of independent coordinates and rates over the period.
 
+    ArgumentError if names or values do not fit.
+
     Parameters
     ----------
-    system : System
-        The system.
     given : bool or mapping of str to float
         Whether the motion is periodic, or increases of coordinates over a period that are not zero, as of a crank.
     start : State
         State near the start.
-
-    Raises
-    ------
-    ArgumentError
-        If names or values do not fit.
     """
     if given is False or given is None:
         return ()
@@ -163,10 +153,7 @@ def increments(system: System, given, start: State) -> tuple[EndCondition, ...]:
 def motion_limits(system: System, equations, given) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Limits of (q, v) and of the inputs: those of joints and inputs, and of names of a mapping.
 
-    Raises
-    ------
-    ArgumentError
-        If a name or a value does not fit.
+    ArgumentError if a name or a value does not fit.
     """
     n_x, known = system.n_q + system.n_v, entries(system)
     lowest, highest = np.full(n_x, -np.inf), np.full(n_x, np.inf)
@@ -193,13 +180,7 @@ def motion_limits(system: System, equations, given) -> tuple[np.ndarray, np.ndar
 
 
 def refuse_beyond(ends: dict[str, MotionEnd], lowest: np.ndarray, highest: np.ndarray):
-    """Refuse conditions that no motion within the limits meets.
-
-    Raises
-    ------
-    ArgumentError
-        If there is one, by its name.
-    """
+    """Refuse conditions that no motion within the limits meets; ArgumentError if there is one, by its name."""
     for what, end in ends.items():
         for one in end.conditions:
             if one.low > highest[one.place] or one.high < lowest[one.place]:

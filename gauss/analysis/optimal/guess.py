@@ -22,6 +22,8 @@ def first_guess(
 ) -> MotionValues:
     """Values on a mesh.
 
+    ArgumentError if the motion is none of this system.
+
     Parameters
     ----------
     equations : OptimalEquations
@@ -38,11 +40,6 @@ def first_guess(
         Duration [s].
     stages : int
         Collocation points of an interval.
-
-    Raises
-    ------
-    ArgumentError
-        If the motion is none of this system.
     """
     if given is None:
         states = _line(equations.system, *ends, led, mesh, duration)

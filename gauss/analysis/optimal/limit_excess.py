@@ -41,8 +41,6 @@ def limit_excess(problem: MotionProblem, t: np.ndarray, moved: np.ndarray, u: np
 
     Parameters
     ----------
-    problem : MotionProblem
-        The phase.
     t : ndarray, shape (n + 1,)
         Mesh points [s].
     moved : ndarray, shape (n, m + 1, n_q + n_v)

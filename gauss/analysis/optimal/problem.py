@@ -20,8 +20,6 @@ class MotionProblem:
     ----------
     system : System
         The system, whose inputs have limits.
-    equations : OptimalEquations
-        Equations of motion.
     cost : casadi.Function or None
         (t, x, u) → cost per time; None: the duration is the cost.
     start_time : float
@@ -140,12 +138,8 @@ class Solved:
     ----------
     values : tuple of MotionValues
         The motion of each phase.
-    costs : tuple of float
-        Their costs.
     status : str
         Status in the words of IPOPT.
-    iterations : int
-        Iterations.
     kkt, residual : float
         Largest entry of the gradient of the Lagrangian, relative to the largest multiplier or 1, and largest residual of a
         constraint, both in shares of the units.

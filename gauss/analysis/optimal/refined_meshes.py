@@ -24,21 +24,16 @@ def on_refined_meshes(
 ) -> list[OptimalMotion]:
     """Optimum of all phases on the first meshes that are fine enough.
 
+    SimulationError if there is no optimum, or more refinements are needed.
+
     Parameters
     ----------
-    problems : sequence of MotionProblem
-        The phases.
     guesses : sequence of MotionValues
         Motions near the optimum, on the first meshes.
     tolerance : float
         Largest error of an interval, in shares of the units.
     refinements : int
         Most refinements.
-
-    Raises
-    ------
-    SimulationError
-        If there is no optimum, or more refinements are needed.
     """
     checks = [MeshError(problem.equations) for problem in problems]
     accurate, meshes, iterations = _optima(problems, checks, guesses, tolerance, refinements)

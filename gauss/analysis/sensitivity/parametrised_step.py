@@ -28,8 +28,6 @@ class ParametrisedStep(MotionStep):
 
     Parameters
     ----------
-    family : ParametrisedSystem
-        The systems.
     integrator : str
         Explicit Runge–Kutta method: "rk4", "dopri5" or "dop853", with fixed steps.
 

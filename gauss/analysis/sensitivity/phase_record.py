@@ -29,8 +29,6 @@ class RecordedPhase:
 
     Parameters
     ----------
-    phase : Phase
-        The phase.
     start : State
         Its first state.
     struck : tuple of int
@@ -95,10 +93,7 @@ def recorded_motion(
 ) -> tuple[list[RecordedPhase], np.ndarray]:
     """Phases of a motion with events, and its states (k, n_q + n_v) at times (k,), inputs being held between these.
 
-    Raises
-    ------
-    SimulationError
-        If the motion needs time stepping, begins with an impact, or cannot continue.
+    SimulationError if the motion needs time stepping, begins with an impact, or cannot continue.
     """
     driven, breaks = system, ()
     if inputs.size and inputs.any():

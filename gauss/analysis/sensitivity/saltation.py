@@ -72,13 +72,7 @@ class Transition(NamedTuple):
     inputs: np.ndarray
 
     def saltation(self) -> Saltation:
-        """Saltation matrix.
-
-        Raises
-        ------
-        SimulationError
-            If the motion has no derivative at the event, by the names of its elements.
-        """
+        """Saltation matrix; SimulationError if the motion has no derivative at the event, by the names of its elements."""
         one, end, start = self.steps[0], self.before.end, self.after.start
         n, found = one.n_x, np.zeros((one.n_x, one.n_given))
         found[:, :n] = np.eye(n)

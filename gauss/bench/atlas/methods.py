@@ -66,13 +66,7 @@ class Method:
         return {} if self.ours else {"form": self.form}
 
     def instant(self, compulsion: Compulsion) -> Answer:
-        """Accelerations of one instant.
-
-        Raises
-        ------
-        BackendError
-            If the method says that it has none.
-        """
+        """Accelerations of one instant; BackendError if the method says that it has none."""
         if self.certified:
             solution = solve(compulsion, self.backend, **self._options)
             if not solution.status.certified:
@@ -86,10 +80,7 @@ class Method:
     def motion(self, system: System, duration: float, step: float, state: State | None = None, times=None) -> Trajectory:
         """Motion; ``step`` is for integrators of fixed step.
 
-        Raises
-        ------
-        GaussError
-            If the method says that it cannot go on.
+        GaussError if the method says that it cannot go on.
         """
         fixed = isinstance(INTEGRATORS[self.integrator], FixedStep)
         settings: dict[str, Any] = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}

@@ -35,6 +35,8 @@ def explore(
 ) -> ResultTable:
     """Examine all cells that have no verdict yet, and return the table.
 
+    BackendError if there is no such case or method.
+
     Parameters
     ----------
     folder : Path
@@ -45,11 +47,6 @@ def explore(
         Examine again what has a verdict.
     progress : bool
         Show a bar.
-
-    Raises
-    ------
-    BackendError
-        If there is no such case or method.
     """
     cases, methods = chosen(cases, CASES, "case"), chosen(methods, METHODS, "method")
     table = STABILITY.table(folder, fresh)

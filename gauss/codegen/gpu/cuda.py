@@ -25,11 +25,6 @@ WARP = 32
 class CudaDevice:
     """One GPU.
 
-    Parameters
-    ----------
-    number : int
-        Which one.
-
     Attributes
     ----------
     name : str
@@ -122,17 +117,14 @@ class CudaDevice:
 class CudaProgram:
     """Thread code on a GPU.
 
+    DeviceError if the driver refuses the code.
+
     Attributes
     ----------
     threads_per_block : int
         Threads that start together; fewer where each takes many registers.
     memory_bytes : int
         Memory that the driver takes for the frames of all threads at once [bytes].
-
-    Raises
-    ------
-    DeviceError
-        If the driver refuses the code.
     """
 
     def __init__(self, device: CudaDevice, lowered: Lowered):

@@ -71,13 +71,7 @@ class CudaDriver:
 
     @contextmanager
     def entered(self, context) -> Iterator[None]:
-        """Calls of this thread go to a context.
-
-        Raises
-        ------
-        DeviceError
-            If this process was forked from the one that began.
-        """
+        """Calls of this thread go to a context; DeviceError if this process was forked from the one that began."""
         if os.getpid() != self.process:
             raise DeviceError("device 'cuda': a forked process cannot use the GPU of its parent: start it by 'spawn'.")
         self.call("cuCtxPushCurrent", context)

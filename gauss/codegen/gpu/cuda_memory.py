@@ -21,8 +21,6 @@ class CudaArray:
 
     Parameters
     ----------
-    device : CudaDevice
-        The GPU.
     shape : tuple of int
         Its shape.
     """
@@ -51,10 +49,7 @@ class CudaArray:
     def __dlpack__(self, *, dl_device=None, copy=None, **_):
         """Capsule of the array; programs wait for their threads, so that no stream needs to.
 
-        Raises
-        ------
-        BufferError
-            If a copy is asked for, or another device.
+        BufferError if a copy is asked for, or another device.
         """
         if copy or dl_device not in (None, self.__dlpack_device__()):
             raise BufferError("gauss lends this array where it is; numpy() copies it.")
@@ -78,17 +73,12 @@ class CudaArray:
 class CudaView:
     """Array of another library on a GPU.
 
+    DeviceError if it lies on another GPU.
+
     Parameters
     ----------
-    device : CudaDevice
-        The GPU.
     given : object
         Array with ``__cuda_array_interface__``.
-
-    Raises
-    ------
-    DeviceError
-        If it lies on another GPU.
     """
 
     def __init__(self, device: "CudaDevice", given):
@@ -128,13 +118,7 @@ class CudaView:
 
 
 def stream_handle(stream) -> int:
-    """Handle of a stream: a whole number, or a stream of cuda.core, torch or CuPy.
-
-    Raises
-    ------
-    DeviceError
-        If it is no stream.
-    """
+    """Handle of a stream: a whole number, or a stream of cuda.core, torch or CuPy; DeviceError if it is no stream."""
     protocol = getattr(stream, "__cuda_stream__", None)
     if callable(protocol):
         return int(protocol()[1])

@@ -87,20 +87,11 @@ class Device(Protocol):
     def on(self, stream) -> "Device":
         """The device with another stream; None is the default stream.
 
-        Raises
-        ------
-        DeviceError
-            If it has no streams, or this is none.
+        DeviceError if it has no streams, or this is none.
         """
 
     def lowered(self, code: ThreadCode) -> Lowered:
-        """Thread code for this device.
-
-        Raises
-        ------
-        DeviceError
-            If it calls what a GPU does not have.
-        """
+        """Thread code for this device; DeviceError if it calls what a GPU does not have."""
 
     def program(self, lowered: Lowered) -> DeviceProgram:
         """Thread code, ready to run."""

@@ -15,16 +15,13 @@ NAME = re.compile(rf"(?:cuda(?::(?P<number>\d{{1,3}}))?|(?P<lanes>lanes))(?P<sin
 def device_name(given) -> str:
     """Name of one device, or of several: "cuda:0", "cuda:0,cuda:1", "cuda:0 float32".
 
+    ArgumentError if it is no such name, or GPUs and this CPU are to share a batch.
+
     Parameters
     ----------
     given : str or sequence of str
         "cuda" or "cuda:0" for the first GPU, "cuda:1" for the second; "lanes" for this CPU, one thread after the other;
         with " float32" behind it for single precision. A sequence of such names shares a batch.
-
-    Raises
-    ------
-    ArgumentError
-        If it is no such name, or GPUs and this CPU are to share a batch.
     """
     matches = _matches(given)
     if not matches or None in matches:

@@ -65,8 +65,6 @@ def capsule(owner, pointer: int, shape: tuple[int, ...], kind: int, number: int)
 
     Parameters
     ----------
-    owner : object
-        Owner of the memory.
     pointer : int
         Its address.
     shape : tuple of int

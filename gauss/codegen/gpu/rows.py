@@ -62,8 +62,6 @@ class RowsOnDevice(OnDevice):
 
     Parameters
     ----------
-    name : str
-        Name of the devices.
     function : Function
         Its inputs are the vectors and the number, concatenated; its outputs the results and the limited quantities.
     interface : Interface
@@ -95,8 +93,6 @@ class RowsOnDevice(OnDevice):
 
         Parameters
         ----------
-        on : Device
-            The device.
         count : int
             Number of rows.
         vectors : sequence of (DeviceArray, int, int)

@@ -158,8 +158,6 @@ def write_penetration(module: ir.Module, states: tuple[int, int, int], close: fl
 
     Parameters
     ----------
-    module : llvmlite.ir.Module
-        Where code is emitted.
     states : tuple of int
         Values of status: the depth agrees with a plane that supports D; so, but D touches it beside the face, where no place
         is known; nothing agrees.

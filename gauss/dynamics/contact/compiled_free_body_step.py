@@ -43,8 +43,6 @@ class FreeBodyMemory(CompiledStepMemory):
 
     Parameters
     ----------
-    stepper : FreeBodyStepper
-        The stepper.
     laws : BlockContactLaws
         Laws of contact and friction.
     constants : dict

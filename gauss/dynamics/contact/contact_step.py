@@ -104,10 +104,7 @@ class ContactProblem:
     def solve(self, start: np.ndarray) -> tuple[np.ndarray, float | None]:
         """Forces (n,) that obey the laws, and their error in the unit of b; None for those of the convex relaxation.
 
-        Raises
-        ------
-        SimulationError
-            If neither is found.
+        SimulationError if neither is found.
         """
         if not start.size:
             return start, 0.0

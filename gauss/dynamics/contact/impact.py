@@ -73,6 +73,8 @@ def impact(
 ) -> Impact:
     """Impact in a state.
 
+    SimulationError if no velocities keep all gaps from closing, or the backend's answer is not certified.
+
     Parameters
     ----------
     system : System
@@ -89,11 +91,6 @@ def impact(
         Time just before the impact [s], where prescribed speeds differ from those at the time of the state.
     driven : sequence of str
         Relations with these speeds.
-
-    Raises
-    ------
-    SimulationError
-        If no velocities keep all gaps from closing, or the backend's answer is not certified.
     """
     motion = kinematics(system, state)
     found, before = gaps(motion), motion.quasi_velocities()

@@ -50,13 +50,6 @@ class StepRows(NamedTuple):
 class MechanismRows:
     """Rows of one system.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    table : ShapeTable
-        Its shapes.
-
     Attributes
     ----------
     others : list
@@ -153,8 +146,6 @@ class MechanismRows:
 
         Parameters
         ----------
-        rows, near : StepRows, NearContacts
-            Rows of the step.
         force, lost : ndarray, shape (n,)
             Forces, and their work [J].
         change : ndarray, shape (n_v,)

@@ -70,23 +70,16 @@ class ModeSelector(ModeTrials):
     ) -> ActiveMode:
         """Mode in a state with the closed gaps ``touching``.
 
+        SimulationError if a solution is not certified, or no mode is consistent.
+
         Parameters
         ----------
-        state : State
-            The state.
-        touching : ndarray of int
-            Closed gaps.
         backend : str or Backend
             Backend of the trials.
         backlash_sides : dict, optional
             Sides of the backlash in contact; those of the state when not given.
         load : array_like, shape (n_v,), optional
             Generalised forces added to those of the scene [N m, N].
-
-        Raises
-        ------
-        SimulationError
-            If a solution is not certified, or no mode is consistent.
         """
         whole = kinematics(self.system, state)
         at = ModeProblem(state, whole, gaps(whole), touching, backend, checked_load(self.system, load))
@@ -180,10 +173,7 @@ class ModeSelector(ModeTrials):
 def active_mode(system: System, state: State, load=None, backend: str = "auto") -> ActiveMode:
     """Mode in a state of a system with set-valued elements or links with losses; ``load`` (n_v,) is added.
 
-    Raises
-    ------
-    SimulationError
-        As :meth:`ModeSelector.choose`.
+    SimulationError as :meth:`ModeSelector.choose`.
     """
     selector = mode_selector(system)
     return selector.choose(state, selector.touching(state), backend, load=load)

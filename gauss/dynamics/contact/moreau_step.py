@@ -135,10 +135,7 @@ class MoreauStepper:
 
         Without them it is made twice, so that it expects its own forces.
 
-        Raises
-        ------
-        SimulationError
-            If shapes overlap unseen by their gap functions, or no forces are found.
+        SimulationError if shapes overlap unseen by their gap functions, or no forces are found.
         """
         if start is not None:
             return self._step(state, h, start, last, before)

@@ -55,10 +55,7 @@ class Overlap(NamedTuple):
 def confirmed(near: NearContacts, overlaps: list[Overlap], table: ShapeTable, t: float) -> NearContacts:
     """Contacts of a state, whose shapes are not too deep in each other, and meet where they have normals.
 
-    Raises
-    ------
-    SimulationError
-        If they are, or do not: it names the contact.
+    SimulationError if they are, or do not: it names the contact.
     """
     if overlaps:
         law, depth = overlaps[0]

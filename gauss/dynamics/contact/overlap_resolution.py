@@ -24,8 +24,6 @@ def resolved(stepper, state: State) -> State:
     ----------
     stepper : MechanismStepper
         Steps of the system.
-    state : State
-        The state.
 
     Raises
     ------

@@ -85,13 +85,7 @@ def unilateral_dynamics(system: System, laws: Laws, certified: Callable, doc: st
 
 
 class ActiveSetKernel:
-    """Active set of contacts at the level of accelerations, by machine code: at once, or above the compile threshold.
-
-    Parameters
-    ----------
-    system : System
-        With contacts.
-    """
+    """Active set of contacts at the level of accelerations, by machine code: at once, or above the compile threshold."""
 
     def __init__(self, system: System):
         self.system, self.gaps = system, len(system.contacts.placed)

@@ -102,6 +102,8 @@ def _matrix(system: System, rows: Sequence[Mapping[int, float]]) -> np.ndarray:
 def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.ndarray:
     """Root Q (m,) of the piecewise affine ``residual(Q)`` (m,) by Newton's method; the last call is at the root.
 
+    SimulationError if the iteration does not converge.
+
     Parameters
     ----------
     residual : callable
@@ -110,11 +112,6 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
         Initial forces.
     units : ndarray, shape (m,)
         Forces of the scene: smaller ones, as near a reversal, have round-off relative to these.
-
-    Raises
-    ------
-    SimulationError
-        If the iteration does not converge.
     """
     Q, left = guess, residual(guess)
     if not np.isfinite(left).all():
@@ -145,8 +142,6 @@ def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndar
     ----------
     compulsion : Compulsion
         Without the losses.
-    links : CutRows
-        The rows.
     answer : callable
         Compulsion → certified solution.
     """
@@ -175,12 +170,8 @@ class CutRowEngine(Engine):
         The phase, with all rows.
     cut : System
         The same without the cut rows.
-    links : CutRows
-        The cut rows.
     backend : str, Backend or class
         How accelerations are solved.
-    plan : Plan
-        Of the phase.
     """
 
     def __init__(self, system: System, cut: System, links: CutRows, backend: str | Backend | type, plan: Plan):
@@ -295,10 +286,7 @@ class CutRowEngine(Engine):
     def check(self, point: Point, last: bool = False):
         """Check compiled accelerations with the forces of the rows as loads.
 
-        Raises
-        ------
-        DistrustError
-            If the residual is too large; from then on all rows are solved by the certified engine.
+        DistrustError if the residual is too large; from then on all rows are solved by the certified engine.
         """
         if self.compiled is None:
             return

@@ -42,10 +42,6 @@ class OneMode(Relation):
 
     Parameters
     ----------
-    name : str
-        Name of the relation.
-    whole : Relation
-        The relation.
     mode : tuple of float
         Values of its conditions, in the order of :func:`conditions`.
     """
@@ -89,11 +85,6 @@ class Step(NamedTuple):
 
 class ConstraintModes:
     """Modes of the constraints of a system.
-
-    Parameters
-    ----------
-    system : System
-        The system.
 
     Attributes
     ----------

@@ -32,8 +32,6 @@ class Jumps:
 
     Parameters
     ----------
-    system : System
-        The system.
     times : ndarray, shape (k,)
         Switching times of its relations with a possible jump [s].
     sizes : ndarray, shape (2, r)
@@ -54,10 +52,7 @@ class Jumps:
     def names(self, state: State, after: float) -> tuple[str, ...]:
         """Relations whose velocity jumps between the time of a state and one just after it [s].
 
-        Raises
-        ------
-        SimulationError
-            If a prescribed position jumps.
+        SimulationError if a prescribed position jumps.
         """
         if self.system is None or not self.within(state.t, after):
             return ()
@@ -69,11 +64,8 @@ class Jumps:
     def crossed(self, state: State, after: float) -> tuple[Impact, tuple[str, ...]] | None:
         """Impact, and the names of the relations whose velocity jumps; None if none does.
 
-        Raises
-        ------
-        SimulationError
-            If a prescribed position jumps, the velocity constraints are inconsistent, or a contact with friction bears an
-            impulse.
+        SimulationError if a prescribed position jumps, the velocity constraints are inconsistent, or a contact with friction
+        bears an impulse.
         """
         names, system = self.names(state, after), self.system
         if system is None or not names:
@@ -89,21 +81,16 @@ class Jumps:
 def driven_impact(system: System, state: State, names: tuple[str, ...], since: float | None = None) -> Impact:
     """Impact of relations whose prescribed velocities jump.
 
+    SimulationError if the velocity constraints are inconsistent, or a contact with friction bears an impulse.
+
     Parameters
     ----------
     system : System
         The system after the jump.
     state : State
         State before it.
-    names : tuple of str
-        The relations.
     since : float, optional
         Time just before the impact [s], where prescribed speeds differ from those at the time of the state.
-
-    Raises
-    ------
-    SimulationError
-        If the velocity constraints are inconsistent, or a contact with friction bears an impulse.
     """
     parts = sides(system.scene)
     touching = np.flatnonzero(gaps(kinematics(system, state)).width <= TOUCHING * gap_scales(system))
@@ -138,21 +125,16 @@ NO_JUMPS = Jumps(None, np.zeros(0), np.zeros((2, 0)))
 def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
     """Possible jumps of prescribed velocities at given switching times.
 
+    SimulationError if a prescribed position jumps at one of them.
+
     Parameters
     ----------
-    system : System
-        The system.
     start : State
         Initial state.
     end : float
         Final time [s].
     stops : sequence of (float, float)
         Times just before and just after each switching time of its relations [s].
-
-    Raises
-    ------
-    SimulationError
-        If a prescribed position jumps at one of them.
     """
     if not system.relations.asks_time:
         return NO_JUMPS
@@ -184,8 +166,6 @@ class _Sides:
 
     Parameters
     ----------
-    motion : Kinematics
-        Kinematics of the state.
     before, after : float
         Times [s].
     sizes : ndarray, shape (2, r)

@@ -99,10 +99,7 @@ def timed_switching(
 ) -> tuple[Timetable, Jumps]:
     """Switching times and mesh of traced loads and of prescribed motions up to a time [s]; jumps of prescribed velocities.
 
-    Raises
-    ------
-    SimulationError
-        If a prescribed position jumps.
+    SimulationError if a prescribed position jumps.
     """
     begin, prescribed = start.t, prescribed_times(system.relations, start.t, end, monotone)
     times = _given_times(system, breaks, begin, end).join(prescribed)

@@ -28,8 +28,6 @@ class UnitParameters:
 
     Parameters
     ----------
-    system : System
-        The system.
     names : sequence of str
         Numbers of its scene.
 

@@ -39,10 +39,7 @@ SHOWN = 1.0  # m, half the edge of the square that a viewer shows of a plane
 def write_contacts(document):
     """Write unilateral constraints and joint friction.
 
-    Raises
-    ------
-    FileError
-        If MuJoCo has no counterpart of one; the message names it.
+    FileError if MuJoCo has no counterpart of one; the message names it.
     """
     scene = document.scene
     for element in scene.contacts.values():

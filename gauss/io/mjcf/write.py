@@ -45,8 +45,6 @@ class MjcfDocument:
         The same, compiled.
     limbs : list of Limb
         Bodies of the tree.
-    root : Element
-        The file.
     bodies : dict
         Element of every body.
     taken : set
@@ -115,6 +113,8 @@ class MjcfDocument:
 def to_mjcf(scene: Scene) -> str:
     """Write a scene as MJCF, for MuJoCo.
 
+    FileError if MuJoCo has no counterpart of an element; the message names it.
+
     Parameters
     ----------
     scene : Scene
@@ -125,11 +125,6 @@ def to_mjcf(scene: Scene) -> str:
     -------
     str
         The file. Its key frame "start" is the start of the scene, if the scene gives one.
-
-    Raises
-    ------
-    FileError
-        If MuJoCo has no counterpart of an element; the message names it.
 
     Notes
     -----

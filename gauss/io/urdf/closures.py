@@ -55,10 +55,7 @@ class LoopClosure:
     def add_to(self, scene: Scene):
         """Add the joint, and the frames that it needs.
 
-        Raises
-        ------
-        SceneError
-            If there is no such link, or both frames are on one body.
+        SceneError if there is no such link, or both frames are on one body.
         """
         what = f"loop {self.name!r}"
         ends = [_carrier(scene, end, f"{what}: {side}") for side, end in self._ends]
@@ -88,23 +85,18 @@ class LoopClosure:
 def add_coupling(scene: Scene, source: Source, name: str, predecessor: str, successor: str, ratio: float):
     """Add the coupling r Σ q (to the predecessor) = Σ q (to the successor), from the nearest common ancestor.
 
+    SceneError if there is no such link, or a chain holds no joint of one freedom.
+
     Parameters
     ----------
     scene : Scene
         Scene of the tree of the file.
     source : Source
         The file, whose joints give the chains.
-    name : str
-        Name of the coupling.
     predecessor, successor : str
         Links.
     ratio : float
         r: the successor turns so many times as fast as the predecessor.
-
-    Raises
-    ------
-    SceneError
-        If there is no such link, or a chain holds no joint of one freedom.
     """
     what = f"coupling {name!r}"
     if not ratio:

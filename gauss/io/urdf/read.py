@@ -36,10 +36,10 @@ SPECK = 1e-8
 def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "physical") -> Scene:
     """Scene of a URDF file.
 
+    FileError if it cannot be parsed, or holds something that gauss does not model; the message names it.
+
     Parameters
     ----------
-    path : str or Path
-        The file.
     root : str
         "fixed": the base is part of the ground; "free": it floats on a free joint. A robot whose base weighs nothing and
         carries a joint of type ``floating`` floats already; to let it float twice is refused.
@@ -48,11 +48,6 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "phy
     inertia : str
         "physical": inertia without mass, and moments that violate the triangle inequality, are refused; "as given": they
         are taken, with a warning.
-
-    Raises
-    ------
-    FileError
-        If it cannot be parsed, or holds something that gauss does not model; the message names it.
 
     Warns
     -----

@@ -40,14 +40,8 @@ class UrdfDocument:
 
     Parameters
     ----------
-    scene : Scene
-        What is written.
-    system : System
-        Its system.
     limbs : list of Limb
         Bodies of the tree.
-    root : Element
-        The file.
     rest : Scene
         What the file cannot say.
     shifts : dict
@@ -78,6 +72,8 @@ def write_urdf(scene: Scene, path: Path) -> Path:
 def to_urdf(scene: Scene) -> tuple[str, str]:
     """Write a scene as URDF.
 
+    FileError if a name or a law cannot be written; the message names it.
+
     Parameters
     ----------
     scene : Scene
@@ -87,11 +83,6 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
     -------
     tuple of str
         The file, which lists in a comment what it cannot say, and the contents of the file beside it, empty if not needed.
-
-    Raises
-    ------
-    FileError
-        If a name or a law cannot be written; the message names it.
     """
     system = compile_scene(scene)
     tree, cut = spanning_tree(scene)
@@ -259,10 +250,7 @@ def _keep_rest(document: UrdfDocument):
 def _measured(document: UrdfDocument, output: Output) -> Output:
     """Output in the file, at the same point of its body.
 
-    Raises
-    ------
-    FileError
-        If it measures a joint that becomes a chain in the file, or from a body whose frame is another there.
+    FileError if it measures a joint that becomes a chain in the file, or from a body whose frame is another there.
     """
     if SENSORS[output.kind][0] == "joint":
         rates = document.scene.joints[output.of].pair.rates

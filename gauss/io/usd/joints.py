@@ -37,10 +37,6 @@ class UsdJoint:
         Where the file has it.
     name, kind : str
         Name and kind, as of :class:`gauss.scene.Joint`; "free" holds nothing.
-    parent, child : str
-        Bodies.
-    parent_frame, child_frame : FramePose
-        Frame of the joint in each.
     axis : tuple of float
         Axis in these frames.
     limits : tuple of float, optional
@@ -142,10 +138,7 @@ def _by_freedoms(prim: Usd.Prim, units: StageUnits) -> tuple:
 def freedom_range(prim: Usd.Prim, freedom: str) -> tuple[float, float]:
     """Lower and upper limit of a freedom of a joint, in units of the file; infinite without.
 
-    Raises
-    ------
-    FileError
-        If one is not a number.
+    FileError if one is not a number.
     """
     if not prim.HasAPI(UsdPhysics.LimitAPI, freedom):
         return -inf, inf

@@ -42,10 +42,7 @@ class Shown:
 def shown(thing: Scene | Trajectory, frames: int, visuals=(), joints=(), traces=None) -> Shown:
     """View of a scene at its start, or of a motion; traces of the bodies that carry no others if none are named.
 
-    Raises
-    ------
-    StateError
-        If the name of a trace is that of no body or frame.
+    StateError if the name of a trace is that of no body or frame.
     """
     require(thing, (Scene, Trajectory), "show")
     if isinstance(thing, Scene):
