@@ -5,10 +5,10 @@ steps are those of :mod:`gauss.rotors.stops`. Explicit steps keep h |λ| ≤ 1/2
 stability the error estimate of DOP853 fails. Where that asks for too many steps, Radau IIA takes over (Hairer and Wanner,
 Solving ODEs II, IV.2 and IV.8).
 
-The loop is not the one of :mod:`gauss.simulation.phases`, though it gives the same motions of ``to_scene(network)``, to 2e-10
-of the largest speed: that one has no implicit steps, no limit by the decay, and machine code for each of its phases; the
-shipped networks took it 2.6 to 40 times the CPU time (``parallel_branches`` 0.92 s for 0.36 s, ``hoist`` 4.1 s for 0.14 s,
-second runs), and ``harvester`` more than 170 s for 0.3 s of motion, which take 0.4 s here.
+The loop is not that of :mod:`gauss.simulation.phases`, which gives the same motions of ``to_scene(network)``, to 2e-10 of
+the largest speed, but has no implicit steps, no limit by the decay, and machine code for each phase: the shipped networks
+took it 2.6 to 40 times the CPU time (``parallel_branches`` 0.92 s for 0.36 s, ``hoist`` 4.1 s for 0.14 s, second runs),
+and ``harvester`` more than 170 s for 0.3 s of motion, which take 0.4 s here.
 """
 
 import time
@@ -53,10 +53,6 @@ class BeltSlipWarning(UserWarning):
     Examples
     --------
     >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> import warnings
     >>> issubclass(rotors.BeltSlipWarning, UserWarning)
     True
     """
