@@ -15,13 +15,13 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 
 import gauss
 from benchmarks.command import command, load_at_the_end
 from gauss import export
+from gauss.bench.contest import Competitor, interleaved, repeated
 from gauss.bench.machine import header
 from gauss.bench.markdown import head
 from gauss.dynamics.laws.traced_laws import Laws
@@ -42,14 +42,8 @@ def panda(inputs: bool = False) -> gauss.Scene:
 
 def least(rounds: int, *calls: Callable, repeats: int = 1) -> list[float]:
     """Least processor time of each call [s], taken in turn."""
-    found = np.full((rounds, len(calls)), np.inf)
-    for row in found:
-        for k, call in enumerate(calls):
-            began = process_time()
-            for _ in range(repeats):
-                call()
-            row[k] = (process_time() - began) / repeats
-    return found.min(axis=0).tolist()
+    found = interleaved({k: Competitor(repeated(call, repeats), repeats) for k, call in enumerate(calls)}, rounds)
+    return [min(found[k]) for k in range(len(calls))]
 
 
 MODELS = [

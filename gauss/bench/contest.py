@@ -11,6 +11,7 @@ import numpy as np
 OURS = "gauss"
 WARM_UP = 0.02  # s until caches are filled: before, a run is slower the shorter it is
 Name = TypeVar("Name")
+Result = TypeVar("Result")
 Clock = Callable[[], float]  # s: time.process_time or time.perf_counter
 
 
@@ -113,9 +114,14 @@ def interleaved(
 
 def duration(run: Callable, clock: Clock = time.process_time) -> float:
     """Seconds of one call; by the default clock CPU seconds of all threads of the process together."""
+    return with_time(run, clock)[1]
+
+
+def with_time(run: Callable[[], Result], clock: Clock = time.process_time) -> tuple[Result, float]:
+    """Result of one call, and its seconds as of :func:`duration`."""
     begin = clock()
-    run()
-    return clock() - begin
+    result = run()
+    return result, clock() - begin
 
 
 def repeated(call: Callable, count: int) -> Callable[[], list]:

@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from gauss.analysis import energy
 from gauss.backends import available
+from gauss.bench.contest import with_time
 from gauss.bench.extrapolation import extrapolated
 from gauss.bench.levels import AUTO
 from gauss.bench.measurement import chosen
@@ -228,13 +230,11 @@ def attempt(
 
 def _timed(system: System, duration: float, run: dict[str, Any], time_limit: float) -> tuple[Trajectory, float, float]:
     """A motion, the time of its first run, and the least of the runs after it [s]."""
-    began = time.perf_counter()
-    trajectory = simulate(system, duration, **run)
-    first, best = time.perf_counter() - began, np.inf
+    move = partial(simulate, system, duration, **run)
+    (trajectory, first), best = with_time(move, time.perf_counter), np.inf
     for _ in range(REPEATS):
-        began = time.perf_counter()
-        trajectory = simulate(system, duration, **run)
-        best = min(best, time.perf_counter() - began)
+        trajectory, seconds = with_time(move, time.perf_counter)
+        best = min(best, seconds)
         if best > time_limit / 10:
             break
     return trajectory, first, best
