@@ -30,16 +30,11 @@ class Tangents:
     """Tangents of one system in one state that meets its constraints.
 
     SimulationError if nothing in the system can move.
-
-    Parameters
-    ----------
-    held : tuple of int
-        Places of rates that are kept at their values.
     """
 
     system: System
     state: State
-    held: tuple[int, ...] = ()
+    held: tuple[int, ...] = ()  # places of rates that are kept at their values
 
     def __post_init__(self):
         """Refuse systems without tangents."""

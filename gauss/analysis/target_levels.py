@@ -24,18 +24,10 @@ ROUNDED_BOUND = 1e-12  # violation of a bound that is round-off, in units of the
 
 
 class LevelRows(NamedTuple):
-    """Weighted rows of the targets of one level: A y ≈ b.
+    """Weighted rows of the targets of one level: A y ≈ b."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (m, k)
-        Weighted Jacobian along the independent directions.
-    b : ndarray, shape (m,)
-        Weighted errors or rates.
-    """
-
-    A: np.ndarray
-    b: np.ndarray
+    A: np.ndarray  # (m, k) weighted Jacobian along the independent directions
+    b: np.ndarray  # (m,) weighted errors or rates
 
 
 def solver_of(backend: str):

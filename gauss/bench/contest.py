@@ -17,24 +17,13 @@ Clock = Callable[[], float]  # s: time.process_time or time.perf_counter
 
 @dataclass(frozen=True)
 class Competitor:
-    """Work that is timed.
+    """Work that is timed."""
 
-    Parameters
-    ----------
-    run : callable
-        Does the work once.
-    units : int
-        Units of the work in one run.
-    is_short : bool
-        False to run it for :data:`WARM_UP` before each timed run, so that the state of the caches does not count.
-    every : int
-        It is run in every so many-th round.
-    """
-
-    run: Callable
-    units: int = 1
+    run: Callable  # does the work once
+    units: int = 1  # units of the work in one run
+    # false to run it for :data:`WARM_UP` before each timed run, so that the state of the caches does not count
     is_short: bool = True
-    every: int = 1
+    every: int = 1  # it is run in every so many-th round
 
 
 @dataclass(frozen=True)
@@ -47,30 +36,14 @@ class Goal:
 
 @dataclass(frozen=True)
 class Contest:
-    """One row of the table.
+    """One row of the table."""
 
-    Parameters
-    ----------
-    work : str
-        What is done.
-    tasks : dict
-        Competitors by name; the first is gauss.
-    goals : tuple of Goal
-        What is asked for.
-    agreement : float
-        Largest relative difference of the results to Pinocchio's.
-    remarks : str
-        Settings of this row.
-    operations : int
-        Operations of one unit in the code of gauss, if they are counted.
-    """
-
-    work: str
-    tasks: dict[str, Competitor]
-    goals: tuple[Goal, ...]
-    agreement: float
-    remarks: str = ""
-    operations: int = 0
+    work: str  # what is done
+    tasks: dict[str, Competitor]  # competitors by name; the first is gauss
+    goals: tuple[Goal, ...]  # what is asked for
+    agreement: float  # largest relative difference of the results to Pinocchio's
+    remarks: str = ""  # settings of this row
+    operations: int = 0  # operations of one unit in the code of gauss, if they are counted
 
 
 @dataclass(frozen=True)

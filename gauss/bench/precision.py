@@ -43,35 +43,18 @@ REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the le
 
 @dataclass(frozen=True)
 class Attempt:
-    """One motion by one method with one setting.
+    """One motion by one method with one setting."""
 
-    Parameters
-    ----------
-    engine, method : str
-        Who computed it, and how: the integrator, and the backend where one was asked for.
-    setting : float
-        Tolerance, or step [s].
-    error : float
-        Of the centres of mass at the end [m].
-    seconds, compile_seconds : float
-        Wall time of a run, and of making its machine code before, which is not in it [s].
-    drift : float
-        Change of energy that work does not explain [J].
-    gap : float
-        Largest constraint residual at the end [rad, m].
-    reason : str
-        Why there is no result; empty if there is one.
-    """
-
-    engine: str
+    engine: str  # engine, method: who computed it, and how: the integrator, and the backend where one was asked for
     method: str
-    setting: float
-    error: float = np.nan
+    setting: float  # tolerance, or step [s]
+    error: float = np.nan  # of the centres of mass at the end [m]
+    # seconds, compile_seconds: wall time of a run, and of making its machine code before, which is not in it [s]
     seconds: float = np.nan
     compile_seconds: float = np.nan
-    drift: float = np.nan
-    gap: float = np.nan
-    reason: str = ""
+    drift: float = np.nan  # change of energy that work does not explain [J]
+    gap: float = np.nan  # largest constraint residual at the end [rad, m]
+    reason: str = ""  # why there is no result; empty if there is one
 
     @property
     def failed(self) -> bool:

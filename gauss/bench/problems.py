@@ -25,27 +25,16 @@ SOLVABLE, INCONSISTENT, UNKNOWN = "solvable", "inconsistent", "unknown"  # verdi
 
 @dataclass(frozen=True)
 class MechanismProblem:
-    """One compulsion with its name.
-
-    Parameters
-    ----------
-    note : str
-        What it is, and what is hard about it.
-    system, state : System, State, optional
-        Where it comes from, if the compulsion is that of a system in a state and nothing else.
-    load : ndarray, shape (n_v,), optional
-        Generalised forces that act there [N m, N].
-    verdict : str
-        "solvable", or "inconsistent" where no accelerations meet all rows: there is no reference then.
-    """
+    """One compulsion with its name."""
 
     name: str
-    note: str
+    note: str  # what it is, and what is hard about it
     compulsion: Compulsion
+    # system, state: where it comes from, if the compulsion is that of a system in a state and nothing else
     system: System | None = None
     state: State | None = None
-    load: np.ndarray | None = None
-    verdict: str = SOLVABLE
+    load: np.ndarray | None = None  # generalised forces that act there [N m, N]
+    verdict: str = SOLVABLE  # "solvable", or "inconsistent" where no accelerations meet all rows: there is no reference then
 
 
 @dataclass(frozen=True)

@@ -174,23 +174,12 @@ def _columns(system: System, independent) -> tuple[int, ...]:
 
 
 class TracedFunction(NamedTuple):
-    """Function of a state before it is compiled.
+    """Function of a state before it is compiled."""
 
-    Attributes
-    ----------
-    trace : callable
-        () → its trace, whose last outputs are the error measures of :func:`error_measures`.
-    interface : Interface
-        Its arguments and results.
-    name : str
-        Its name in messages.
-    by_null_space : callable or None
-        (state, arguments by name) → its results where elimination leaves few digits; None where it is not by elimination.
-    """
-
-    trace: Callable[[], Function]
-    interface: Interface
-    name: str
+    trace: Callable[[], Function]  # () → its trace, whose last outputs are the error measures of :func:`error_measures`
+    interface: Interface  # its arguments and results
+    name: str  # its name in messages
+    # (state, arguments by name) → its results where elimination leaves few digits; None where it is not by elimination
     by_null_space: Callable[[State, dict], Sequence[np.ndarray]] | None = None
 
 

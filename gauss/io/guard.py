@@ -23,19 +23,11 @@ NAMES = ("name", "link", "joint", "body")  # attributes that may look like numbe
 
 @dataclass(frozen=True)
 class Source:
-    """One file that may be parsed.
-
-    Parameters
-    ----------
-    root : Element
-        What it holds.
-    places : dict
-        File and line of every element, as "robot.urdf:12".
-    """
+    """One file that may be parsed."""
 
     path: Path
-    root: Element
-    places: dict[Element, str] = field(repr=False)
+    root: Element  # what it holds
+    places: dict[Element, str] = field(repr=False)  # file and line of every element, as "robot.urdf:12"
 
     def place(self, element: Element | None) -> str:
         """File and line of an element; the file alone where there is none."""

@@ -25,20 +25,12 @@ PairOfSolids = SolidPair | BallOnTerrain | SolidOnTerrain
 
 @dataclass(frozen=True)
 class PatchPoint(FeaturePair):
-    """A point of the patch of contact of two solids; far where the patch has fewer, and from terrain that is not near.
+    """A point of the patch of contact of two solids; far where the patch has fewer, and from terrain that is not near."""
 
-    Parameters
-    ----------
-    shape, other : Collider
-        The shapes.
-    corner : int
-        Which ball of the first shape, where it is a set of points.
-    """
-
-    shape: Collider
+    shape: Collider  # shape, other: the shapes
     other: Collider
     index: int
-    corner: int = 0
+    corner: int = 0  # which ball of the first shape, where it is a set of points
 
     @property
     def is_traced(self) -> bool:

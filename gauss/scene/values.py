@@ -188,15 +188,9 @@ def _when(t) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ConstantLaw:
-    """Function of (t, motion) with the same value at all times.
+    """Function of (t, motion) with the same value at all times."""
 
-    Parameters
-    ----------
-    value : float or tuple of float
-        The value; expressions where parameters are.
-    """
-
-    value: Any
+    value: Any  # the value; expressions where parameters are
 
     def __call__(self, t, motion):
         """The value."""

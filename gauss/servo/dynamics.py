@@ -24,18 +24,10 @@ AGREEMENT = 1e-9  # relative difference of compiled accelerations and the saddle
 
 
 class ServoQuestion(NamedTuple):
-    """Question for the plan of a servo-controlled motion.
+    """Question for the plan of a servo-controlled motion."""
 
-    Attributes
-    ----------
-    servo : Servo
-        The servo.
-    stabilisation : str
-        States are projected onto contacts and relations.
-    """
-
-    servo: Servo
-    stabilisation: str = "projection"
+    servo: Servo  # the servo
+    stabilisation: str = "projection"  # states are projected onto contacts and relations
 
 
 SERVOS = RuleTable(

@@ -24,24 +24,12 @@ class ScalarRelation(NamedTuple):
 
 
 class ServoRows(NamedTuple):
-    """Rows of several scalar relations, in symbols or numbers.
+    """Rows of several scalar relations, in symbols or numbers."""
 
-    Attributes
-    ----------
-    position : ndarray, shape (r,)
-        Residual at position level; zero for relations of velocities and accelerations.
-    velocity : ndarray, shape (r,)
-        Residual at velocity level; zero for relations of accelerations.
-    G : ndarray, shape (r, m)
-        Rows on the accelerations.
-    gamma : ndarray, shape (r,)
-        Right-hand side of G q̈ = γ.
-    """
-
-    position: np.ndarray
-    velocity: np.ndarray
-    G: np.ndarray
-    gamma: np.ndarray
+    position: np.ndarray  # (r,) residual at position level; zero for relations of velocities and accelerations
+    velocity: np.ndarray  # (r,) residual at velocity level; zero for relations of accelerations
+    G: np.ndarray  # (r, m) rows on the accelerations
+    gamma: np.ndarray  # (r,) right-hand side of G q̈ = γ
 
 
 def scalars(relations, symbols: MotionSymbols) -> list[ScalarRelation]:

@@ -26,21 +26,11 @@ INDEPENDENT = 1e-8  # share of the largest pivot, below which a condition follow
 
 @dataclass(frozen=True)
 class EndCondition:
-    """Condition on one coordinate or rate at an end of a motion.
+    """Condition on one coordinate or rate at an end of a motion."""
 
-    Parameters
-    ----------
-    name : str
-        "pin" or "pin rate".
-    place : int
-        Entry of (q, v).
-    low, high : float
-        Least and largest value; of a periodic motion, of the increase over the period.
-    """
-
-    name: str
-    place: int
-    low: float
+    name: str  # "pin" or "pin rate"
+    place: int  # entry of (q, v)
+    low: float  # low, high: least and largest value; of a periodic motion, of the increase over the period
     high: float
 
     @property
@@ -51,18 +41,10 @@ class EndCondition:
 
 @dataclass(frozen=True)
 class MotionEnd:
-    """Conditions on one end, and a consistent state near them.
+    """Conditions on one end, and a consistent state near them."""
 
-    Parameters
-    ----------
-    conditions : tuple of EndCondition
-        Independent conditions.
-    guess : State
-        State that meets what is fixed.
-    """
-
-    conditions: tuple[EndCondition, ...]
-    guess: State
+    conditions: tuple[EndCondition, ...]  # independent conditions
+    guess: State  # state that meets what is fixed
 
 
 def entries(system: System) -> dict[str, int]:

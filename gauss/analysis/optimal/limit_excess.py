@@ -17,18 +17,10 @@ from gauss.errors import LimitWarning, user_level
 
 @dataclass(frozen=True)
 class LimitExcess:
-    """What a motion is beyond its limits by.
+    """What a motion is beyond its limits by."""
 
-    Parameters
-    ----------
-    of_intervals : ndarray, shape (n,)
-        The largest of each interval, in shares of the units; 0 within the limits.
-    where : str
-        What is beyond its limit most, by how much, and when; empty within the limits.
-    """
-
-    of_intervals: np.ndarray
-    where: str
+    of_intervals: np.ndarray  # (n,) the largest of each interval, in shares of the units; 0 within the limits
+    where: str  # what is beyond its limit most, by how much, and when; empty within the limits
 
     @property
     def largest(self) -> float:

@@ -91,27 +91,13 @@ class MotionProblem:
 
 @dataclass(frozen=True)
 class MotionValues:
-    """Values of a motion on a mesh, in shares of the units.
+    """Values of a motion on a mesh, in shares of the units."""
 
-    Parameters
-    ----------
-    mesh : ndarray, shape (n + 1,)
-        Mesh from 0 to 1.
-    x : ndarray, shape (n_x, n + 1)
-        States at the mesh points.
-    z : ndarray, shape (s, n_x, n)
-        States at the collocation points.
-    u : ndarray, shape (2, n_u, n)
-        Inputs at begin and end of the intervals.
-    duration : float
-        Duration [s].
-    """
-
-    mesh: np.ndarray
-    x: np.ndarray
-    z: np.ndarray
-    u: np.ndarray
-    duration: float
+    mesh: np.ndarray  # (n + 1,) mesh from 0 to 1
+    x: np.ndarray  # (n_x, n + 1) states at the mesh points
+    z: np.ndarray  # (s, n_x, n) states at the collocation points
+    u: np.ndarray  # (2, n_u, n) inputs at begin and end of the intervals
+    duration: float  # [s]
 
     def on(self, mesh: np.ndarray, stages: int) -> "MotionValues":
         """The same motion on another mesh, interpolated."""

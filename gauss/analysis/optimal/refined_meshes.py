@@ -73,24 +73,13 @@ def _optima(problems, checks, guesses, tolerance: float, refinements: int):
 
 @dataclass(frozen=True)
 class MeshedMotion:
-    """Optimum on the meshes of all phases, and its check; each of the lists has an entry for each phase.
+    """Optimum on the meshes of all phases, and its check; each of the lists has an entry for each phase."""
 
-    Parameters
-    ----------
-    solved : Solved
-        Answer of IPOPT.
-    samples : list of tuple of ndarray
-        Times (n + 1,), states (n + 1, n_q + n_v), and inputs (n, 2, n_u) at the ends of the intervals.
-    errors : list of ndarray
-        Error (n,) of each interval.
-    excess : list of LimitExcess
-        What it is beyond its limits by.
-    """
-
-    solved: Solved
+    solved: Solved  # answer of IPOPT
+    # times (n + 1,), states (n + 1, n_q + n_v), and inputs (n, 2, n_u) at the ends of the intervals
     samples: list[tuple[np.ndarray, ...]]
-    errors: list[np.ndarray]
-    excess: list[LimitExcess]
+    errors: list[np.ndarray]  # error (n,) of each interval
+    excess: list[LimitExcess]  # what it is beyond its limits by
 
     @property
     def mesh_error(self) -> float:

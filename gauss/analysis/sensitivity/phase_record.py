@@ -25,28 +25,14 @@ RELATIVE_TOLERANCE = 1e-12  # of the steps, as simulate has it
 
 @dataclass
 class RecordedPhase:
-    """A smooth phase, and the event that ends it.
-
-    Parameters
-    ----------
-    start : State
-        Its first state.
-    struck : tuple of int
-        Gaps that close with an impact at its end.
-    bearing : tuple of int
-        Closed gaps that bear an impulse there.
-    other : tuple of str
-        Elements other than gaps that take part in the impact.
-    end : State
-        State before the event; that of the end of the motion in the last phase.
-    """
+    """A smooth phase, and the event that ends it."""
 
     phase: Phase
-    start: State
-    struck: tuple[int, ...] = ()
-    bearing: tuple[int, ...] = ()
-    other: tuple[str, ...] = ()
-    end: State = field(init=False)
+    start: State  # its first state
+    struck: tuple[int, ...] = ()  # gaps that close with an impact at its end
+    bearing: tuple[int, ...] = ()  # closed gaps that bear an impulse there
+    other: tuple[str, ...] = ()  # elements other than gaps that take part in the impact
+    end: State = field(init=False)  # state before the event; that of the end of the motion in the last phase
 
     def system(self, whole: System) -> System:
         """Smooth system of the phase, made of another system of the same elements."""

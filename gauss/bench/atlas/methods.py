@@ -28,25 +28,13 @@ RTOL, ATOL = 1e-10, 1e-12  # of adaptive integrators
 
 @dataclass(frozen=True)
 class Method:
-    """One way to compute a motion.
+    """One way to compute a motion."""
 
-    Parameters
-    ----------
-    backend : str
-        What solves for accelerations.
-    form : str
-        Form of the compulsion that a QP solver gets.
-    integrator, stabilisation : str
-        As in :func:`gauss.simulate`.
-    certified : bool
-        Whether every evaluation is certified, as users get it, or believed as the backend claims.
-    """
-
-    backend: str = AUTO
-    form: str = "F2s"
-    integrator: str = "rk4"
+    backend: str = AUTO  # what solves for accelerations
+    form: str = "F2s"  # form of the compulsion that a QP solver gets
+    integrator: str = "rk4"  # integrator, stabilisation: as in :func:`gauss.simulate`
     stabilisation: str = "projection"
-    certified: bool = True
+    certified: bool = True  # whether every evaluation is certified, as users get it, or believed as the backend claims
 
     @property
     def name(self) -> str:

@@ -39,27 +39,13 @@ def resting(system: System, v):
 
 
 class Impact(NamedTuple):
-    """Result of an impact.
+    """Result of an impact."""
 
-    Attributes
-    ----------
-    state : State
-        State after it.
-    work : float
-        Work of prescribed motions [J].
-    loss : float
-        Kinetic energy lost, the work of prescribed motions included [J].
-    impulses : dict of str to tuple of float
-        Impulse −λ of every relation, one for each of its residuals [N s, N m s].
-    active : ndarray of int
-        Closed gaps that bear an impulse.
-    """
-
-    state: State
-    work: float
-    loss: float
-    impulses: dict[str, tuple[float, ...]]
-    active: np.ndarray
+    state: State  # state after it
+    work: float  # work of prescribed motions [J]
+    loss: float  # kinetic energy lost, the work of prescribed motions included [J]
+    impulses: dict[str, tuple[float, ...]]  # impulse −λ of every relation, one for each of its residuals [N s, N m s]
+    active: np.ndarray  # closed gaps that bear an impulse
 
 
 def impact(

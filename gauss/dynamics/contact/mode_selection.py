@@ -26,30 +26,15 @@ MOST_PIVOTS = 100  # changes of elements, in one selection
 
 
 class ActiveMode(NamedTuple):
-    """Selected mode with its solution.
+    """Selected mode with its solution."""
 
-    Attributes
-    ----------
-    gaps : tuple of int
-        Gaps that stay closed.
-    mode : ContactMode
-        Mode of all other elements.
-    forces : dict of str to float
-        Forces of set-valued elements along their coordinates, and of links with losses on the driven ones [N m, N].
-    solution : Solution
-        Certified solution.
-    system : System
-        The phase without its gaps.
-    load : ndarray, shape (n_v,)
-        Generalised forces of the losses.
-    """
-
-    gaps: tuple[int, ...]
-    mode: ContactMode
+    gaps: tuple[int, ...]  # gaps that stay closed
+    mode: ContactMode  # mode of all other elements
+    # forces of set-valued elements along their coordinates, and of links with losses on the driven ones [N m, N]
     forces: dict[str, float]
-    solution: Solution
-    system: System
-    load: np.ndarray
+    solution: Solution  # certified solution
+    system: System  # the phase without its gaps
+    load: np.ndarray  # (n_v,) generalised forces of the losses
 
     @property
     def case(self) -> tuple:

@@ -32,24 +32,12 @@ LIMITS = ACCELERATION_TOLERANCE, ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FIN
 
 
 class UnilateralAccelerations(NamedTuple):
-    """Accelerations with an active set of contacts, and their errors.
+    """Accelerations with an active set of contacts, and their errors."""
 
-    Attributes
-    ----------
-    acceleration : ndarray, shape (n_v,)
-        Joint accelerations.
-    opening : ndarray, shape (m,)
-        Accelerations of the gap functions, in units of the scene.
-    scale : float
-        Largest acceleration, in the same.
-    errors : list
-        Error of the accelerations, of complementarity, residual of the bilateral constraints, sum of all results.
-    """
-
-    acceleration: np.ndarray
-    opening: np.ndarray
-    scale: float
-    errors: list
+    acceleration: np.ndarray  # (n_v,) joint accelerations
+    opening: np.ndarray  # (m,) accelerations of the gap functions, in units of the scene
+    scale: float  # largest acceleration, in the same
+    errors: list  # error of the accelerations, of complementarity, residual of the bilateral constraints, sum of all results
 
 
 def unilateral_dynamics(system: System, laws: Laws, certified: Callable, doc: str) -> Callable:

@@ -40,31 +40,15 @@ NOT_CONVERGED = "the forces of the links with losses, of closed stops and of sti
 
 
 class CutRows(NamedTuple):
-    """Constraint rows of a phase whose forces are found apart: links with losses, held joints; and forces of sliding joints.
+    """Rows of a phase whose forces are found apart: links with losses, held joints; and forces of sliding joints."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the m links and held joints.
-    rows : ndarray of int, shape (m,)
-        Their rows.
-    R, W : ndarray, shape (m, n_v)
-        Jacobian of the rows, and generalised forces for Q = 1.
-    units : ndarray, shape (m,)
-        Forces of the scene along the driven joints [N m, N].
-    held : tuple of HeldJoint
-        The held joints among them.
-    braking : ndarray, shape (n_v,)
-        Generalised forces of sliding joints, which are not in the cut system either.
-    """
-
-    names: tuple[str, ...]
-    rows: np.ndarray
-    R: np.ndarray
+    names: tuple[str, ...]  # names of the m links and held joints
+    rows: np.ndarray  # (m,) their rows
+    R: np.ndarray  # R, W (m, n_v): Jacobian of the rows, and generalised forces for Q = 1
     W: np.ndarray
-    units: np.ndarray
-    held: tuple[HeldJoint, ...]
-    braking: np.ndarray
+    units: np.ndarray  # (m,) forces of the scene along the driven joints [N m, N]
+    held: tuple[HeldJoint, ...]  # the held joints among them
+    braking: np.ndarray  # (n_v,) generalised forces of sliding joints, which are not in the cut system either
 
     @property
     def ideal(self) -> bool:

@@ -28,19 +28,11 @@ CONTRADICTION = 1e-6  # velocity residual after a jump, relative to the scales o
 
 @dataclass(frozen=True)
 class Jumps:
-    """Possible jumps of the prescribed velocities of a system.
-
-    Parameters
-    ----------
-    times : ndarray, shape (k,)
-        Switching times of its relations with a possible jump [s].
-    sizes : ndarray, shape (2, r)
-        Range of the position, and largest velocity, that each row prescribes.
-    """
+    """Possible jumps of the prescribed velocities of a system."""
 
     system: System | None
-    times: np.ndarray
-    sizes: np.ndarray
+    times: np.ndarray  # (k,) switching times of its relations with a possible jump [s]
+    sizes: np.ndarray  # (2, r) range of the position, and largest velocity, that each row prescribes
 
     def __bool__(self):
         return bool(self.times.size)

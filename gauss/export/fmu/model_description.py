@@ -12,21 +12,11 @@ from gauss.versions import VERSION
 
 
 class Variable(NamedTuple):
-    """A variable of a unit.
+    """A variable of a unit."""
 
-    Attributes
-    ----------
-    name : str
-        Its name.
-    reference : int
-        Its value reference.
-    attributes : dict of str to str
-        Attributes of its element.
-    """
-
-    name: str
-    reference: int
-    attributes: dict[str, str]
+    name: str  # its name
+    reference: int  # its value reference
+    attributes: dict[str, str]  # attributes of its element
 
     def __str__(self) -> str:
         pairs = {"name": self.name, "valueReference": str(self.reference), "variability": "continuous"} | self.attributes

@@ -35,28 +35,14 @@ STIFF = {"solref": f"{2 * TIMESTEP:g} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 
 @dataclass
 class MjcfDocument:
-    """MJCF file while it is written.
+    """MJCF file while it is written."""
 
-    Parameters
-    ----------
-    scene : Scene
-        What is written.
-    system : System
-        The same, compiled.
-    limbs : list of Limb
-        Bodies of the tree.
-    bodies : dict
-        Element of every body.
-    taken : set
-        Names in use, with the kind of element that they name.
-    """
-
-    scene: Scene
-    system: System
-    limbs: list[Limb]
+    scene: Scene  # what is written
+    system: System  # the same, compiled
+    limbs: list[Limb]  # bodies of the tree
     root: Element = field(default_factory=lambda: Element("mujoco"))
-    bodies: dict[str, Element] = field(default_factory=dict)
-    taken: set[tuple[str, str]] = field(default_factory=set)
+    bodies: dict[str, Element] = field(default_factory=dict)  # element of every body
+    taken: set[tuple[str, str]] = field(default_factory=set)  # names in use, with the kind of element that they name
 
     def add(self, parent: Element, tag: str, kind: str = "", **attributes) -> Element:
         """Add an element; its name must be unique among elements of the ``kind``."""

@@ -27,21 +27,12 @@ KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 
 @dataclass(frozen=True)
 class JointFile:
-    """Contents of the file.
+    """Contents of the file."""
 
-    Parameters
-    ----------
-    closures : tuple
-        Loop joints, each with its place.
-    kinds : dict
-        Type that replaces that of a joint of the URDF, with its place, by the name of the joint.
-    motors : tuple of Marked
-        Actuated joints.
-    """
-
-    closures: tuple[tuple[LoopClosure, str], ...] = ()
+    closures: tuple[tuple[LoopClosure, str], ...] = ()  # loop joints, each with its place
+    # type that replaces that of a joint of the URDF, with its place, by the name of the joint
     kinds: dict[str, Marked] | None = None
-    motors: tuple[Marked, ...] = ()
+    motors: tuple[Marked, ...] = ()  # actuated joints
 
     def replaced(self, source: Source) -> Source:
         """URDF file with the types of its joints replaced; ball joints are hinges in it, see :attr:`balls`.

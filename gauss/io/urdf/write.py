@@ -36,26 +36,16 @@ TYPES = {"hinge": "continuous", "slide": "prismatic"}
 
 @dataclass
 class UrdfDocument:
-    """URDF file while it is written, and what goes beside it.
-
-    Parameters
-    ----------
-    limbs : list of Limb
-        Bodies of the tree.
-    rest : Scene
-        What the file cannot say.
-    shifts : dict
-        Where the frame of each body is moved to, in its old frame (3,) [m].
-    mimics : dict
-        Element of each joint of the file of one freedom, by name, that mimics no other yet.
-    """
+    """URDF file while it is written, and what goes beside it."""
 
     scene: Scene
     system: System
-    limbs: list[Limb]
+    limbs: list[Limb]  # bodies of the tree
     root: Element
-    rest: Scene
+    rest: Scene  # what the file cannot say
+    # where the frame of each body is moved to, in its old frame (3,) [m]
     shifts: dict[str, np.ndarray] = field(default_factory=dict)
+    # element of each joint of the file of one freedom, by name, that mimics no other yet
     mimics: dict[str, Element] = field(default_factory=dict)
 
 
