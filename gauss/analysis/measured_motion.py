@@ -30,12 +30,8 @@ class MeasuredMotion(NamedTuple):
 def measured_motion(model: RegressorModel, q, v, acceleration, forces) -> MeasuredMotion:
     """Regressors and forces of samples.
 
-    Raises
-    ------
-    StateError
-        If samples do not fit the system, are not finite or far off the constraints.
-    SimulationError
-        If a load of the scene cannot be compiled.
+    StateError if samples do not fit the system, are not finite or far off the constraints.
+    SimulationError if a load of the scene cannot be compiled.
     """
     system, n_v = model.system, model.system.n_v
     q = _array(q, "q", None, system.n_q)

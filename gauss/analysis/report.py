@@ -22,6 +22,9 @@ STYLE = (
 def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figure"]]) -> Path:
     """Write a report.
 
+    ArgumentError if the path does not end with .html, or its folder does not exist.
+    FileError if the file cannot be written.
+
     Parameters
     ----------
     path : str or Path
@@ -30,13 +33,6 @@ def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figu
         Heading, and a table of fixed width.
     figures : sequence of (str, Figure)
         Figures with what they show.
-
-    Raises
-    ------
-    ArgumentError
-        If the path does not end with .html, or its folder does not exist.
-    FileError
-        If the file cannot be written.
     """
     if not isinstance(path, str | Path) or Path(path).suffix != ".html":
         raise ArgumentError(f"report: expected a path that ends with .html, got {path!r}.")

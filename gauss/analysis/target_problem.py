@@ -112,12 +112,8 @@ def bounds(N: np.ndarray, low: np.ndarray, high: np.ndarray, units: np.ndarray, 
 def named_values(system: System, given, what: str) -> Iterator[tuple[int, object]]:
     """Places in v and values of a dictionary by the names of coordinates.
 
-    Raises
-    ------
-    ArgumentError
-        If it is no dictionary.
-    StateError
-        If a name is none of the system.
+    ArgumentError if it is no dictionary.
+    StateError if a name is none of the system.
     """
     if not isinstance(given, Mapping):
         raise ArgumentError(f"{what}: expected values by the names of coordinates, got {given!r}.")

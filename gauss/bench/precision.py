@@ -136,6 +136,9 @@ def attempts(
 
     Backends get three settings at least, so that there is a curve, unless a run takes ten times as long.
 
+    SimulationError if there is no such integrator.
+    BackendError if there is no such backend.
+
     Parameters
     ----------
     scene : Scene or System
@@ -150,13 +153,6 @@ def attempts(
         Longest run [s].
     backends : sequence of str, optional
         How accelerations are solved, each by itself; "auto" when not given.
-
-    Raises
-    ------
-    SimulationError
-        If there is no such integrator.
-    BackendError
-        If there is no such backend.
     """
     _require_charted(methods or ())
     backends = chosen(backends, (AUTO, *available()), "backend") if backends else ()

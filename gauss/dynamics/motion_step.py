@@ -34,6 +34,9 @@ PROJECTIONS = 2  # Newton steps in position after a step
 class MotionStep:
     """Step of one system.
 
+    ArgumentError if there is no such method or parameter.
+    SimulationError if the system has no smooth dynamics in machine code, with the reasons.
+
     Parameters
     ----------
     integrator : str
@@ -44,13 +47,6 @@ class MotionStep:
         Those of one value that do not act in its accelerations, as the limit of friction in one that sticks.
     moved_loops : ndarray, shape (m, n_p), optional
         Derivatives of the position residual by the parameters, as by the place of a stop that bears; zero when not given.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no such method or parameter.
-    SimulationError
-        If the system has no smooth dynamics in machine code, with the reasons.
     """
 
     moved_loops: np.ndarray | None = None

@@ -65,14 +65,9 @@ def state_function(
 ) -> Callable:
     """Compiled function of a state, or of several at once; see :meth:`gauss.System.function`.
 
-    Raises
-    ------
-    ArgumentError
-        If there is no such function, or it is called with options that it does not have.
-    StateError
-        If there is no such frame or joint, or coordinates cannot be independent.
-    SimulationError
-        If the law of a load cannot be compiled.
+    ArgumentError if there is no such function, or it is called with options that it does not have.
+    StateError if there is no such frame or joint, or coordinates cannot be independent.
+    SimulationError if the law of a load cannot be compiled.
     """
     requests, columns = _requested(system, names, reference, independent)
     laws = traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""

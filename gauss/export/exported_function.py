@@ -131,12 +131,8 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
 def folder_of(folder) -> Path:
     """Folder of a path, made if it is not there.
 
-    Raises
-    ------
-    ArgumentError
-        If it is no path.
-    FileError
-        If it cannot be made.
+    ArgumentError if it is no path.
+    FileError if it cannot be made.
     """
     if not isinstance(folder, str | PathLike):
         raise ArgumentError(f"export: folder: expected a path, got {folder!r:.80}.")

@@ -73,12 +73,8 @@ class ServoEngine(Engine):
     def instant(self, state: State) -> ServoInstant:
         """Rows that determine the efforts, and responses.
 
-        Raises
-        ------
-        UnrealisableError
-            If S loses rank, or did so since the start: the sign of its determinant changes.
-        SlackError
-            If a cable would be in compression.
+        UnrealisableError if S loses rank, or did so since the start: the sign of its determinant changes.
+        SlackError if a cable would be in compression.
         """
         if self.certified:
             here = saddle(self.servo, state, self.plan).instant

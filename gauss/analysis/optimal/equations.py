@@ -35,11 +35,6 @@ class OptimalEquations:
 
     SimulationError if the scene has no inputs, or elements that no smooth function describes, by their names.
 
-    Parameters
-    ----------
-    system : System
-        System with inputs.
-
     Attributes
     ----------
     units : ndarray, shape (n_q + n_v,)

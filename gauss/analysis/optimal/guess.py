@@ -26,8 +26,6 @@ def first_guess(
 
     Parameters
     ----------
-    equations : OptimalEquations
-        Equations of motion.
     given : OptimalMotion, Trajectory or None
         A motion of the same system; None for straight lines.
     ends : tuple of State

@@ -25,19 +25,15 @@ WARP = 32
 class CudaDevice:
     """One GPU.
 
+    MissingPackageError if cuda-bindings is not installed.
+    DeviceError if there is no driver, no such device, or it is too old.
+
     Attributes
     ----------
     name : str
         Its name, such as "cuda:0".
     stream : int
         Stream of copies and programs; 0 is the default stream.
-
-    Raises
-    ------
-    MissingPackageError
-        If cuda-bindings is not installed.
-    DeviceError
-        If there is no driver, no such device, or it is too old.
     """
 
     def __init__(self, number: int = 0):

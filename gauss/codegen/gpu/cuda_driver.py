@@ -27,12 +27,8 @@ REMEDIES = {
 class CudaDriver:
     """Functions of the CUDA driver: a status that is no success is a DeviceError.
 
-    Raises
-    ------
-    MissingPackageError
-        If cuda-bindings is not installed.
-    DeviceError
-        If there is no driver.
+    MissingPackageError if cuda-bindings is not installed.
+    DeviceError if there is no driver.
     """
 
     def __init__(self):

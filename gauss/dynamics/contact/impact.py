@@ -67,8 +67,6 @@ def impact(
         With unilateral constraints.
     state : State
         State before the impact, on the bilateral constraints.
-    touching : ndarray of int
-        Closed gaps.
     restitution : ndarray, shape (m,)
         Coefficient of every gap.
     backend : str

@@ -28,8 +28,6 @@ def inertial(system: System, limbs: list[Limb], limb: Limb, strict: bool = True)
         The scene, compiled.
     limbs : list of Limb
         Bodies of the tree.
-    limb : Limb
-        The body.
     strict : bool
         Whether what MuJoCo refuses is refused, where more in its place would show.
     """

@@ -37,8 +37,6 @@ def of_link(source: Source, link: Element, placed) -> MassProperties:
 
     Parameters
     ----------
-    source : Source
-        The file.
     placed : callable
         (element of a collision) → its pose (R, p) in the link.
     """

@@ -75,8 +75,6 @@ def add_coupling(scene: Scene, source: Source, name: str, predecessor: str, succ
         Scene of the tree of the file.
     source : Source
         The file, whose joints give the chains.
-    predecessor, successor : str
-        Links.
     ratio : float
         r: the successor turns so many times as fast as the predecessor.
     """
