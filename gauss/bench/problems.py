@@ -49,7 +49,7 @@ SELECTION: dict[str, Entry] = {}
 
 
 def selected(name: str, verdict: str = SOLVABLE) -> Callable:
-    """Enter a function that makes a problem, from its name and the docstring of the function, into the selection."""
+    """Register a function that makes a problem under a name; its docstring is the note."""
 
     def enter(function):
         note = function.__doc__.strip().rstrip(".")
@@ -222,7 +222,7 @@ def box_8():
 
 @selected("box about to tilt")
 def box_tilting():
-    """Box on eight points, the moment on it 1e-9 short of what lifts it: rows that hold by next to nothing."""
+    """Box on eight points, the moment on it 1e-9 below the one that lifts it: multipliers near zero."""
     return _box(_feet(8), tilt=1.0 - 1e-9)
 
 

@@ -1,6 +1,6 @@
 """Functions of a state in which the elimination of loop constraints leaves few digits, by the null space of these.
 
-They are numbers of one state, in a hundred times the time of machine code: rows of a batch take them one by one.
+They are evaluated on numbers, for one state at a time, in a hundred times the time of machine code.
 """
 
 from collections.abc import Sequence

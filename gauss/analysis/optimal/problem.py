@@ -1,4 +1,4 @@
-"""What is to be optimal in a phase of a motion, its values on a mesh, and the answer of a programme."""
+"""Optimal-control problem of a phase, values of a motion on a mesh, and the solution of the nonlinear programme."""
 
 from dataclasses import dataclass, replace
 

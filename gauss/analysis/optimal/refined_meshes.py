@@ -15,8 +15,8 @@ from gauss.analysis.optimal.result import OptimalMotion
 from gauss.errors import SimulationError
 from gauss.system import State
 
-LIMIT_REFINEMENTS = 4  # most of them that limits alone ask for: each may make the intervals there four times shorter
-LIMIT_SHARE = 2.0  # of the tolerance, within which limits are kept: the motions that are looked at have errors of it
+LIMIT_REFINEMENTS = 4  # refinements for the sake of limits alone, each of which divides intervals by up to four
+LIMIT_SHARE = 2.0  # times the tolerance: how far limits may be missed, by motions that have errors of this size
 
 
 def on_refined_meshes(
@@ -79,7 +79,7 @@ class MeshedMotion:
     # times (n + 1,), states (n + 1, n_q + n_v), and inputs (n, 2, n_u) at the ends of the intervals
     samples: list[tuple[np.ndarray, ...]]
     errors: list[np.ndarray]  # error (n,) of each interval
-    excess: list[LimitExcess]  # what it is beyond its limits by
+    excess: list[LimitExcess]  # excess of each phase over its limits
 
     @property
     def mesh_error(self) -> float:

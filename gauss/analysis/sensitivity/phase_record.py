@@ -101,7 +101,7 @@ def recorded_motion(
             kept += [packed(state) for state in inside]
             reached = max(reached, point.state.t)
             last = point.state
-        kept += [packed(last)] * (len(nodes) - len(kept))  # the last node but for the rounding of its time
+        kept += [packed(last)] * (len(nodes) - len(kept))  # the last node, to the rounding of its time
     run.record[-1].end = last
     return run.record, np.array(kept)
 

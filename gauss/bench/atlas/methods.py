@@ -1,4 +1,4 @@
-"""Methods of the atlas: a formulation, a solver, an integrator, and what is done against drift."""
+"""Methods of the atlas: a formulation, a solver, an integrator, and a stabilisation."""
 
 import warnings
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ class Method:
                 "stabilisation": self.stabilisation,
             }
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", BalanceWarning)  # it is looked at below, whatever that takes
+                warnings.simplefilter("ignore", BalanceWarning)  # warned of below
                 trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
             warn_of_balance(trajectory)
             return trajectory

@@ -1,6 +1,6 @@
 """The instances of the suite by class: ``instances()`` makes them, each with its reference, which is checked on the way.
 
-References are not trusted: nothing leaves the suite whose verdict is not proven to the digits that it claims.
+An instance whose verdict is not proven to the digits that its reference claims is refused.
 """
 
 from collections.abc import Callable, Iterable, Iterator

@@ -166,7 +166,7 @@ def _floats(model, index: int) -> bool:
 
 
 def _link_name(name: str) -> str:
-    """Name of a link; one that is called like the world itself gets another."""
+    """Name of a link; a link named like the world gets another name."""
     return f"{GROUND} link" if name == GROUND else name
 
 
@@ -202,7 +202,7 @@ def _axis(joint) -> np.ndarray:
 
 
 def _couple(scene: Scene, source: Source):
-    """Mimic tags as couplings; a mimicked joint that does not move is held as a fixed offset cannot be."""
+    """Mimic tags as couplings; joints that mimic one that does not move, or each other in a circle, are refused."""
     leads: dict[str, str] = {}
     for joint in source.root.findall("joint"):
         tag = joint.find("mimic")
