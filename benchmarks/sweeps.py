@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.command import command
+from benchmarks.command import command, load_at_the_end
 from gauss.bench.contest import with_time
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
@@ -110,7 +110,7 @@ def measured(side: int, singles: int) -> tuple[list[dict], list[str]]:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["GAUSS_CACHE"] = folder
         rows = measure(side, singles)
-    return rows, [*header("numpy", "llvmlite", "xarray", "loky"), f"load before the end: {os.getloadavg()[0]:.1f}"]
+    return rows, [*header("numpy", "llvmlite", "xarray", "loky"), load_at_the_end()]
 
 
 if __name__ == "__main__":
