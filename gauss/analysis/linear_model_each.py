@@ -30,8 +30,11 @@ class LinearModelOfEach:
     def __call__(self, q, v, load, out=None, t=0.0) -> Matrices:
         """Matrices about a state, or about each of a batch of states.
 
-        StateError if a state does not fit, is off the constraints, or the independent coordinates do not determine the
-        others there.
+        Raises
+        ------
+        StateError
+            If a state does not fit, is off the constraints, or the independent coordinates do not determine the others
+            there.
         """
         given = [real_array(part, name) for name, part in (("q", q), ("v", v), ("load", load))]
         time = real_array(t, "t", "times [s]")

@@ -54,9 +54,6 @@ class Kernel(machine.CodeCaller):
     def __call__(self, inputs, out=None) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).
 
-        ValueError if the number of inputs is not that of the kernel, or ``out`` does not fit or shares memory with the
-        inputs.
-
         Parameters
         ----------
         inputs : array_like
@@ -64,6 +61,11 @@ class Kernel(machine.CodeCaller):
         out : ndarray, optional
             Destination: doubles of the shape of the outputs, contiguous rows, no overlap with the inputs. A new array
             when not given.
+
+        Raises
+        ------
+        ValueError
+            If the number of inputs is not that of the kernel, or ``out`` does not fit or shares memory with the inputs.
         """
         given = np.asarray(inputs, dtype=float)
         if given.ndim not in (1, 2) or given.shape[0] != self.n_in:

@@ -108,8 +108,12 @@ class PythonWrapper:
     def __call__(self, *args, **kwargs):
         """Results, in ``out`` if that is given.
 
-        ArgumentError if an argument is missing, or there are too many.
-        StateError if an argument cannot be converted or has the wrong shape.
+        Raises
+        ------
+        ArgumentError
+            If an argument is missing, or there are too many.
+        StateError
+            If an argument cannot be converted or has the wrong shape.
         """
         try:
             bound = self.__signature__.bind(*args, **kwargs).arguments

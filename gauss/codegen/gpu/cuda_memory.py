@@ -49,7 +49,10 @@ class CudaArray:
     def __dlpack__(self, *, dl_device=None, copy=None, **_):
         """Capsule of the array; programs wait for their threads, so that no stream needs to.
 
-        BufferError if a copy is asked for, or another device.
+        Raises
+        ------
+        BufferError
+            If a copy is asked for, or another device.
         """
         if copy or dl_device not in (None, self.__dlpack_device__()):
             raise BufferError("gauss lends this array where it is; numpy() copies it.")

@@ -39,9 +39,6 @@ class DeviceFunction:
     def __call__(self, *vectors, t=0.0, stream=None):
         """Results (n, …) of all rows.
 
-        StateError if an argument does not fit, or a row is refused: it says which, and why.
-        DeviceError if the device has not enough memory, or an array lies on another one.
-
         Parameters
         ----------
         *vectors : array_like, shape (n, k)
@@ -51,6 +48,13 @@ class DeviceFunction:
         stream : int or object, optional
             Stream of the device (its handle, or a stream of cuda.core, torch or CuPy): the function comes after what is in
             it, and waits for it alone. By default it waits for what writes to the arguments, and runs in the default stream.
+
+        Raises
+        ------
+        StateError
+            If an argument does not fit, or a row is refused: it says which, and why.
+        DeviceError
+            If the device has not enough memory, or an array lies on another one.
         """
         if stream is not None and len(self.rows.devices) > 1:
             raise DeviceError("stream: a stream is of one device, and several share this function.")

@@ -93,6 +93,8 @@ class RowsOnDevice(OnDevice):
 
         Parameters
         ----------
+        on : Device
+            The device.
         count : int
             Number of rows.
         vectors : sequence of (DeviceArray, int, int)
