@@ -204,28 +204,37 @@ def _rod(length: float) -> dict:
     return {"mass": length, "inertia": (1e-3 * length, moment, moment), "com": (length / 2, 0, 0)}
 
 
-def stewart_platform(base: float = 1.0, top: float = 0.6, height: float = 1.0, stiffness: float = 4000.0) -> gauss.Scene:
+def stewart_platform(
+    base: float = 1.0, top: float = 0.6, height: float = 1.0, stiffness: float = 4000.0, n: int = 1
+) -> gauss.Scene:
     """Platform on six legs with springs, each a Cardan joint at the base, a slider, and a ball joint at the platform.
 
-    The legs lead in turn to the three corners of the platform; "leg1" … "leg6" are the sliders.
+    The legs lead in turn to the three corners of the platform; "leg1" … "leg6" are the sliders. Of ``n`` platforms each
+    stands on the one below; those of the second are "leg2.1" … "leg2.6".
     """
-    scene = gauss.Scene("Stewart platform")
+    scene, below = gauss.Scene("Stewart platform" if n == 1 else f"{n} Stewart platforms"), "ground"
     foot_angles = np.deg2rad([-10, 10, 110, 130, 230, 250])
     head_angles = np.deg2rad([-50, 50, 70, 170, 190, 290])
-    for k, (foot_angle, head_angle) in enumerate(zip(foot_angles, head_angles, strict=True), start=1):
-        foot = base * np.array([np.cos(foot_angle), np.sin(foot_angle), 0.0])
-        head = np.array([top * np.cos(head_angle), top * np.sin(head_angle), height])
-        leg = (head - foot) / np.linalg.norm(head - foot)
-        R = _frame(leg, np.cross([0.0, 0.0, 1.0], leg))
-        turned = {"position": foot, "rotation": R}
-        scene.body(f"cylinder{k}", 2.0, (0.03, 0.03, 0.002), com=(0, 0, 0.25), **turned)
-        scene.body(f"rod{k}", 1.0, (0.015, 0.015, 0.0005), com=(0, 0, np.linalg.norm(head - foot) - 0.25), **turned)
-        if k == 1:
-            scene.body("platform", 20.0, (0.8, 0.8, 1.5), position=(0, 0, height))
-        scene.universal(f"foot{k}", "ground", f"cylinder{k}", at=foot, axis=R[:, 0], second_axis=R[:, 1])
-        scene.prismatic(f"leg{k}", f"cylinder{k}", f"rod{k}", at=foot, axis=leg)
-        scene.ball(f"head{k}", f"rod{k}", "platform", at=head)
-        scene.joint_spring(f"spring{k}", f"leg{k}", stiffness=stiffness)
+    for stage in range(n):
+        prefix, floor = (f"{stage + 1}." if stage else ""), np.array([0.0, 0.0, stage * height])
+        platform = f"platform{prefix[:-1]}"
+        for k, (foot_angle, head_angle) in enumerate(zip(foot_angles, head_angles, strict=True), start=1):
+            foot = floor + base * np.array([np.cos(foot_angle), np.sin(foot_angle), 0.0])
+            head = floor + np.array([top * np.cos(head_angle), top * np.sin(head_angle), height])
+            leg = (head - foot) / np.linalg.norm(head - foot)
+            R = _frame(leg, np.cross([0.0, 0.0, 1.0], leg))
+            leg_names = (f"{part}{prefix}{k}" for part in ("cylinder", "rod", "foot", "leg", "head", "spring"))
+            cylinder, rod, foot_joint, slider, head_joint, spring = leg_names
+            turned = {"position": foot, "rotation": R}
+            scene.body(cylinder, 2.0, (0.03, 0.03, 0.002), com=(0, 0, 0.25), **turned)
+            scene.body(rod, 1.0, (0.015, 0.015, 0.0005), com=(0, 0, np.linalg.norm(head - foot) - 0.25), **turned)
+            if k == 1:
+                scene.body(platform, 20.0, (0.8, 0.8, 1.5), position=floor + (0, 0, height))
+            scene.universal(foot_joint, below, cylinder, at=foot, axis=R[:, 0], second_axis=R[:, 1])
+            scene.prismatic(slider, cylinder, rod, at=foot, axis=leg)
+            scene.ball(head_joint, rod, platform, at=head)
+            scene.joint_spring(spring, slider, stiffness=stiffness)
+        below = platform
     return scene
 
 

@@ -29,10 +29,12 @@ def scenes() -> dict[str, Callable[[], gauss.Scene]]:
 _FAMILIES = (
     ("ladder of 10", "n_four_bar", 10),
     ("ladder of 40", "n_four_bar", 40),
+    ("ladder of 500", "n_four_bar", 500),
     ("hung chain of 100", "hung_chain", 100),
     ("random tree of 40", "random_tree", 40),
     ("delta robot", "delta_robot", None),
     ("Stewart platform", "stewart_platform", None),
+    ("20 Stewart platforms", "stewart_platform", 20),
     ("Andrews' squeezer", "andrews_squeezer", None),
     ("governor", "flyball_governor", None),
 )

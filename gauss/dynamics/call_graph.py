@@ -3,7 +3,8 @@
 Kernels of links and loops are traced once for each kind; the work grows with their number. The unit wrench of every row is
 carried inward along its branches, and u is its force on a joint of the branch: rows of loops that share no branch are
 uncoupled in S. The unit forces of couplings act along joints, and are carried inward likewise. S + μ is factored block by
-block, LDLᵀ, loops of least degree first: where few loops share a branch the factor has few blocks per loop.
+block, LDLᵀ, loops of least degree first: where few loops share a branch the factor has few blocks per loop. Where all loops
+are coupled, as of platforms on each other, each is eliminated at its root (:mod:`gauss.dynamics.loop_fronts`).
 """
 
 from collections.abc import Callable
@@ -11,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.backends.structure import GROUND
-from gauss.codegen.kernels import BlockLDLT, CallRecorder, Operand
+from gauss.codegen.kernels import CallRecorder, Operand
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.coupling_calls import CouplingCalls
 from gauss.dynamics.link_frames import joint_sides, link_frames
@@ -23,11 +24,12 @@ from gauss.dynamics.link_kernels import (
     link_acceleration,
     pose,
     residual_force,
-    row_inward,
 )
+from gauss.dynamics.loop_fronts import LoopFronts
 from gauss.dynamics.loop_kernels import GROUND_POSE, LoopJointKind, loop_joint_numbers
 from gauss.dynamics.tree_recursion import link_numbers, link_of
 from gauss.system import Subsystem
+from gauss.system.elimination_cost import elimination_roots
 
 MOST_LINK_KINDS = 24  # beyond, links are not distinguished by the zeros among their constants
 DAMPED = float(np.sqrt(MU))  # regularisation: along rows with smaller pivots accelerations are undetermined
@@ -92,7 +94,7 @@ class CallGraph:
                 found[member] = self.recorder.operand(entries)
         return found
 
-    def _at_link(self, name: str, body: int, function: Callable, *arguments):
+    def at_link(self, name: str, body: int, function: Callable, *arguments):
         """Call of a kernel (link, pair, forward, …) at a link."""
         pair, forward = self.joint[body].pair, body == self.joint[body].child
         return self.recorder.call(
@@ -111,11 +113,11 @@ class CallGraph:
             *arguments,
         )
 
-    def _inward(self, name: str, body: int, function: Callable, *arguments):
+    def inward(self, name: str, body: int, function: Callable, *arguments):
         """The same where the last result is for the inner link; at the root it is left out."""
         if self.inner[body] >= 0:
-            return self._at_link(name, body, function, *arguments)
-        return *self._at_link(f"{name} root", body, lambda *given: function(*given)[:-1], *arguments), None
+            return self.at_link(name, body, function, *arguments)
+        return *self.at_link(f"{name} root", body, lambda *given: function(*given)[:-1], *arguments), None
 
     def _own(self, vector, body: int):
         """Part of a vector of coordinates or rates that belongs to the joint of a link."""
@@ -129,25 +131,24 @@ class CallGraph:
         self._kinematics()
         self._eliminate()
         self._loop_wrenches()
-        self._delassus()
-        self.factors = {MU: BlockLDLT(self.recorder, self.S, MU)}
+        self.factors = {MU: LoopFronts(self, MU, dict(zip(self.rows, elimination_roots(self.subsystem), strict=True)))}
 
     def _kinematics(self):
         self.omega, self.kinematics, self.bias, self.gyro = {GROUND: np.zeros(3)}, {}, {}, {}
         for edge in self.edges:
             body = edge.outer
-            R, p, S, self.bias[body], self.omega[body], self.gyro[body] = self._at_link(
+            R, p, S, self.bias[body], self.omega[body], self.gyro[body] = self.at_link(
                 "pass", body, forward_kinematics, self._own(self.q, body), self._own(self.v, body), self.omega[edge.inner]
             )
             self.kinematics[body] = R, p, S
 
     def _eliminate(self):
-        collected = {body: np.zeros(21) for body in (GROUND, *self.order)}
+        self.collected = collected = {body: np.zeros(21) for body in (GROUND, *self.order)}  # inertia of links beyond
         self.eliminated = {}
         for edge in reversed(self.edges):
             body, inner = edge.outer, edge.inner
             more = collected[inner]
-            *found, moved = self._inward("eliminate", body, eliminate_link, *self.kinematics[body], collected[body], more)
+            *found, moved = self.inward("eliminate", body, eliminate_link, *self.kinematics[body], collected[body], more)
             self.eliminated[body] = found
             if inner >= 0:
                 collected[inner] = moved
@@ -167,7 +168,7 @@ class CallGraph:
         self.rows |= {block: ends[-1] + members for block, members in self.couplings.members.items()}
         self.scale |= self.couplings.scale
 
-    def _unit_forces(self):
+    def unit_forces(self):
         """Unit wrenches (6, m) on links, and unit forces along joints of the tree, {body: (1, m)}, of each block of rows."""
         for index, wrenches in self.held.items():
             yield index, wrenches, {}
@@ -177,53 +178,34 @@ class CallGraph:
             for joint in along.keys() - outer.keys():
                 for body, free in self.free[joint].items():
                     (more,) = self.recorder.call("along loop joint", lambda free, own: (free @ own,), free, along[joint])
-                    wrenches[body] = self._sum(wrenches[body], more) if body in wrenches else more
+                    wrenches[body] = self.sum(wrenches[body], more) if body in wrenches else more
             none = self.couplings.no_wrenches[len(self.couplings.members[block])]
             yield block, {body: none for body in forces} | wrenches, forces
 
-    def _delassus(self):
-        """Blocks of S: unit wrenches of each block of rows, carried inward along its branches."""
-        joint_forces: dict[int, list] = {body: [] for body in self.order}
-        for index, wrenches, forces in self._unit_forces():
-            waiting = {body: wrench for body, wrench in wrenches.items() if body >= 0 and wrench.shape[1]}
-            while waiting:
-                body = max(waiting, key=self.order.__getitem__)
-                across, wrench = (*self.kinematics[body], *self.eliminated[body][:2]), waiting.pop(body)
-                along = forces.get(body, np.zeros((self.joint[body].pair.n_v, wrench.shape[1])))
-                u, onward = self._inward("carry row", body, row_inward, *across, wrench, along)
-                joint_forces[body].append((index, u))
-                inner = self.inner[body]
-                if inner >= 0:
-                    waiting[inner] = self._sum(waiting[inner], onward) if inner in waiting else onward
-        self._sum_blocks(joint_forces)
+    def path(self, body: int) -> list[int]:
+        """Links from one to the ground."""
+        found = [body]
+        while found[-1] != GROUND:
+            found.append(self.inner[found[-1]])
+        return found
 
-    def _sum_blocks(self, joint_forces: dict[int, list]):
-        """Sum the blocks uᵀ D⁻¹ w over the joints that two loops share."""
-        self.S: dict[tuple[int, int], Operand] = {}
-        for body, shares in joint_forces.items():
-            D_inverse = self.eliminated[body][1]
-            for i, (one, u) in enumerate(shares):
-                for other, w in shares[: i + 1]:
-                    key, first, second = ((one, other), u, w) if one >= other else ((other, one), w, u)
-                    known = self.S[key] if key in self.S else np.zeros((first.shape[1], second.shape[1]))
-                    (self.S[key],) = self.recorder.call("gram", _gram, known, first, D_inverse, second)
-
-    def _sum(self, one, other):
+    def sum(self, one, other) -> Operand:
+        """Record the sum of two arrays."""
         return self.recorder.call("sum", lambda a, b: (a + b,), one, other)[0]
 
     # --- sections evaluated on the factorisation
 
     def factor_damped(self):
         """Record the factorisation of S + DAMPED, which only checks need."""
-        self.factors[DAMPED] = BlockLDLT(self.recorder, self.S, DAMPED)
+        self.factors[DAMPED] = self.factors[MU].damped(DAMPED)
 
     def multipliers(self, residual, mu: float = MU) -> np.ndarray:
         """Record (S + μ 1)⁻¹ residual, with scaled rows; μ is MU, or that of :meth:`factor_damped`."""
-        return self._joined(self.factors[mu].solve({i: part for i, part in self._rows_of(residual).items() if part.size}))
+        return self.joined(self.factors[mu].solve({i: part for i, part in self.rows_of(residual).items() if part.size}))
 
     def motion(self, tau, multipliers, still: bool) -> tuple[np.ndarray, np.ndarray]:
         """Record joint accelerations (n_v,) under forces, and the residual of the scaled rows; still: by forces alone."""
-        nothing, tau = np.zeros(6), self.couplings.less_forces(tau, self._rows_of(multipliers))
+        nothing, tau = np.zeros(6), self.couplings.less_forces(tau, self.rows_of(multipliers))
         forces = self._with_loop_forces(
             {body: nothing if still else self.gyro[body] for body in self.order}, tau, multipliers
         )
@@ -233,7 +215,7 @@ class CallGraph:
             bias = nothing if still else self.bias[body]
             more = forces[inner] if inner >= 0 else nothing
             across, driven = (*self.kinematics[body], *self.eliminated[body]), self._own(tau, body)
-            u[body], onward = self._inward("pull", body, force, *across, forces[body], bias, driven, more)
+            u[body], onward = self.inward("pull", body, force, *across, forces[body], bias, driven, more)
             if inner >= 0:
                 forces[inner] = onward
         accelerations, rates = {GROUND: nothing if still else self.weight}, self._none()
@@ -241,20 +223,20 @@ class CallGraph:
             body = edge.outer
             bias = nothing if still else self.bias[body]
             across, before = (*self.kinematics[body], *self.eliminated[body][:2]), accelerations[edge.inner]
-            own, accelerations[body] = self._at_link("carry", body, acceleration, *across, u[body], bias, before)
+            own, accelerations[body] = self.at_link("carry", body, acceleration, *across, u[body], bias, before)
             rates[self.joint[body].v] = self.recorder.array(own)
         return rates, self._values(rates, accelerations, still)
 
     def residual(self, rates, multipliers, tau) -> tuple[np.ndarray, np.ndarray]:
         """Record the residuals of the equations of motion (n_v,), by inverse dynamics, and of the scaled rows."""
         accelerations = self._accelerations(rates, still=False)
-        tau = self.couplings.less_forces(tau, self._rows_of(multipliers))
+        tau = self.couplings.less_forces(tau, self.rows_of(multipliers))
         forces = self._with_loop_forces({body: np.zeros(6) for body in self.order}, tau, multipliers)
         residual = self._none()
         for edge in reversed(self.edges):
             body, inner = edge.outer, edge.inner
             place, more = self.joint[body].v, forces[inner] if inner >= 0 else np.zeros(6)
-            own, onward = self._inward(
+            own, onward = self.inward(
                 "balance",
                 body,
                 residual_force,
@@ -280,19 +262,19 @@ class CallGraph:
         poses = {GROUND: GROUND_POSE}
         for edge in self.edges:
             body = edge.outer
-            (poses[body],) = self._at_link("pose", body, pose, self._own(self.q, body), poses[edge.inner])
+            (poses[body],) = self.at_link("pose", body, pose, self._own(self.q, body), poses[edge.inner])
         residuals, off = self.couplings.position_residuals(self.q), self._none()
         for index in self.loops:
             joint = self.subsystem.joints[index]
             here = poses[joint.parent], poses[joint.child]
             residuals[index], along = self._at_loop("gap", index, LoopJointKind.position_residual, self.q[joint.q], *here)
             off[joint.v] = self.recorder.array(along)
-        return self._joined(residuals), off
+        return self.joined(residuals), off
 
     @property
     def scales(self) -> np.ndarray:
         """Factors of the rows."""
-        return self._joined(self.scale)
+        return self.joined(self.scale)
 
     def _accelerations(self, rates, still: bool):
         nothing = np.zeros(6)
@@ -300,7 +282,7 @@ class CallGraph:
         for edge in self.edges:
             body = edge.outer
             bias = nothing if still else self.bias[body]
-            (found[body],) = self._at_link(
+            (found[body],) = self.at_link(
                 "outward",
                 body,
                 link_acceleration,
@@ -313,7 +295,7 @@ class CallGraph:
 
     def _with_loop_forces(self, forces, tau, multipliers):
         """Forces on links, plus those of the multipliers, less generalised forces along loop joints."""
-        parts = self._rows_of(multipliers)
+        parts = self.rows_of(multipliers)
         for index in self.loops:
             for body, held in self.held[index].items():
                 if body >= 0:
@@ -335,9 +317,9 @@ class CallGraph:
                 f"value {still}", index, function, self.q[joint.q], self.v[joint.v], self.scale[index], *motions
             )
             rates[joint.v] = self.recorder.array(own)
-        return self._joined(values | self.couplings.values(rates))
+        return self.joined(values | self.couplings.values(rates))
 
-    def _joined(self, blocks: dict) -> np.ndarray:
+    def joined(self, blocks: dict) -> np.ndarray:
         """Object array (m,) of all rows, given by blocks."""
         found = np.zeros(sum(map(len, self.rows.values()))).astype(object)
         for index, block in blocks.items():
@@ -347,7 +329,8 @@ class CallGraph:
     def _block(self, vector):
         return vector if isinstance(vector, Operand) else self.recorder.operand(vector)
 
-    def _rows_of(self, vector) -> dict[int, np.ndarray]:
+    def rows_of(self, vector) -> dict[int, np.ndarray]:
+        """Parts of a vector of all rows, by block."""
         return {index: vector[rows] for index, rows in self.rows.items()}
 
     def _along_tree(self, rates) -> np.ndarray:
@@ -359,10 +342,6 @@ class CallGraph:
 
     def _none(self) -> np.ndarray:
         return np.zeros(self.subsystem.n_v).astype(object)
-
-
-def _gram(known, one, D_inverse, other):
-    return (known + one.T @ D_inverse @ other,)
 
 
 def _with_wrenches(force, held, multipliers, free, tau):

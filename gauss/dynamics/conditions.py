@@ -23,16 +23,16 @@ from gauss.scene.contact_pairs import have_closed_form
 from gauss.scene.patch_distances import no_closed_form
 from gauss.system import System, build, phase_scene, sides, whole
 from gauss.system.contact_gaps import of_shapes, slips
-from gauss.system.elimination_cost import MOST_WORK
+from gauss.system.elimination_cost import MOST_SHARED_JOINTS, MOST_WORK
 
 LARGE_TREE_BODIES = (
     40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
 )
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
 MOST_COUPLING_WORK = 10_000  # operations for couplings above which kernels are as fast, and compiled in a fifth of the time
-# Pairs of loops that share a joint of the tree, per body, above which kernels of loops are slower than straight-line code,
-# and, where this is too long, up to which they are made within seconds
-MOST_SHARED_JOINTS, MOST_SHARED_BY_KERNELS = 100, 500
+# Pairs of loops that share a joint of the tree, per body, up to which kernels of loops are made within seconds; they are
+# slower than straight-line code above MOST_SHARED_JOINTS
+MOST_SHARED_BY_KERNELS = 500
 WIDEST = 128  # rates up to which steps are compiled whose code grows faster than the scene, as by their dense matrices
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
@@ -83,7 +83,7 @@ def has_large_loops(system) -> bool:
         return False
     if _share_few_joints(subsystems):
         return True
-    return _share_few_joints(subsystems, MOST_SHARED_BY_KERNELS) and _loop_work(subsystems) > MOST_WORK
+    return _share_few_joints_in_kernels(subsystems) and _loop_work(subsystems) > MOST_WORK
 
 
 def obstacles(system) -> list[str]:
@@ -116,9 +116,15 @@ def _coupling_work(subsystems) -> int:
     return _loop_work(coupled) - _loop_work([replace(subsystem, couplings=()) for subsystem in coupled])
 
 
-def _share_few_joints(subsystems, most: int = MOST_SHARED_JOINTS) -> bool:
-    """Whether no more pairs of loops share a joint of the tree than so many per body."""
-    return sum(subsystem.shared_joints for subsystem in subsystems) <= most * _n_bodies(subsystems)
+def _share_few_joints(subsystems) -> bool:
+    """Whether few pairs of loops share a joint of the tree."""
+    return sum(subsystem.shared_joints for subsystem in subsystems) <= MOST_SHARED_JOINTS * _n_bodies(subsystems)
+
+
+def _share_few_joints_in_kernels(subsystems) -> bool:
+    """Whether few do where kernels eliminate loops that stand on each other one after the other."""
+    shared = sum(subsystem.joints_shared_in_kernels for subsystem in subsystems)
+    return shared <= MOST_SHARED_BY_KERNELS * _n_bodies(subsystems)
 
 
 def _n_bodies(subsystems) -> int:

@@ -6,7 +6,7 @@ and its neighbours.
 
 import numpy as np
 
-from gauss.dynamics.aba import Elimination, add, eliminate, inertia_to_inner
+from gauss.dynamics.aba import Elimination, add, blocks, eliminate, inertia_to_inner
 from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.dynamics.tree_recursion import UPPER, symmetric
 
@@ -45,6 +45,11 @@ def _inertia(numbers):
 def _flat(inertia) -> np.ndarray:
     A, B, C = inertia
     return np.concatenate([A[UPPER], B.ravel(), C[UPPER]])
+
+
+def add_to_inertia(collected, H, across):
+    """Articulated inertia with the product H (6, m) across (m, 6) added, one share of a symmetric sum."""
+    return collected + _flat(blocks(H @ across))
 
 
 def row_inward(link, pair, forward, R, p, S, U, D_inverse, wrenches, forces):

@@ -8,6 +8,7 @@ from gauss.backends.structure import GROUND
 
 MOST_ROWS = 6  # of a block of couplings, as of a loop joint
 MOST_WORK = 250_000  # operations: traced in a few seconds
+MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per body, up to which K M⁻¹ Kᵀ is sparse
 OPERATIONS_PER_LINK = 30  # for the response of one link to one loop constraint
 
 
@@ -58,19 +59,51 @@ def _closing_groups(subsystem) -> list[tuple[int, set[int]]]:
 
 def shared_joints(subsystem) -> int:
     """Number of pairs of loops that share a joint of the tree, summed over the joints: blocks of the sum K M⁻¹ Kᵀ."""
-    inner = {edge.outer: edge.inner for edge in subsystem.tree}
+    loops = _loop_paths(subsystem)
+    return _shared_joints(loops, [GROUND for _ in loops])
+
+
+def joints_shared_in_kernels(subsystem) -> int:
+    """The same where each loop is eliminated at its link of :func:`elimination_roots`."""
+    return _shared_joints(_loop_paths(subsystem), elimination_roots(subsystem))
+
+
+def elimination_roots(subsystem) -> list[int]:
+    """Link at which kernels eliminate each loop joint and block of couplings: the ground, or the innermost of its loop.
+
+    Where few loops share a joint all are eliminated together, K M⁻¹ Kᵀ being sparse. Loops that stand on each other, as
+    stacked platforms, are all coupled there, and are eliminated one after the other.
+    """
+    if subsystem.shared_joints > MOST_SHARED_JOINTS * subsystem.n_bodies:
+        return innermost_links(subsystem)
+    return [GROUND for _ in _loop_paths(subsystem)]
+
+
+def innermost_links(subsystem) -> list[int]:
+    """Link of each loop, by loop joint and block of couplings, that is nearest to the ground; the ground itself is one."""
+    return [next(body for body in some[0] if all(body in path for path in some)) for some in _loop_paths(subsystem)]
+
+
+def _shared_joints(loops, roots) -> int:
     crossed: Counter = Counter()
-    loops = [{subsystem.joints[index].parent, subsystem.joints[index].child} for index in subsystem.loop_joints]
-    coupled = [set().union(*(_coupled_bodies(subsystem, int(k)) for k in block)) for block in coupling_blocks(subsystem)]
-    for ends in loops + coupled:
-        bodies = set()
-        for end in ends:
-            body = end
-            while body != GROUND and body not in bodies:
-                bodies.add(body)
-                body = inner[body]
-        crossed.update(bodies)
+    for paths, root in zip(loops, roots, strict=True):
+        crossed.update({body for path in paths for body in path[: path.index(root)]})
     return sum(count**2 for count in crossed.values())
+
+
+def _loop_paths(subsystem) -> list[list[list[int]]]:
+    """Links from each body on the joints of each loop joint and block of couplings to the ground."""
+    inner = {edge.outer: edge.inner for edge in subsystem.tree}
+
+    def path(body: int) -> list[int]:
+        found = [body]
+        while found[-1] != GROUND:
+            found.append(inner[found[-1]])
+        return found
+
+    loops = [{subsystem.joints[index].parent, subsystem.joints[index].child} for index in subsystem.loop_joints]
+    loops += [set().union(*(_coupled_bodies(subsystem, int(k)) for k in block)) for block in coupling_blocks(subsystem)]
+    return [[path(body) for body in ends] for ends in loops]
 
 
 def coupling_blocks(subsystem) -> list[np.ndarray]:

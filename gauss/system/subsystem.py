@@ -15,7 +15,7 @@ import numpy as np
 from gauss.backends.structure import GROUND, Edge
 from gauss.errors import StateError
 from gauss.scene import Coupling
-from gauss.system.elimination_cost import loop_elimination_work, shared_joints
+from gauss.system.elimination_cost import joints_shared_in_kernels, loop_elimination_work, shared_joints
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
 from gauss.versions import FormerAttribute
 
@@ -133,6 +133,11 @@ class Subsystem:
     def shared_joints(self) -> int:
         """Pairs of loops that share a joint of the tree, summed over the joints."""
         return shared_joints(self)
+
+    @cached_property
+    def joints_shared_in_kernels(self) -> int:
+        """The same where kernels eliminate loops that stand on each other one after the other."""
+        return joints_shared_in_kernels(self)
 
     def has(self, name: str) -> bool:
         """Whether it has a joint of this name."""

@@ -173,27 +173,7 @@ def ladder(n: int = 50):
 
 def platforms(count: int) -> gauss.Scene:
     """Stack of platforms, each on six legs with springs that stand on the one below."""
-    scene, below = gauss.Scene(f"stack of {count} platforms"), "ground"
-    feet, heads = np.deg2rad([-10, 10, 110, 130, 230, 250]), np.deg2rad([-50, 50, 70, 170, 190, 290])
-    for stage in range(count):
-        for k, (foot_angle, head_angle) in enumerate(zip(feet, heads, strict=True)):
-            name = f"{stage}.{k}"
-            foot = np.array([0.9 * np.cos(foot_angle), 0.9 * np.sin(foot_angle), stage])
-            head = np.array([0.6 * np.cos(head_angle), 0.6 * np.sin(head_angle), stage + 1.0])
-            leg = (head - foot) / np.linalg.norm(head - foot)
-            across = np.cross([0.0, 0.0, 1.0], leg) / np.hypot(leg[0], leg[1])
-            turned = {"position": foot, "rotation": np.column_stack([np.cross(across, leg), across, leg])}
-            scene.body(f"cylinder{name}", 2.0, (0.03, 0.03, 0.002), com=(0.0, 0.0, 0.25), **turned)
-            scene.body(f"rod{name}", 1.0, (0.015, 0.015, 0.0005), com=(0.0, 0.0, 0.8), **turned)
-            if not k:
-                scene.body(f"platform{stage}", 20.0, (0.8, 0.8, 1.5), position=(0.0, 0.0, stage + 1.0))
-            axes = {"axis": turned["rotation"][:, 0], "second_axis": across}
-            scene.universal(f"foot{name}", below, f"cylinder{name}", at=foot, **axes)
-            scene.prismatic(f"leg{name}", f"cylinder{name}", f"rod{name}", at=foot, axis=leg)
-            scene.ball(f"head{name}", f"rod{name}", f"platform{stage}", at=head)
-            scene.joint_spring(f"spring{name}", f"leg{name}", stiffness=4e4)
-        below = f"platform{stage}"
-    return scene
+    return gauss.load("stewart_platform", n=count, stiffness=4e4)
 
 
 def mass_matrix(system, q) -> np.ndarray:
