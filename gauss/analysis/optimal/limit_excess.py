@@ -57,7 +57,7 @@ def warn_of_excess(found: Sequence[LimitExcess], accepted: float):
     Warns
     -----
     LimitWarning
-        With what is beyond its limit most.
+        Names what exceeds its limit most.
     """
     worst = max(found, key=lambda one: one.largest)
     if worst.largest > accepted:

@@ -15,7 +15,7 @@ from gauss.bench.suite.optimality import certificate_residual, ray_residual, res
 from gauss.bench.suite.refine import refined
 from gauss.errors import BackendError, did_you_mean
 
-VERSION = "1.0.0"  # of the suite: another number for other numbers
+VERSION = "1.0.0"  # of the random numbers of the suite
 CLASSES = {
     "equality": "Accelerations of open and closed mechanisms: equality rows alone, all independent.",
     "scales": "The same mechanisms in other units, and with masses up to twelve orders apart.",

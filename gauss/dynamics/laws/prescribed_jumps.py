@@ -23,7 +23,7 @@ from gauss.system import State, System, retract, sides
 RELATIVE = 1e-10  # of the largest coordinate, or velocity, in a row: a smaller change may be rounding in the law
 SMOOTH = 4.0  # ratio to the change over an equal time beside the switching time: a smaller one may be the slope of the law
 LOOKS = 33  # times at which magnitudes of laws are sampled, besides switching times
-CONTRADICTION = 1e-6  # velocity residual after a jump, relative to the scales of the rows: more is no rounding
+CONTRADICTION = 1e-6  # velocity residual after a jump, relative to the scales of the rows: a larger one is no rounding
 
 
 @dataclass(frozen=True)
