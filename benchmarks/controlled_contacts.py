@@ -11,7 +11,6 @@ Drake is installed, its error-controlled integrator CENIC (benchmarks/cenic.py).
 measured, the least of the rounds. Writes benchmarks/results/controlled_contacts.csv, .md and .png.
 """
 
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -22,6 +21,7 @@ import numpy as np
 import gauss
 from benchmarks import cenic
 from benchmarks.command import RESULTS, command
+from gauss.bench.contest import duration
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, in_time, table
 
@@ -145,11 +145,7 @@ def measure(rounds: int) -> tuple[list[dict], list[str]]:
     rows = []
     for (name, how, number), run in runs.items():
         exact = np.array([CASES[name].position(t) for t in np.linspace(0.0, CASES[name].duration, SAMPLES)])
-        found, least = run(), np.inf
-        for _ in range(rounds):
-            begun = time.process_time()
-            run()
-            least = min(least, time.process_time() - begun)
+        found, least = run(), min(duration(run) for _ in range(rounds))
         rows.append({"motion": name, "how": how, "given": number, "error": np.abs(found - exact).max(), "time": least})
     return rows, header("mujoco", "drake")
 

@@ -15,15 +15,15 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 
 import gauss
 from benchmarks.command import command, load_at_the_end
 from gauss import export
+from gauss.bench.contest import Competitor, interleaved, repeated
 from gauss.bench.machine import header
-from gauss.bench.markdown import head
+from gauss.bench.markdown import head, table
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
 from models import families
@@ -42,14 +42,8 @@ def panda(inputs: bool = False) -> gauss.Scene:
 
 def least(rounds: int, *calls: Callable, repeats: int = 1) -> list[float]:
     """Least processor time of each call [s], taken in turn."""
-    found = np.full((rounds, len(calls)), np.inf)
-    for row in found:
-        for k, call in enumerate(calls):
-            began = process_time()
-            for _ in range(repeats):
-                call()
-            row[k] = (process_time() - began) / repeats
-    return found.min(axis=0).tolist()
+    found = interleaved({k: Competitor(repeated(call, repeats), repeats) for k, call in enumerate(calls)}, rounds)
+    return [min(found[k]) for k in range(len(calls))]
 
 
 MODELS = [
@@ -170,13 +164,13 @@ def measure(rounds: int) -> tuple[list[dict], list[str]]:
 
 def page(rows: list[dict], conditions: list[str]) -> list[str]:
     """The table as a page."""
-    lines = [*head("From simulation to design", conditions), "| Panda | measured | goal |", "|---|---|---|"]
+    lines = []
     for row in rows:
         value = float(row["value"])
         shown = f"{value * 1e6:.3g} µs" if row["unit"] and value < 1e-3 else f"{value:.3g} {row['unit']}".strip()
         goal = "" if row["goal"] in ("", None) else f"≤ {float(row['goal']):g} {row['unit']}".strip()
-        lines.append(f"| {row['line']} | {shown} | {goal} |")
-    return [*lines, ""]
+        lines.append((row["line"], shown, goal))
+    return [*head("From simulation to design", conditions), *table(("Panda", "measured", "goal"), lines), ""]
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ import mujoco
 import gauss
 from benchmarks.foreign_accelerations import NotCompared, deviation
 from benchmarks.foreign_urdf import deviation_of_urdf, is_refused_by_parser, opened_urdf
+from gauss.bench.markdown import table
 from gauss.errors import GaussError
 
 RESULTS = Path(__file__).parent / "results"
@@ -155,9 +156,8 @@ def page(found: list[FileRecord]) -> list[str]:
     """Page of the results."""
     about = (__doc__ or "").split("\n")[6:]
     lines = ["# Model files of others", "", *about, f"gauss {gauss.__version__}, MuJoCo {mujoco.__version__}.", ""]
-    lines += [f"| source | files | {' | '.join((*STATES, *APART))} | of those that move, open |"]
-    lines += ["|---" * (3 + len(STATES + APART)) + "|"]
-    lines += [_row(name, [one for one in found if name in (one.source, _format(one), "all")]) for name in _sources(found)]
+    rows = [_row(name, [one for one in found if name in (one.source, _format(one), "all")]) for name in _sources(found)]
+    lines += table(("source", "files", *STATES, *APART, "of those that move, open"), rows)
     trees = [one.deviation for one in found if one.status == "agreed" and not one.has_loops]
     loops = [one.deviation for one in found if one.status == "agreed" and one.has_loops]
     lines += ["", "Largest relative deviation of accelerations of those that agree: "]
@@ -177,30 +177,29 @@ def _needs(found: list[FileRecord]) -> list[str]:
     """Options of the URDF files that open."""
     robots = [one for one in found if _format(one) == "URDF" and one.status in ("agreed", "opened", "differs")]
     count = Counter(", ".join(one.reasons) or "none" for one in robots)
-    rows = [f"| {options} | {number} |" for options, number in count.most_common()]
-    return ["| options that a URDF file needs | files |", "|---|---|", *rows, ""] if rows else []
+    return [*table(("options that a URDF file needs", "files"), count.most_common()), ""] if count else []
 
 
-def _row(source: str, own: list[FileRecord]) -> str:
+def _row(source: str, own: list[FileRecord]) -> tuple:
     count = Counter(one.status for one in own)
     good = count["agreed"] + count["opened"] + count["differs"]
     moving = good + count["refused"] + count["too slow"] + count["crashed"]
-    numbers = " | ".join(str(count[status]) for status in (*STATES, *APART))
-    return f"| {source} | {len(own)} | {numbers} | {good} of {moving}: {100 * good / max(moving, 1):.0f} % |"
+    numbers = [count[status] for status in (*STATES, *APART)]
+    return source, len(own), *numbers, f"{good} of {moving}: {100 * good / max(moving, 1):.0f} %"
 
 
 def _refusals(found: list[FileRecord]) -> list[str]:
     refused = [one.reasons for one in found if one.status == "refused"]
     alone = Counter(one[0] for one in refused if len(one) == 1)
     count = Counter(reason for one in refused for reason in one)
-    rows = [f"| {reason.replace('|', '/')} | {number} | {alone[reason]} |" for reason, number in count.most_common()]
-    return ["| refused for | files | alone |", "|---|---|---|", *rows]
+    rows = [(reason, number, alone[reason]) for reason, number in count.most_common()]
+    return table(("refused for", "files", "alone"), rows)
 
 
 def _exceptions(found: list[FileRecord]) -> list[str]:
     odd = [one for one in found if one.status in ("differs", "crashed", "too slow")]
-    rows = [f"| {one.source}/{one.path} | {one.status} | {one.deviation:.1e} {' '.join(one.reasons)} |" for one in odd]
-    return ["", "| file | status | |", "|---|---|---|", *rows] if rows else []
+    rows = [(f"{one.source}/{one.path}", one.status, f"{one.deviation:.1e} {' '.join(one.reasons)}") for one in odd]
+    return ["", *table(("file", "status", ""), rows)] if rows else []
 
 
 def _too_slow(*_):

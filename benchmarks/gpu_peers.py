@@ -13,6 +13,7 @@ from statistics import median
 import numpy as np
 
 import gauss
+from gauss.bench.contest import duration
 
 OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "SPRING", "DAMPER", "PASSIVE", "ACTUATION", "CLAMPCTRL", "SENSOR")  # of MuJoCo
 PEERS: dict[str, Callable] = {}
@@ -36,12 +37,7 @@ def rows(
 
 def seconds(run: Callable, rounds: int) -> float:
     """Median time of a run by the clock."""
-    times = []
-    for _ in range(rounds):
-        began = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - began)
-    return median(times)
+    return median(duration(run, time.perf_counter) for _ in range(rounds))
 
 
 def _model(scene: gauss.Scene, step: float):

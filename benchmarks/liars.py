@@ -8,10 +8,10 @@ tells two hundred of them in the test suite, and besides answers of other shapes
 is given.
 """
 
-import time
 from collections import Counter
 
 from benchmarks.command import command
+from gauss.bench.contest import with_time
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
 from tests.validation.test_liars import made, outcomes
@@ -21,10 +21,8 @@ COUNT = {"count": (10_000, "lies"), "seed": (1, "another seed, other lies")}
 
 def measure(count: int, seed: int) -> tuple[list[dict], list[str]]:
     """Tell lies; rows of kinds, problems and outcomes with their numbers."""
-    begin = time.process_time()
-    found = outcomes(made(), count, seed)
+    found, seconds = with_time(lambda: outcomes(made(), count, seed))
     rows = [dict(zip(("lie", "problem", "outcome"), key, strict=True)) | {"count": n} for key, n in sorted(found.items())]
-    seconds = time.process_time() - begin
     return rows, [*header("numpy", "scipy"), f"{count} lies, seed {seed}, {seconds:.0f} s of CPU time"]
 
 

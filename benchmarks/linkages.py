@@ -17,7 +17,6 @@ four-bar's cycle.
 """
 
 import os
-import time
 from statistics import median
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -26,7 +25,7 @@ import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
 from benchmarks.command import RESULTS, command  # noqa: E402
-from gauss.bench.contest import Competitor, interleaved, repeated  # noqa: E402
+from gauss.bench.contest import Competitor, interleaved, repeated, with_time  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head  # noqa: E402
 from gauss.io import linkages  # noqa: E402
@@ -46,9 +45,7 @@ def measured(name: str, rounds: int) -> dict:
     linkage = gauss.load_linkage(name)
     angles = np.linspace(0.0, 2 * np.pi, ANGLES, endpoint=False)
     found = linkage.cycle(angles)
-    begin = time.process_time()
-    kernel = cycle_kernel(linkage.chain)
-    made = time.process_time() - begin
+    kernel, made = with_time(lambda: cycle_kernel(linkage.chain))
     rows = [angles, found.motion.crank_speed, np.zeros(ANGLES)]
     inputs = np.array(rows + [row for pose in near(linkage.chain, angles).values() for row in pose])
     equation = ReducedLinkage(linkage.chain)

@@ -15,7 +15,6 @@ over the largest acceleration. Writes benchmarks/results/rotors.csv and .md, and
 """
 
 import os
-import time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -23,7 +22,7 @@ import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
 from benchmarks.command import RESULTS, command  # noqa: E402
-from gauss.bench.contest import Competitor, interleaved, repeated  # noqa: E402
+from gauss.bench.contest import Competitor, interleaved, repeated, with_time  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head  # noqa: E402
 from gauss.rotors import Linear, Network, Viscous, simulate  # noqa: E402
@@ -62,9 +61,7 @@ class MeasuredChain:
     def __init__(self, n: int):
         self.n, network = n, chain(n)
         reduced = reduce(network)
-        begin = time.process_time()
-        self.equations = NetworkEquations(reduced, compiled=True)
-        self.compiling = time.process_time() - begin
+        self.equations, self.compiling = with_time(lambda: NetworkEquations(reduced, compiled=True))
         self.run = RotorRun(self.equations, "dop853", 1e-9, (1e-9, 1e-9), np.inf, switching(reduced, 1.0, 1e-9))
         self.run.start()
         self.plain = NetworkEquations(reduced, compiled=False)

@@ -16,12 +16,14 @@ made both ways are compared. Writes benchmarks/results/sweeps.csv and .md.
 import os
 import tempfile
 import time
+from functools import partial
 from statistics import median
 from typing import Any
 
 import numpy as np
 
-from benchmarks.command import command
+from benchmarks.command import command, load_at_the_end
+from gauss.bench.contest import with_time
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
 
@@ -74,9 +76,9 @@ def measure(side: int, singles: int) -> list[dict]:
                 rows.append({"what": what, "way": "single", "members": 1, "wall_s": wall})
 
         batch(chosen[: singles // 2])
-        begin = time.perf_counter()
-        swept = gauss.sweep(scene, values, DURATION, samples=SAMPLES, workers=WORKERS, progress=False, **RUN)
-        rows.append({"what": what, "way": "sweep", "members": side * side, "wall_s": time.perf_counter() - begin})
+        sweep = partial(gauss.sweep, scene, values, DURATION, samples=SAMPLES, workers=WORKERS, progress=False, **RUN)
+        swept, wall = with_time(sweep, time.perf_counter)
+        rows.append({"what": what, "way": "sweep", "members": side * side, "wall_s": wall})
         batch(chosen[singles // 2 :])
         assert (swept.status == 1).all()
         worst = max(np.abs(swept.q.sel(member).values - motion.q).max() for member, motion in motions)
@@ -108,7 +110,7 @@ def measured(side: int, singles: int) -> tuple[list[dict], list[str]]:
     with tempfile.TemporaryDirectory() as folder:
         os.environ["GAUSS_CACHE"] = folder
         rows = measure(side, singles)
-    return rows, [*header("numpy", "llvmlite", "xarray", "loky"), f"load before the end: {os.getloadavg()[0]:.1f}"]
+    return rows, [*header("numpy", "llvmlite", "xarray", "loky"), load_at_the_end()]
 
 
 if __name__ == "__main__":

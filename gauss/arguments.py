@@ -87,6 +87,8 @@ def real_numbers(value) -> np.ndarray | None:
 def real_array(value, what: str, expected: str = "numbers") -> np.ndarray:
     """Array of real numbers.
 
+    ArgumentError if it is none: text, objects, complex or masked numbers, rows of several lengths.
+
     Parameters
     ----------
     value : array_like
@@ -95,11 +97,6 @@ def real_array(value, what: str, expected: str = "numbers") -> np.ndarray:
         Function and argument, for the message.
     expected : str
         What is expected, in words.
-
-    Raises
-    ------
-    ArgumentError
-        If it is none: text, objects, complex or masked numbers, rows of several lengths.
     """
     found = real_numbers(value)
     if found is not None:
@@ -127,10 +124,7 @@ def table(value, what: str, expected: str) -> dict:
 def name_list(value, what: str, expected: str = "names") -> tuple[str, ...]:
     """Names, of one text or of several; none for None.
 
-    Raises
-    ------
-    ArgumentError
-        If one is no text.
+    ArgumentError if one is no text.
     """
     if isinstance(value, str) or value is None:
         return () if value is None else (value,)
@@ -142,10 +136,7 @@ def name_list(value, what: str, expected: str = "names") -> tuple[str, ...]:
 def generator(seed, what: str) -> np.random.Generator:
     """Generator of random numbers of a seed.
 
-    Raises
-    ------
-    ArgumentError
-        If the seed is no whole number ≥ 0, nor None for one that differs from call to call.
+    ArgumentError if the seed is no whole number ≥ 0, nor None for one that differs from call to call.
     """
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0):
         raise ArgumentError(f"{what}: seed: expected a whole number of at least 0, or None, got {seed!r:.80}.")

@@ -43,24 +43,12 @@ TOLERANCE = 1e-10  # relative difference of accelerations to Pinocchio's
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """One thing that was looked at."""
 
-    Parameters
-    ----------
-    name : str
-        What it is.
-    text : str
-        What was found.
-    remedy : str
-        What to do; empty where nothing is to be done.
-    works : bool
-        Whether gauss runs as it is.
-    """
-
-    name: str
-    text: str
-    remedy: str = ""
-    works: bool = True
+    name: str  # what it is
+    text: str  # what was found
+    remedy: str = ""  # what to do; empty where nothing is to be done
+    works: bool = True  # whether gauss runs as it is
 
 
 def examine() -> list[Finding]:

@@ -1,7 +1,6 @@
 """Measures all problems and writes the page."""
 
 import time
-from collections.abc import Callable
 from statistics import median
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 import benchmarks.iftomm
 import gauss
 from benchmarks.iftomm.problems import BenchmarkProblem
-from gauss.bench.contest import Competitor, interleaved
+from gauss.bench.contest import Competitor, interleaved, with_time
 from gauss.bench.markdown import formatted_table, head
 
 MARGIN = 100  # how many times less than asked errors should be
@@ -24,7 +23,7 @@ def measure(all_problems: list[BenchmarkProblem], rounds: int) -> list[dict]:
             system, problem.duration, times=problem.times, progress=False, **problem.settings
         )
         runs.append(run)
-        first, motion = _timed(run)
+        motion, first = with_time(run, time.perf_counter)
         energy, error = float(np.abs(gauss.energy(motion).balance).max()), problem.error(motion)
         rows.append(
             {
@@ -49,12 +48,6 @@ def measure(all_problems: list[BenchmarkProblem], rounds: int) -> list[dict]:
         row["wall_ms"] = 1e3 * median(walls[k])
         row["first_s"] -= median(walls[k])
     return rows
-
-
-def _timed(run: Callable) -> tuple[float, gauss.Trajectory]:
-    began = time.perf_counter()
-    motion = run()
-    return time.perf_counter() - began, motion
 
 
 COLUMNS = {

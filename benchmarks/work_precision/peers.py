@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Iterator
+from functools import partial
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from benchmarks.work_precision.scenes import TimedScene
+from gauss.bench.contest import with_time
 from gauss.bench.precision import LOST, REPEATS, TOLERANCES, Attempt, ReferencePositions
 from gauss.system import System
 
@@ -71,9 +73,8 @@ def _ladder(engine, method, settings, run, case, against, patience, made) -> Ite
             if engine == "heyoka":
                 run(method, setting, case.duration)  # makes its machine code
             for _ in range(1 + REPEATS):
-                began = time.perf_counter()
-                found = run(method, setting, case.duration)
-                best = min(best, time.perf_counter() - began)
+                found, seconds = with_time(partial(run, method, setting, case.duration), time.perf_counter)
+                best = min(best, seconds)
                 found = found() if callable(found) else found
                 if best > patience / 10:
                     break

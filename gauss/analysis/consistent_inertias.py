@@ -48,6 +48,8 @@ def nearest_consistent(rows: np.ndarray, right: np.ndarray, prior: np.ndarray, n
     Where bodies meet the rows, the distance of the other directions from the guess is least; else that of rows, with a small
     weight of that distance.
 
+    SimulationError if the solver ends without a solution.
+
     Parameters
     ----------
     rows, right : ndarray, shape (r, p), (r,)
@@ -61,11 +63,6 @@ def nearest_consistent(rows: np.ndarray, right: np.ndarray, prior: np.ndarray, n
     -------
     ndarray, shape (p,)
         Parameters whose pseudo-inertias are positive semidefinite.
-
-    Raises
-    ------
-    SimulationError
-        If the solver ends without a solution.
     """
     U, sizes, V = np.linalg.svd(rows)
     r, size = len(right), sizes[0]

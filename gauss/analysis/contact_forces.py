@@ -77,18 +77,11 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
 
 
 class GapForces(NamedTuple):
-    """Forces of all gaps along a motion.
+    """Forces of all gaps along a motion."""
 
-    Attributes
-    ----------
-    values, ambiguous : ndarray, shape (k, g)
-        Forces, and whether they are not unique.
-    solutions : dict
-        Solution of each sample with closed gaps, and these gaps, by its index.
-    """
-
-    values: np.ndarray
+    values: np.ndarray  # values, ambiguous (k, g): forces, and whether they are not unique
     ambiguous: np.ndarray
+    # solution of each sample with closed gaps, and these gaps, by its index
     solutions: dict[int, tuple[Solution, np.ndarray]]
 
 

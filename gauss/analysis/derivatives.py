@@ -83,6 +83,8 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
 class AccelerationChanges:
     """Changes of the accelerations of a system in one state.
 
+    SimulationError, StateError as :func:`derivatives`.
+
     Parameters
     ----------
     system, state, load
@@ -92,11 +94,6 @@ class AccelerationChanges:
     ----------
     system : System
         The system of the contact mode in this state, in which sticking elements are constraints.
-
-    Raises
-    ------
-    SimulationError, StateError
-        As :func:`derivatives`.
     """
 
     def __init__(self, system: System, state: State, load=None):
@@ -121,10 +118,7 @@ class AccelerationChanges:
         Where rows are redundant, directions along the constraints keep their digits; along others these rows contradict each
         other, and their multipliers are large.
 
-        Raises
-        ------
-        SimulationError
-            If the changes are not determined.
+        SimulationError if the changes are not determined.
         """
         system, laws, state = self.system, self.laws, self.state
         if not system.n_v:

@@ -21,10 +21,7 @@ OF_ELEMENTS = {"bodies": ("mass", "com"), "contacts": ("restitution", "lowest", 
 def derivative_of(scene: Scene, name: str) -> tuple[str, int] | None:
     """Parameter of :func:`gauss.sensitivities` for a number such as "floor.restitution", and its entry; None for the start.
 
-    Raises
-    ------
-    ArgumentError
-        If there is no derivative by it through events.
+    ArgumentError if there is no derivative by it through events.
     """
     if is_start(scene, name):
         return None

@@ -214,7 +214,7 @@ class FitProblem:
         less, more = (self._if_valid(p) for p in pair)
         if less is None and more is None:
             raise StateError(
-                f"fit_motion: {name!r} alone can be neither more nor less, as an inertia of a thin rod: leave it out."
+                f"fit_motion: {name!r} cannot change alone, as one moment of inertia of a thin rod: leave it out."
             )
         width = h * ((less is not None) + (more is not None))
         return ((centre if more is None else more) - (centre if less is None else less)) / width

@@ -1,13 +1,13 @@
 """Result of a fit of a whole motion: values with confidence intervals, residuals, a table and a figure."""
 
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gauss.analysis.report import widths_figure, write_report
-from gauss.errors import extra
 from gauss.scene import Scene
 
 if TYPE_CHECKING:
@@ -88,11 +88,12 @@ class MotionFit:
         ------
         MissingPackageError
             If matplotlib is not installed.
+        FileError
+            If the format is none of these, or the file cannot be written.
         """
-        with extra("view"):
-            from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(9.0, 0.8 + 1.8 * len(self.columns)), layout="constrained")
+        style = import_module("gauss.view.style")  # needs matplotlib
+        style.check_format(path)
+        figure = style.Figure(figsize=(9.0, 0.8 + 1.8 * len(self.columns)), layout="constrained")
         rows = figure.subplots(len(self.columns), 2, squeeze=False, sharex=True)
         for (left, right), name, one, other in zip(rows, self.columns, self.measured.T, self.fitted.T, strict=True):
             left.plot(self.t, one, ".", markersize=2, label="measured")
@@ -103,9 +104,7 @@ class MotionFit:
         rows[0, 0].legend()
         for axes in rows[-1]:
             axes.set(xlabel="t [s]")
-        if path is not None:
-            figure.savefig(path)
-        return figure
+        return style.saved(figure, path)
 
     def report(self, path) -> Path:
         """Write a report as one HTML file: the table, motions, and the widths of the confidence intervals.

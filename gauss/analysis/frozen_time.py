@@ -18,21 +18,16 @@ from gauss.system import State, System
 def state_at(system: System, given: State | None, t: float | None, what: str) -> State:
     """State that a result is asked for, at the time that is asked for; the start of the scene at rest if none is given.
 
+    ArgumentError if the state or the time is none, or both are given: a state has a time of its own.
+
     Parameters
     ----------
-    system : System
-        The system.
     given : State, optional
         State of the user.
     t : float, optional
         Time of the user [s].
     what : str
         Name of the function in messages.
-
-    Raises
-    ------
-    ArgumentError
-        If the state or the time is none, or both are given: a state has a time of its own.
 
     Warns
     -----

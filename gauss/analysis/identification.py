@@ -9,6 +9,7 @@ fit needs in a triangle. Standard parameters are those nearest to the scene that
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ from gauss.analysis.measured_motion import MeasuredMotion, measured_motion
 from gauss.analysis.regressor import RegressorModel
 from gauss.analysis.report import widths_figure, write_report
 from gauss.arguments import generator, named_arguments, real_array
-from gauss.errors import ArgumentError, StateError, extra
+from gauss.errors import ArgumentError, StateError
 from gauss.scene import Scene
 from gauss.system import System
 from gauss.system.coordinate_names import force_units
@@ -129,11 +130,12 @@ class Identification:
         ------
         MissingPackageError
             If matplotlib is not installed.
+        FileError
+            If the format is none of these, or the file cannot be written.
         """
-        with extra("view"):
-            from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(7.0, 0.9 + 2.1 * len(self.rows)), layout="constrained")
+        style = import_module("gauss.view.style")  # needs matplotlib
+        style.check_format(path)
+        figure = style.Figure(figsize=(7.0, 0.9 + 2.1 * len(self.rows)), layout="constrained")
         units = force_units(self.model.system)
         for axes, row, one, other in zip(
             figure.subplots(len(self.rows), squeeze=False)[:, 0], self.rows, self.measured.T, self.predicted.T, strict=True
@@ -144,9 +146,7 @@ class Identification:
             axes.margins(x=0.01)
         axes.set(xlabel="sample")
         figure.legend(handles=[points, line], loc="outside upper right", ncols=2)
-        if path is not None:
-            figure.savefig(path)
-        return figure
+        return style.saved(figure, path)
 
     def report(self, path) -> Path:
         """Write a report as one HTML file: the table, forces, and the widths of the confidence intervals.

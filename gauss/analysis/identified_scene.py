@@ -16,10 +16,7 @@ LEAST_MASS = 1e-12  # of a body, relative to all: less is none
 def identified_scene(model: RegressorModel, values: np.ndarray) -> Scene:
     """Scene of a model with other parameters (p,).
 
-    Raises
-    ------
-    SceneError
-        If a body has a negative mass or moment, or friction is negative: values that are not consistent.
+    SceneError if a body has a negative mass or moment, or friction is negative: values that are not consistent.
     """
     scene, n = model.system.scene, len(STANDARD)
     bodies, scale = dict(scene.bodies), model.system.scale

@@ -245,10 +245,6 @@ class _Point:
 
     Parameters
     ----------
-    problem : TargetProblem
-        The targets.
-    state : State
-        The state.
     is_closed : bool
         Whether it meets the constraints.
     """

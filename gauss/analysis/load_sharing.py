@@ -18,6 +18,8 @@ UNDETERMINED = 1e-9  # entry of the remaining null space above which a multiplie
 def shared(solution: Solution, motion: Kinematics, compliance: dict) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers (r,) of least elastic energy, and which of them (r,) are not unique.
 
+    SceneError if a joint does not exist, or its compliances are not six numbers ≥ 0.
+
     Parameters
     ----------
     solution : Solution
@@ -27,11 +29,6 @@ def shared(solution: Solution, motion: Kinematics, compliance: dict) -> tuple[np
     compliance : dict
         By joint: six compliances along the axes of the joint on its parent, z along the axis of the pair,
         of rotation [rad/(N m)] and translation [m/N]; joints that are not named are rigid.
-
-    Raises
-    ------
-    SceneError
-        If a joint does not exist, or its compliances are not six numbers ≥ 0.
     """
     from scipy.linalg import null_space  # a slow import
 

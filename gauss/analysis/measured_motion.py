@@ -21,29 +21,17 @@ LARGEST_MOVE = 0.1  # of a projected sample, in the units of the coordinates
 
 
 class MeasuredMotion(NamedTuple):
-    """Samples of a motion.
+    """Samples of a motion."""
 
-    Attributes
-    ----------
-    matrix : ndarray, shape (n, k, p)
-        Regressors.
-    forces : ndarray, shape (n, k)
-        Forces Y π that inertias and friction take.
-    """
-
-    matrix: np.ndarray
-    forces: np.ndarray
+    matrix: np.ndarray  # (n, k, p) regressors
+    forces: np.ndarray  # (n, k) forces Y π that inertias and friction take
 
 
 def measured_motion(model: RegressorModel, q, v, acceleration, forces) -> MeasuredMotion:
     """Regressors and forces of samples.
 
-    Raises
-    ------
-    StateError
-        If samples do not fit the system, are not finite or far off the constraints.
-    SimulationError
-        If a load of the scene cannot be compiled.
+    StateError if samples do not fit the system, are not finite or far off the constraints.
+    SimulationError if a load of the scene cannot be compiled.
     """
     system, n_v = model.system, model.system.n_v
     q = _array(q, "q", None, system.n_q)

@@ -21,10 +21,6 @@ def obstacles(problem: TargetProblem, state: State, rows: list[TargetRows], N: n
 
     Parameters
     ----------
-    problem : TargetProblem
-        Targets and limits.
-    state : State
-        The state.
     rows : list of TargetRows
         Rows of all targets there.
     N : ndarray, shape (n_v, m)

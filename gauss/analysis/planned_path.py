@@ -147,8 +147,6 @@ class _Follower:
 
     Parameters
     ----------
-    system : System
-        The system.
     others : tuple of Target
         Targets beside that of the path.
     backend : str

@@ -34,13 +34,7 @@ def _span(columns: np.ndarray, zero: float) -> np.ndarray:
 
 
 def gain(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Gain K (m, n) of the regulator.
-
-    Raises
-    ------
-    SimulationError
-        If the Riccati equation has no stabilising solution.
-    """
+    """Gain K (m, n) of the regulator; SimulationError if the Riccati equation has no stabilising solution."""
     from scipy.linalg import solve_continuous_are  # takes long to import
 
     try:
@@ -55,10 +49,7 @@ def gain(A: np.ndarray, B: np.ndarray, Q: np.ndarray, R: np.ndarray) -> np.ndarr
 def weights(given, usual: np.ndarray, what: str) -> np.ndarray:
     """Matrix of weights, of a matrix, of its diagonal, or the usual one of its diagonal.
 
-    Raises
-    ------
-    ArgumentError
-        If it is no finite symmetric matrix of this size, or has a negative eigenvalue.
+    ArgumentError if it is no finite symmetric matrix of this size, or has a negative eigenvalue.
     """
     if given is None:
         return np.diag(usual)

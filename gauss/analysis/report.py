@@ -22,6 +22,9 @@ STYLE = (
 def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figure"]]) -> Path:
     """Write a report.
 
+    ArgumentError if the path does not end with .html, or its folder does not exist.
+    FileError if the file cannot be written.
+
     Parameters
     ----------
     path : str or Path
@@ -30,13 +33,6 @@ def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figu
         Heading, and a table of fixed width.
     figures : sequence of (str, Figure)
         Figures with what they show.
-
-    Raises
-    ------
-    ArgumentError
-        If the path does not end with .html, or its folder does not exist.
-    FileError
-        If the file cannot be written.
     """
     if not isinstance(path, str | Path) or Path(path).suffix != ".html":
         raise ArgumentError(f"report: expected a path that ends with .html, got {path!r}.")
@@ -57,10 +53,7 @@ def write_report(path, title: str, text: str, figures: Sequence[tuple[str, "Figu
 def widths_figure(names: Sequence[str], values, half_widths) -> "Figure":
     """Half widths of confidence intervals as shares of the values, on a logarithmic scale.
 
-    Raises
-    ------
-    MissingPackageError
-        If matplotlib is not installed.
+    MissingPackageError if matplotlib is not installed.
     """
     with extra("view"):
         from matplotlib.figure import Figure

@@ -21,35 +21,18 @@ T = TypeVar("T")
 
 @dataclass
 class SampleForces:
-    """Multipliers of all constraints of a system along a motion.
+    """Multipliers of all constraints of a system along a motion."""
 
-    Parameters
-    ----------
-    values : ndarray, shape (k, r)
-        Multipliers.
-    loose : ndarray, shape (k, r)
-        Whether they are not unique.
-    errors : ndarray, shape (k, c)
-        Estimated relative errors by constraint.
-    tolerances : ndarray, shape (k,)
-        Largest errors that certificates accept.
-    backends : list of str
-        Solver of each sample.
-    """
-
-    values: np.ndarray
-    loose: np.ndarray
-    errors: np.ndarray
-    tolerances: np.ndarray
-    backends: list[str]
+    values: np.ndarray  # (k, r) multipliers
+    loose: np.ndarray  # (k, r) whether they are not unique
+    errors: np.ndarray  # (k, c) estimated relative errors by constraint
+    tolerances: np.ndarray  # (k,) largest errors that certificates accept
+    backends: list[str]  # solver of each sample
 
     def of(self, trajectory: Trajectory, name: str):
         """Constraint of this name, its multipliers (k, m), and which of them are not unique (m,).
 
-        Raises
-        ------
-        SimulationError
-            If those of some sample are not certified.
+        SimulationError if those of some sample are not certified.
         """
         constraints = trajectory.system.structure.constraints
         place = next(i for i, constraint in enumerate(constraints) if constraint.name == name)
@@ -62,10 +45,7 @@ class SampleForces:
 def sample_forces(trajectory: Trajectory, backend) -> SampleForces:
     """Multipliers of all constraints at every sample, found once for each backend that is given by its name.
 
-    Raises
-    ------
-    SimulationError
-        If a sample has no certified solution.
+    SimulationError if a sample has no certified solution.
     """
     return kept_with(trajectory, "multipliers", backend, lambda: _found(trajectory, backend))
 

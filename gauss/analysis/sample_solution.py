@@ -20,10 +20,7 @@ def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
 
     Rows of joints, couplings and relations come first, as in the structure of the system; sticking elements follow.
 
-    Raises
-    ------
-    SimulationError
-        If it is not certified.
+    SimulationError if it is not certified.
     """
     system, state = trajectory.system, trajectory.state(index)
     if trajectory.step is not None:

@@ -17,10 +17,7 @@ FEW_DIGITS = 1e-5  # share of accelerations by which constraints may be left: de
 def changes_along(changes: AccelerationChanges, tangents: Tangents, forces: np.ndarray) -> list[np.ndarray]:
     """Changes of the accelerations by independent displacements (n_v, k), by rates (n_v, l), and by forces (n_v, m).
 
-    Raises
-    ------
-    SimulationError
-        If they are not determined, or round-off leaves them few digits.
+    SimulationError if they are not determined, or round-off leaves them few digits.
     """
     N, D, rate, zeros = tangents.position, tangents.change, tangents.rate, np.zeros
     (n, k), many, free = N.shape, rate.shape[1], tangents.independent_rates

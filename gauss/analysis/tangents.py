@@ -29,24 +29,12 @@ from gauss.system import State, System, coordinate_rates, whole
 class Tangents:
     """Tangents of one system in one state that meets its constraints.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    state : State
-        The state.
-    held : tuple of int
-        Places of rates that are kept at their values.
-
-    Raises
-    ------
-    SimulationError
-        If nothing in the system can move.
+    SimulationError if nothing in the system can move.
     """
 
     system: System
     state: State
-    held: tuple[int, ...] = ()
+    held: tuple[int, ...] = ()  # places of rates that are kept at their values
 
     def __post_init__(self):
         """Refuse systems without tangents."""

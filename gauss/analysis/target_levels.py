@@ -24,28 +24,14 @@ ROUNDED_BOUND = 1e-12  # violation of a bound that is round-off, in units of the
 
 
 class LevelRows(NamedTuple):
-    """Weighted rows of the targets of one level: A y ≈ b.
+    """Weighted rows of the targets of one level: A y ≈ b."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (m, k)
-        Weighted Jacobian along the independent directions.
-    b : ndarray, shape (m,)
-        Weighted errors or rates.
-    """
-
-    A: np.ndarray
-    b: np.ndarray
+    A: np.ndarray  # (m, k) weighted Jacobian along the independent directions
+    b: np.ndarray  # (m,) weighted errors or rates
 
 
 def solver_of(backend: str):
-    """QP solver of a name.
-
-    Raises
-    ------
-    BackendError
-        If there is no QP solver of this name.
-    """
+    """QP solver of a name; BackendError if there is no QP solver of this name."""
     method = make(backend)
     if not isinstance(method, Programmed):
         raise BackendError(f"backend {backend!r} solves no QP with inequality rows; name a QP solver, for instance 'daqp'.")
@@ -54,6 +40,8 @@ def solver_of(backend: str):
 
 def lexicographic(levels: Sequence[LevelRows], G: np.ndarray, h: np.ndarray, damping: float, solver) -> np.ndarray:
     """Unknowns (k,) of the lexicographic least squares.
+
+    SimulationError if no unknowns are within the bounds, or the solver finds none.
 
     Parameters
     ----------
@@ -65,11 +53,6 @@ def lexicographic(levels: Sequence[LevelRows], G: np.ndarray, h: np.ndarray, dam
         μ ≥ 0: directions that the rows do not determine stay at rest.
     solver : object
         From :func:`solver_of`.
-
-    Raises
-    ------
-    SimulationError
-        If no unknowns are within the bounds, or the solver finds none.
     """
     y, Z = np.zeros(G.shape[1]), np.eye(G.shape[1])
     for rows in levels:

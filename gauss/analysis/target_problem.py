@@ -25,10 +25,6 @@ class TargetProblem:
 
     Parameters
     ----------
-    system : System
-        The system.
-    targets : Target or sequence of Target
-        The targets.
     limits : dict, optional
         Lowest and highest coordinates (2,) [rad, m] by name, instead of those of joints and stops.
     """
@@ -116,12 +112,8 @@ def bounds(N: np.ndarray, low: np.ndarray, high: np.ndarray, units: np.ndarray, 
 def named_values(system: System, given, what: str) -> Iterator[tuple[int, object]]:
     """Places in v and values of a dictionary by the names of coordinates.
 
-    Raises
-    ------
-    ArgumentError
-        If it is no dictionary.
-    StateError
-        If a name is none of the system.
+    ArgumentError if it is no dictionary.
+    StateError if a name is none of the system.
     """
     if not isinstance(given, Mapping):
         raise ArgumentError(f"{what}: expected values by the names of coordinates, got {given!r}.")
@@ -134,10 +126,7 @@ def named_values(system: System, given, what: str) -> Iterator[tuple[int, object
 def positive_values(system: System, given, what: str) -> np.ndarray:
     """Bounds (n_v,): infinite where none is given; of one number, in the unit of each coordinate.
 
-    Raises
-    ------
-    ArgumentError
-        If a value is no positive number.
+    ArgumentError if a value is no positive number.
     """
     found = np.full(system.n_v, np.inf)
     if given is None:

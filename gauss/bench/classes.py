@@ -39,6 +39,8 @@ def compare_class(
 ) -> ResultTable:
     """Measure a class of the selection or of the suite, and return its table, ``qp_<class>.csv``.
 
+    BackendError if there is no such class, or no such problem of it.
+
     Parameters
     ----------
     folder : Path
@@ -58,11 +60,6 @@ def compare_class(
         Measure again what has been measured.
     **how
         Solvers, workers and progress, as for :func:`gauss.bench.qp.compare`.
-
-    Raises
-    ------
-    BackendError
-        If there is no such class, or no such problem of it.
     """
     chosen([kind], (*GROUPS, *SUITE), "class")
     names = problems_of(kind)

@@ -24,7 +24,7 @@ FEWEST = 3  # ... but not fewer than these, as quartiles need them
 BUDGET = 0.1  # [s] for them
 WALL_PER_CPU = 10.0  # times: wall time of a call that counts as one of CPU time, where less was used
 INTERRUPTION = 2e-5  # [s] of wall time beyond CPU time that show other processes; clocks differ by a few microseconds
-GRACE = 2.0  # of the limit, time after which a call is ended with its process
+GRACE = 2.0  # times the limit: a call that takes longer is ended with its process
 
 
 class Times(NamedTuple):

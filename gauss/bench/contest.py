@@ -11,29 +11,19 @@ import numpy as np
 OURS = "gauss"
 WARM_UP = 0.02  # s until caches are filled: before, a run is slower the shorter it is
 Name = TypeVar("Name")
+Result = TypeVar("Result")
 Clock = Callable[[], float]  # s: time.process_time or time.perf_counter
 
 
 @dataclass(frozen=True)
 class Competitor:
-    """Work that is timed.
+    """Work that is timed."""
 
-    Parameters
-    ----------
-    run : callable
-        Does the work once.
-    units : int
-        Units of the work in one run.
-    is_short : bool
-        False to run it for :data:`WARM_UP` before each timed run, so that the state of the caches does not count.
-    every : int
-        It is run in every so many-th round.
-    """
-
-    run: Callable
-    units: int = 1
+    run: Callable  # does the work once
+    units: int = 1  # units of the work in one run
+    # false to run it for :data:`WARM_UP` before each timed run, so that the state of the caches does not count
     is_short: bool = True
-    every: int = 1
+    every: int = 1  # it is run in every so many-th round
 
 
 @dataclass(frozen=True)
@@ -46,30 +36,14 @@ class Goal:
 
 @dataclass(frozen=True)
 class Contest:
-    """One row of the table.
+    """One row of the table."""
 
-    Parameters
-    ----------
-    work : str
-        What is done.
-    tasks : dict
-        Competitors by name; the first is gauss.
-    goals : tuple of Goal
-        What is asked for.
-    agreement : float
-        Largest relative difference of the results to Pinocchio's.
-    remarks : str
-        Settings of this row.
-    operations : int
-        Operations of one unit in the code of gauss, if they are counted.
-    """
-
-    work: str
-    tasks: dict[str, Competitor]
-    goals: tuple[Goal, ...]
-    agreement: float
-    remarks: str = ""
-    operations: int = 0
+    work: str  # what is done
+    tasks: dict[str, Competitor]  # competitors by name; the first is gauss
+    goals: tuple[Goal, ...]  # what is asked for
+    agreement: float  # largest relative difference of the results to Pinocchio's
+    remarks: str = ""  # settings of this row
+    operations: int = 0  # operations of one unit in the code of gauss, if they are counted
 
 
 @dataclass(frozen=True)
@@ -113,9 +87,14 @@ def interleaved(
 
 def duration(run: Callable, clock: Clock = time.process_time) -> float:
     """Seconds of one call; by the default clock CPU seconds of all threads of the process together."""
+    return with_time(run, clock)[1]
+
+
+def with_time(run: Callable[[], Result], clock: Clock = time.process_time) -> tuple[Result, float]:
+    """Result of one call, and its seconds as of :func:`duration`."""
     begin = clock()
-    run()
-    return clock() - begin
+    result = run()
+    return result, clock() - begin
 
 
 def repeated(call: Callable, count: int) -> Callable[[], list]:

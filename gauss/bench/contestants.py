@@ -103,10 +103,7 @@ def backend(solver: str, level: str) -> Programmed:
 def imported(solver: str) -> Callable[[], Callable[[Programme], Outcome]]:
     """Solver of one's own by "module:Class"; called without arguments it makes a callable Programme → Outcome.
 
-    Raises
-    ------
-    BackendError
-        If there is no such module or name in it.
+    BackendError if there is no such module or name in it.
     """
     module, _, name = solver.partition(":")
     try:

@@ -23,10 +23,7 @@ def of_folder(folder: Path) -> Iterator[Instance]:
     .mat with P, q, A, l, u of l ≤ A x ≤ u, as the Maros–Mészáros problems are distributed for OSQP; in .mps or .qps (free
     MPS, with a section QUADOBJ or QMATRIX); or in .hdf5 (FCLIB: contact problems with friction).
 
-    Raises
-    ------
-    FileError
-        If there is none, or one cannot be read.
+    FileError if there is none, or one cannot be read.
     """
     paths = sorted(path for path in Path(folder).glob("*") if path.suffix.lower() in READERS and path.is_file())
     if not paths:

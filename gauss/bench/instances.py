@@ -35,41 +35,20 @@ class Matrices(NamedTuple):
 
 @dataclass(frozen=True)
 class Instance:
-    """Programme that solvers are given, and its solution.
+    """Programme that solvers are given, and its solution."""
 
-    Parameters
-    ----------
-    name, group, note : str
-        Its name, its class, and what it is.
-    verdict : str
-        "solvable", "inconsistent", "infeasible" or "unbounded"; "unknown" of files without a solution or a proof.
-    compulsion : Compulsion, optional
-        Where the programme comes from, in every form.
-    expected : ReferenceSolution, optional
-        Its solution.
-    matrices : Matrices, optional
-        The programme itself, if it is not that of a compulsion.
-    known : KnownSolution, optional
-        Its solution, if it is known.
-    start : ndarray, shape (n,), optional
-        Where a warm start begins: the solution of the problem before it in a sequence.
-    structure : ProgrammeStructure
-        Cones, friction or stages of the programme; none when not given.
-    data : str
-        SHA-256 of its numbers, see :func:`data_of`; of the suite that in the manifest of its files.
-    """
-
-    name: str
+    name: str  # name, group, note: its name, its class, and what it is
     group: str
     note: str = ""
+    # "solvable", "inconsistent", "infeasible" or "unbounded"; "unknown" of files without a solution or a proof
     verdict: str = SOLVABLE
-    compulsion: Compulsion | None = None
-    expected: ReferenceSolution | None = None
-    matrices: Matrices | None = None
-    known: KnownSolution | None = None
-    start: np.ndarray | None = None
-    structure: ProgrammeStructure = ProgrammeStructure()
-    data: str = ""
+    compulsion: Compulsion | None = None  # where the programme comes from, in every form
+    expected: ReferenceSolution | None = None  # its solution
+    matrices: Matrices | None = None  # the programme itself, if it is not that of a compulsion
+    known: KnownSolution | None = None  # its solution, if it is known
+    start: np.ndarray | None = None  # where a warm start begins: the solution of the problem before it in a sequence
+    structure: ProgrammeStructure = ProgrammeStructure()  # cones, friction or stages of the programme; none when not given
+    data: str = ""  # SHA-256 of its numbers, see :func:`data_of`; of the suite that in the manifest of its files
 
     def programme(self, form: str) -> Programme:
         """Programme in a form, without entries that are zero."""

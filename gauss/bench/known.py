@@ -14,32 +14,16 @@ DENSE = 1500  # rows that hold, up to which the directions that they determine a
 
 @dataclass(frozen=True, eq=False)
 class KnownSolution:
-    """Solution of a programme, and what errors of it are compared with, in whatever units it is written.
+    """Solution of a programme, and what errors of it are compared with, in whatever units it is written."""
 
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        Solution.
-    scale : ndarray, shape (n,)
-        What errors of x are compared with, see :func:`scales`.
-    multipliers : ndarray, shape (m + s,), optional
-        Multipliers of the equality and of the inequality rows; None if they are not known.
-    work : ndarray, shape (m + s,)
-        Size of the terms of each row, by which multipliers of all units compare: their product is the work of the row.
-    load : float
-        Largest work of an entry of the linear term.
-    held : ndarray of int
-        Rows that hold with equality.
-    basis : ndarray, shape (h, r), optional
-        Orthonormal directions of the works of the rows that hold which these rows determine; None if all are determined.
-    """
-
-    x: np.ndarray
-    scale: np.ndarray
-    multipliers: np.ndarray | None
+    x: np.ndarray  # (n,) solution
+    scale: np.ndarray  # (n,) what errors of x are compared with, see :func:`scales`
+    multipliers: np.ndarray | None  # multipliers of the equality and of the inequality rows; None if they are not known
+    # (m + s,) size of the terms of each row, by which multipliers of all units compare: their product is the work of the row
     work: np.ndarray
-    load: float
-    held: np.ndarray
+    load: float  # largest work of an entry of the linear term
+    held: np.ndarray  # rows that hold with equality
+    # orthonormal directions of the works of the rows that hold which these rows determine; None if all are determined
     basis: np.ndarray | None
 
     def error(self, x) -> float:

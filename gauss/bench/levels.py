@@ -30,51 +30,26 @@ LOOSEST = max(LEVELS.values())  # absolute: what rows and stationarity are held 
 
 
 class Promise(NamedTuple):
-    """Absolute tolerances that a claim of success promises; infinite where it promises none.
+    """Absolute tolerances that a claim of success promises; infinite where it promises none."""
 
-    Parameters
-    ----------
-    primal, dual, gap : float
-        Of the rows, of stationarity, and of the duality gap.
-    relative : bool
-        Whether those of rows and stationarity are relative to the norms of data and answer, where these are above one.
-    """
-
-    primal: float
+    primal: float  # primal, dual, gap: of the rows, of stationarity, and of the duality gap
     dual: float
     gap: float
+    # whether those of rows and stationarity are relative to the norms of data and answer, where these are above one
     relative: bool = False
 
 
 @dataclass(frozen=True)
 class SolverPolicy:
-    """Settings of a solver beside the tolerances of qpbenchmark, and the promise of its claim.
+    """Settings of a solver beside the tolerances of qpbenchmark, and the promise of its claim."""
 
-    Parameters
-    ----------
-    limits : dict
-        Limits of time and of iterations.
-    tolerances : tuple of str
-        Settings that get the tolerance of the level where qpbenchmark knows none of them.
-    clock : dict
-        Settings without which a library reports no times.
-    beyond : tuple of str
-        Settings that qpbenchmark leaves at their defaults, but for the limit of iterations.
-    has_gap : bool
-        Whether it looks at the duality gap.
-    is_relative : bool
-        Whether its tolerances of rows and stationarity are relative to the norms of data and answer.
-    has_tolerance : bool
-        Whether it takes a tolerance of residuals at all.
-    """
-
-    limits: dict = field(default_factory=dict)
-    tolerances: tuple[str, ...] = ()
-    clock: dict = field(default_factory=dict)
-    beyond: tuple[str, ...] = ()
-    has_gap: bool = False
-    is_relative: bool = False
-    has_tolerance: bool = True
+    limits: dict = field(default_factory=dict)  # limits of time and of iterations
+    tolerances: tuple[str, ...] = ()  # settings that get the tolerance of the level where qpbenchmark knows none of them
+    clock: dict = field(default_factory=dict)  # settings without which a library reports no times
+    beyond: tuple[str, ...] = ()  # settings that qpbenchmark leaves at their defaults, but for the limit of iterations
+    has_gap: bool = False  # whether it looks at the duality gap
+    is_relative: bool = False  # whether its tolerances of rows and stationarity are relative to the norms of data and answer
+    has_tolerance: bool = True  # whether it takes a tolerance of residuals at all
 
 
 # CVXOPT, KVXOPT and ECOS look at the duality gap by tolerances of their own, which follow like those of others. Their

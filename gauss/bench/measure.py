@@ -21,7 +21,7 @@ from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES, ProgrammeStruct
 from gauss.errors import BackendError
 
 NOT_ASKED = "not asked"  # outcome of a problem that a solver does not take: no failure
-LOADING = 30.0  # [s] of CPU time that a library may take to load and to solve next to nothing
+LOADING = 30.0  # [s] of CPU time that a library may take to load and to solve a tiny programme
 WRONG = 1e-3  # relative error above which an answer is wrong for any purpose
 # Relative to the terms that a residual sums: rounding of a residual that is no fault of a solver.
 TERM_ROUNDING_RELATIVE = 10.0 * np.finfo(float).eps
@@ -107,7 +107,7 @@ def _returned(call):
         return error
 
 
-# Programmes of next to no size by the kind of their structure: rows, cones, Coulomb's law, stages.
+# Tiny programmes by the kind of their structure: rows, cones, Coulomb's law, stages.
 TINY = {
     ROWS: of_arrays("", "", np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], np.eye(2)[:1], [1.0]),
     STAGES: of_arrays(
@@ -130,7 +130,7 @@ TINY = {
 
 @lru_cache
 def _loaded(backend: str, level: str, kind: str):
-    """Call a solver once for next to nothing, so that loading its library is no part of its first solve."""
+    """Solve a tiny programme once, so that loading the library is no part of the first timed solve."""
     tiny = TINY[kind]
     prepared = ready(backend, tiny.programme(""), level)
     with prepared.around, ended(LOADING):
@@ -178,7 +178,7 @@ def _excess(programme: Programme, x, y, z, promised: Promise) -> float:
 
 
 def _floors(programme: Programme, x, y, z) -> np.ndarray:
-    """Rounding (3,) of the residuals that :meth:`Programme.residuals` returns: where numbers are large, none gets below."""
+    """Rounding (3,) of the residuals that :meth:`Programme.residuals` returns: no residual of large numbers is smaller."""
     p, x, y, z = programme, np.abs(x), np.abs(y), np.abs(z)
     H, C, K = abs(p.H), abs(p.C), abs(p.K)
     rows = max((C @ x + np.abs(p.d)).max(initial=0.0), (K @ x + np.abs(p.k)).max(initial=0.0))

@@ -12,22 +12,12 @@ from gauss.errors import BackendError, did_you_mean
 
 @dataclass(frozen=True)
 class Measurement:
-    """Measurement of a command of ``gauss bench``.
+    """Measurement of a command of ``gauss bench``."""
 
-    Parameters
-    ----------
-    name : str
-        Of its table, ``NAME.csv``, and its page, ``NAME.md``.
-    keys, values : tuple of str
-        Columns that name a row, and those that are measured.
-    packages : tuple of str
-        Packages whose versions the header tells.
-    """
-
-    name: str
-    keys: tuple[str, ...]
+    name: str  # of its table, ``NAME.csv``, and its page, ``NAME.md``
+    keys: tuple[str, ...]  # keys, values: columns that name a row, and those that are measured
     values: tuple[str, ...]
-    packages: tuple[str, ...]
+    packages: tuple[str, ...]  # packages whose versions the header tells
 
     def table(self, folder: Path, fresh: bool) -> ResultTable:
         """The table in a folder, with the rows that are there unless it begins afresh."""
@@ -42,13 +32,7 @@ class Measurement:
 
 
 def chosen(names: Iterable[str] | None, existing: Iterable[str], what: str) -> tuple[str, ...]:
-    """Return the names, each once, or all if none is given.
-
-    Raises
-    ------
-    BackendError
-        If one does not exist.
-    """
+    """Return the names, each once, or all if none is given; BackendError if one does not exist."""
     existing, names = tuple(existing), tuple(names or ())
     for name in names:
         if name not in existing:

@@ -91,10 +91,7 @@ def compare_motions(
 ) -> ResultTable:
     """Drive all motions that are not driven yet, and return the table.
 
-    Raises
-    ------
-    BackendError
-        If there is no such backend, scene or level.
+    BackendError if there is no such backend, scene or level.
     """
     backends, scenes = chosen(backends, ("recursion", *_foreign()), "backend"), chosen(scenes, SCENES, "scene")
     levels = chosen(levels, LEVELS, "level")

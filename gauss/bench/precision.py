@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from gauss.analysis import energy
 from gauss.backends import available
+from gauss.bench.contest import with_time
 from gauss.bench.extrapolation import extrapolated
 from gauss.bench.levels import AUTO
 from gauss.bench.measurement import chosen
@@ -41,35 +43,18 @@ REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the le
 
 @dataclass(frozen=True)
 class Attempt:
-    """One motion by one method with one setting.
+    """One motion by one method with one setting."""
 
-    Parameters
-    ----------
-    engine, method : str
-        Who computed it, and how: the integrator, and the backend where one was asked for.
-    setting : float
-        Tolerance, or step [s].
-    error : float
-        Of the centres of mass at the end [m].
-    seconds, compile_seconds : float
-        Wall time of a run, and of making its machine code before, which is not in it [s].
-    drift : float
-        Change of energy that work does not explain [J].
-    gap : float
-        Largest constraint residual at the end [rad, m].
-    reason : str
-        Why there is no result; empty if there is one.
-    """
-
-    engine: str
+    engine: str  # engine, method: who computed it, and how: the integrator, and the backend where one was asked for
     method: str
-    setting: float
-    error: float = np.nan
+    setting: float  # tolerance, or step [s]
+    error: float = np.nan  # of the centres of mass at the end [m]
+    # seconds, compile_seconds: wall time of a run, and of making its machine code before, which is not in it [s]
     seconds: float = np.nan
     compile_seconds: float = np.nan
-    drift: float = np.nan
-    gap: float = np.nan
-    reason: str = ""
+    drift: float = np.nan  # change of energy that work does not explain [J]
+    gap: float = np.nan  # largest constraint residual at the end [rad, m]
+    reason: str = ""  # why there is no result; empty if there is one
 
     @property
     def failed(self) -> bool:
@@ -151,6 +136,9 @@ def attempts(
 
     Backends get three settings at least, so that there is a curve, unless a run takes ten times as long.
 
+    SimulationError if there is no such integrator.
+    BackendError if there is no such backend.
+
     Parameters
     ----------
     scene : Scene or System
@@ -165,13 +153,6 @@ def attempts(
         Longest run [s].
     backends : sequence of str, optional
         How accelerations are solved, each by itself; "auto" when not given.
-
-    Raises
-    ------
-    SimulationError
-        If there is no such integrator.
-    BackendError
-        If there is no such backend.
     """
     _require_charted(methods or ())
     backends = chosen(backends, (AUTO, *available()), "backend") if backends else ()
@@ -228,13 +209,11 @@ def attempt(
 
 def _timed(system: System, duration: float, run: dict[str, Any], time_limit: float) -> tuple[Trajectory, float, float]:
     """A motion, the time of its first run, and the least of the runs after it [s]."""
-    began = time.perf_counter()
-    trajectory = simulate(system, duration, **run)
-    first, best = time.perf_counter() - began, np.inf
+    move = partial(simulate, system, duration, **run)
+    (trajectory, first), best = with_time(move, time.perf_counter), np.inf
     for _ in range(REPEATS):
-        began = time.perf_counter()
-        trajectory = simulate(system, duration, **run)
-        best = min(best, time.perf_counter() - began)
+        trajectory, seconds = with_time(move, time.perf_counter)
+        best = min(best, seconds)
         if best > time_limit / 10:
             break
     return trajectory, first, best

@@ -25,31 +25,16 @@ SOLVABLE, INCONSISTENT, UNKNOWN = "solvable", "inconsistent", "unknown"  # verdi
 
 @dataclass(frozen=True)
 class MechanismProblem:
-    """One compulsion with its name.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    note : str
-        What it is, and what is hard about it.
-    compulsion : Compulsion
-        The problem.
-    system, state : System, State, optional
-        Where it comes from, if the compulsion is that of a system in a state and nothing else.
-    load : ndarray, shape (n_v,), optional
-        Generalised forces that act there [N m, N].
-    verdict : str
-        "solvable", or "inconsistent" where no accelerations meet all rows: there is no reference then.
-    """
+    """One compulsion with its name."""
 
     name: str
-    note: str
+    note: str  # what it is, and what is hard about it
     compulsion: Compulsion
+    # system, state: where it comes from, if the compulsion is that of a system in a state and nothing else
     system: System | None = None
     state: State | None = None
-    load: np.ndarray | None = None
-    verdict: str = SOLVABLE
+    load: np.ndarray | None = None  # generalised forces that act there [N m, N]
+    verdict: str = SOLVABLE  # "solvable", or "inconsistent" where no accelerations meet all rows: there is no reference then
 
 
 @dataclass(frozen=True)
@@ -64,7 +49,7 @@ SELECTION: dict[str, Entry] = {}
 
 
 def selected(name: str, verdict: str = SOLVABLE) -> Callable:
-    """Enter a function that makes a problem, from its name and the docstring of the function, into the selection."""
+    """Register a function that makes a problem under a name; its docstring is the note."""
 
     def enter(function):
         note = function.__doc__.strip().rstrip(".")
@@ -75,13 +60,7 @@ def selected(name: str, verdict: str = SOLVABLE) -> Callable:
 
 
 def make_problem(name: str) -> MechanismProblem:
-    """Problem of the selection by name.
-
-    Raises
-    ------
-    BackendError
-        If there is none.
-    """
+    """Problem of the selection by name; BackendError if there is none."""
     if name not in SELECTION:
         raise BackendError(f"no problem {name!r}. {did_you_mean(name, SELECTION)}")
     return SELECTION[name].make()
@@ -243,7 +222,7 @@ def box_8():
 
 @selected("box about to tilt")
 def box_tilting():
-    """Box on eight points, the moment on it 1e-9 short of what lifts it: rows that hold by next to nothing."""
+    """Box on eight points, the moment on it 1e-9 below the one that lifts it: multipliers near zero."""
     return _box(_feet(8), tilt=1.0 - 1e-9)
 
 

@@ -68,6 +68,8 @@ def compare(
 ) -> ResultTable:
     """Measure all cells that are not measured yet, and return the table.
 
+    BackendError if there is no such backend, problem, form, level or solver, or two problems have the same name.
+
     Parameters
     ----------
     folder : Path
@@ -87,11 +89,6 @@ def compare(
         Measure again what has been measured.
     progress : bool
         Show a bar.
-
-    Raises
-    ------
-    BackendError
-        If there is no such backend, problem, form, level or solver, or two problems have the same name.
     """
     solvers = tuple(solvers)
     for solver in solvers:

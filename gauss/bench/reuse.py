@@ -1,10 +1,9 @@
 """Gain of a kept workspace and of a warm start along a motion, step by step, beside solving from nothing."""
 
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -17,6 +16,7 @@ from gauss.backends.piqp_ import PIQP
 from gauss.backends.programme import FORMS
 from gauss.backends.programmed import attempt, read
 from gauss.bench import compiled
+from gauss.bench.contest import with_time
 from gauss.bench.contestants import ready
 from gauss.bench.levels import settings
 from gauss.bench.markdown import in_time, number, table
@@ -60,12 +60,12 @@ def along(compulsions: list[Compulsion], accelerations: list, backend: str, leve
         with prepared.around:
             for mode in modes:
                 if mode == ONE_SHOT:
-                    found, seconds = _timed(prepared.call)
+                    found, seconds = with_time(prepared.call, time.perf_counter)
                     answer, library = prepared.read(found), prepared.library(found)
                     reported = Reported(library.setup, np.nan, library.solve)
                 else:
                     solver, programme = (method(**chosen), lean) if mode == ANEW else (kept[mode], whole)
-                    answer, seconds = _timed(partial(attempt, solver, programme))
+                    answer, seconds = with_time(partial(attempt, solver, programme), time.perf_counter)
                     reported = _reported(solver, backend)
                 answers[mode].append(answer)
                 figures[mode].append((seconds, *reported))
@@ -77,13 +77,6 @@ def _row(mode: str, error: float, figures: list[tuple[float, ...]]) -> dict:
     """Row of a mode: the largest error, and medians of the times but the first."""
     times = zip(("seconds", "setup", "update", "solve"), map(float, np.median(figures[1:], axis=0)), strict=True)
     return {"mode": mode, "error": error, "outcome": "answered"} | dict(times)
-
-
-def _timed(call: Callable) -> tuple[Any, float]:
-    """Result of a call, and its time [s]."""
-    begin = time.perf_counter()
-    found = call()
-    return found, time.perf_counter() - begin
 
 
 class Reported(NamedTuple):

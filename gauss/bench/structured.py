@@ -18,20 +18,11 @@ CONES, COULOMB, STAGES, ROWS = "cones", "coulomb", "stages", "rows"
 
 @dataclass(frozen=True)
 class ProgrammeStructure:
-    """Structure of a programme beside its matrices, for solvers of one kind.
+    """Structure of a programme beside its matrices, for solvers of one kind."""
 
-    Parameters
-    ----------
-    cones : tuple of int
-        Sizes of the second-order cones that the last inequality rows form.
-    friction : tuple of float
-        Coefficients of friction, one a cone of three rows, where Coulomb's law is asked for.
-    stages : tuple of int
-        Of optimal control: number of steps, states and inputs of a step; unknowns are u₀, x₁, u₁, x₂, …
-    """
-
-    cones: tuple[int, ...] = ()
-    friction: tuple[float, ...] = ()
+    cones: tuple[int, ...] = ()  # sizes of the second-order cones that the last inequality rows form
+    friction: tuple[float, ...] = ()  # coefficients of friction, one a cone of three rows, where Coulomb's law is asked for
+    # of optimal control: number of steps, states and inputs of a step; unknowns are u₀, x₁, u₁, x₂, …
     stages: tuple[int, ...] = ()
 
     @property
@@ -42,14 +33,9 @@ class ProgrammeStructure:
 
 @dataclass(frozen=True)
 class StructuredProgramme(Programme):
-    """Programme with a structure.
+    """Programme with a structure."""
 
-    Parameters
-    ----------
-    structure : ProgrammeStructure
-        Its cones, friction and stages; the other fields are those of a programme.
-    """
-
+    # its cones, friction and stages; the other fields are those of a programme
     structure: ProgrammeStructure = field(default_factory=ProgrammeStructure)
 
     @property

@@ -15,21 +15,17 @@ OWN_VERSION = r"\bgauss \d[\w.]*, "
 class ResultTable:
     """Rows of one measurement in a CSV file with a header of comments; rows that are there are not measured again.
 
+    FileError if the file holds rows of other versions, of another machine, or of another table, or cannot be read or
+    written.
+
     Parameters
     ----------
-    path : Path
-        The file.
     header : list of str
         Lines that say when, where and with which versions; rows measured under others are not mixed with new ones.
     keys, values : tuple of str
         Columns that name a row, and those that are measured.
     fresh : bool
         Start over.
-
-    Raises
-    ------
-    FileError
-        If the file holds rows of other versions, of another machine, or of another table, or cannot be read or written.
     """
 
     def __init__(self, path: Path, header: list[str], keys: tuple[str, ...], values: tuple[str, ...], fresh: bool):

@@ -22,21 +22,11 @@ STARTING = threading.Lock()  # the environment that a new process inherits is th
 
 @dataclass(frozen=True)
 class Reply:
-    """Outcome of a call.
+    """Outcome of a call."""
 
-    Parameters
-    ----------
-    outcome : str
-        "answered", "raised", "crashed" or "timed out".
-    value : object
-        What the function returned; None if it did not.
-    reason : str
-        What went wrong, in words.
-    """
-
-    outcome: str
-    value: Any = None
-    reason: str = ""
+    outcome: str  # "answered", "raised", "crashed" or "timed out"
+    value: Any = None  # what the function returned; None if it did not
+    reason: str = ""  # what went wrong, in words
 
 
 class Worker:

@@ -117,10 +117,7 @@ INTERRUPTED = 130  # exit code, by the custom of shells: 128 and the number of t
 def as_far_as_it_came(make):
     """Result of a function, and whether Ctrl-C ended it early: a motion is kept up to then.
 
-    Raises
-    ------
-    typer.Exit
-        If nothing had been made yet.
+    typer.Exit if nothing had been made yet.
     """
     try:
         return make(), False
@@ -137,10 +134,7 @@ def as_far_as_it_came(make):
 def check_files(kind: str, output: Path | None, *figures: Path | None):
     """Refuse files of results and figures that cannot be written, before time is spent.
 
-    Raises
-    ------
-    FileError
-        If an ending does not fit, or there is no such folder.
+    FileError if an ending does not fit, or there is no such folder.
     """
     if output is not None:
         import_module("gauss.io.load").writer(output, kind)

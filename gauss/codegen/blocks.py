@@ -59,12 +59,6 @@ def write_block(module: ir.Module, name: str, whole: Schedule, width: int) -> St
 
     Parameters
     ----------
-    module : llvmlite.ir.Module
-        Module of the code.
-    name : str
-        Name of the function.
-    whole : Schedule
-        Schedule of the function.
     width : int
         Number of states of a vector.
     """

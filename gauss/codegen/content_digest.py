@@ -81,10 +81,7 @@ class _Encoder:
     def encode(self, thing):
         """Append the encoding of an object: its own part, then those of what it contains, in order.
 
-        Raises
-        ------
-        NoDigestError
-            If its content is unknown.
+        NoDigestError if its content is unknown.
         """
         enclosing: dict[int, int] = {}  # address of each object that contains the present one → its depth
         left: list[tuple[Iterator, Any]] = []  # what is to follow an object, and that object, from the outermost on

@@ -42,10 +42,7 @@ def varying(outputs) -> list[Expression]:
 def partials(node: Expression) -> tuple:
     """Partial derivative of a node with respect to each of its operands.
 
-    Raises
-    ------
-    TypeError
-        If the operation has none, as a call of a function.
+    TypeError if the operation has none, as a call of a function.
     """
     if node.op not in _PARTIALS:
         raise TypeError(f"no derivative of {node.op!r}.")

@@ -13,7 +13,7 @@ class DeviceModule(ir.Module):
 
 
 class SingleDeviceModule(DeviceModule):
-    """The same in single precision: traced functions compute so, memory and transcendental functions are double."""
+    """The same in single precision: traced functions compute in it, memory and transcendental functions are double."""
 
 
 def vector_width(module: ir.Module) -> int:

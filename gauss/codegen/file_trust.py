@@ -80,10 +80,7 @@ def read_key(folder: Path) -> bytes | None:
 def obtain_key(folder: Path) -> bytes | None:
     """Secret key of a folder, generated if there is none; of concurrent processes the first one's counts.
 
-    Raises
-    ------
-    OSError
-        If the folder cannot be written to.
+    OSError if the folder cannot be written to.
     """
     found = read_key(folder)
     if found is not None:
@@ -107,10 +104,7 @@ def obtain_key(folder: Path) -> bytes | None:
 def write_temporary(folder: Path, data: bytes) -> str:
     """Path of a new private file, to be renamed once it is complete.
 
-    Raises
-    ------
-    OSError
-        If it cannot be written, as on a full disk; nothing is left of it.
+    OSError if it cannot be written, as on a full disk; nothing is left of it.
     """
     handle, temporary = tempfile.mkstemp(dir=folder, prefix=PARTIAL)
     try:

@@ -174,9 +174,9 @@ class Graph:
         return self._make(node.op, tuple(operands), node.value)
 
     def forget(self):
-        """Let go of the nodes, which refer to the graph, too: those that nobody else has are freed at once, not as garbage.
+        """Drop the nodes, which refer to the graph: those without other references are freed at once, not as garbage.
 
-        A node that is made again later is another one.
+        A node that is made again later is another object.
         """
         self.nodes, self._known, self._constants = [None] * len(self.nodes), {}, {}  # type: ignore[list-item]
 

@@ -64,8 +64,6 @@ def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
 
     Parameters
     ----------
-    ir_text : str
-        The module.
     optimise : int
         As of :func:`gauss.codegen.machine.load`, at least 1; modules that are optimised as a whole are one unit.
     """

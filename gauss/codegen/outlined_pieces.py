@@ -39,12 +39,6 @@ def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: 
 
     Parameters
     ----------
-    module : llvmlite.ir.Module
-        Module of the code.
-    name : str
-        Name of the function.
-    whole : Schedule
-        Schedule of the function.
     callees : dict
         Code of the called functions, for this width.
     width : int

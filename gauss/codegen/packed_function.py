@@ -35,8 +35,6 @@ class PackedFunction(NativeFunction):
 
     Parameters
     ----------
-    function : Function
-        The function.
     seeds : sequence of sequences of tuple of int
         Places of equal inputs, one of each chain, by the kind of the chains.
     numbers : dict

@@ -20,10 +20,6 @@ class PackedSchedule:
 
     Parameters
     ----------
-    whole : Schedule
-        The function.
-    packs : Packs
-        Its packs.
     numbers : dict
         Values of the inputs that are constants, by their places.
 

@@ -33,13 +33,7 @@ def features() -> str:
 
 
 def _most() -> int:
-    """Most doubles in a vector register.
-
-    Raises
-    ------
-    ArgumentError
-        If the environment names another number.
-    """
+    """Most doubles in a vector register; ArgumentError if the environment names another number."""
     given = os.environ.get(VARIABLE) or "8"
     if given not in map(str, WIDER):
         raise ArgumentError(f"{VARIABLE}: expected 2, 4 or 8 doubles in a vector register, got {given!r}.")

@@ -191,10 +191,7 @@ class PythonWrapper:
     def _targets(self, out, lead: Shape) -> list[np.ndarray] | None:
         """Arrays that the results are written to; None without ``out``.
 
-        Raises
-        ------
-        StateError
-            If they do not fit.
+        StateError if they do not fit.
         """
         if out is None:
             return None

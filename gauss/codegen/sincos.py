@@ -40,8 +40,6 @@ class SinCos:
 
     Parameters
     ----------
-    module : llvmlite.ir.Module
-        Module of the function.
     kind : llvmlite.ir.Type
         double, or a vector of them.
     width : int

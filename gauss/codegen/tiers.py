@@ -37,10 +37,7 @@ _current: ContextVar["Run | None"] = ContextVar("current run", default=None)
 def wanted() -> str:
     """Tier of code that is made now: that of the run in progress, else that of the environment.
 
-    Raises
-    ------
-    ArgumentError
-        If the environment names another tier.
+    ArgumentError if the environment names another tier.
     """
     run = _current.get()
     return run.tier if run is not None and run.tier != AUTO else checked(os.environ.get(VARIABLE) or AUTO, VARIABLE)

@@ -6,10 +6,12 @@ there.
 
 import re
 from collections.abc import Iterator
+from itertools import chain, starmap
 from pathlib import Path
 
+from gauss.bench.markdown import table
 from gauss.dynamics import plan
-from gauss.dynamics.rules import Rule, RuleTable
+from gauss.dynamics.rules import Rule
 from gauss.io.catalog import catalog, folder, linkages, networks, servos
 
 PACKAGE = Path(__file__).parents[1]
@@ -20,6 +22,7 @@ INTRODUCTION = (
     "the name of a [model](../models.md), or `robot:NAME`. Errors are one line, with the remedy, and end with code 2. "
     "`gauss --install-completion` lets the shell complete commands and options."
 )
+COLUMNS = ("", "driver", "dynamics", "applies to", "if", "then, where a check fails")  # of a rule
 JOINED = re.compile(r" and (?=[A-Z])")  # of two conditions
 TABLES = {
     "Motions, by `gauss.simulate`": plan.MOTIONS,
@@ -83,17 +86,12 @@ def _models() -> str:
     )
     parts = ["# Models", introduction]
     for kind, lines in kinds.items():
-        parts += [
-            f"## {kind}",
-            "\n".join(
-                ["| name | what it is |", "|---|---|", *(f"| `{name}` | {_cell(line)} |" for name, line in lines.items())]
-            ),
-        ]
+        parts += [f"## {kind}", _table(("name", "what it is"), ((f"`{name}`", line) for name, line in lines.items()))]
     return "\n\n".join(parts) + "\n"
 
 
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
+def _table(titles, rows) -> str:
+    return "\n".join(table(titles, rows))
 
 
 def commands(group) -> str:
@@ -114,30 +112,25 @@ def _described(group, name: str) -> Iterator[str]:
         else:
             yield f"## `{name} {key}`"
             yield (command.help or "").strip()
-            yield "\n".join(["| | |", "|---|---|", *_rows(command.params)])
+            yield _table(("", ""), _rows(command.params))
 
 
-def _rows(parameters) -> Iterator[str]:
+def _rows(parameters) -> Iterator[tuple[str, str]]:
     for parameter in parameters:
         is_option = parameter.param_type_name == "option"
         shown = ", ".join([*parameter.opts, *parameter.secondary_opts]) if is_option else parameter.name.upper()
-        yield f"| `{shown}` | {' '.join((parameter.help or '').replace('|', '/').split())} |"
+        yield f"`{shown}`", " ".join((parameter.help or "").replace("|", "/").split())
 
 
 def plan_tables() -> str:
     """Tables in Markdown."""
-    return "\n\n".join(part for title, table in TABLES.items() for part in (f"### {title}", _table(table))) + "\n"
+    parts = ((f"### {title}", _table(COLUMNS, starmap(_row, enumerate(rules.rules, 1)))) for title, rules in TABLES.items())
+    return "\n\n".join(chain.from_iterable(parts)) + "\n"
 
 
-def _table(table: RuleTable) -> str:
-    head = ["| | driver | dynamics | applies to | if | then, where a check fails |", "|---|---|---|---|---|---|"]
-    return "\n".join(head + [f"| {k} | {_row(rule)} |" for k, rule in enumerate(table.rules, 1)])
-
-
-def _row(rule: Rule) -> str:
+def _row(number: int, rule: Rule) -> tuple:
     conditions = "; ".join(_said(condition) for condition in rule.conditions) or "always"
-    cells = rule.driver, rule.dynamics, _said(rule.when), conditions, rule.fallback or "–"
-    return " | ".join(cell.replace("|", "\\|") for cell in cells)
+    return number, rule.driver, rule.dynamics, _said(rule.when), conditions, rule.fallback or "–"
 
 
 def _said(condition) -> str:

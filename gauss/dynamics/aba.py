@@ -46,17 +46,14 @@ class Elimination(NamedTuple):
 class FreeElimination:
     """Elimination of a joint of six freedoms with orthogonal S: D⁻¹ = Sᵀ Î⁻¹ S, and no inertia is passed on.
 
+    ZeroDivisionError if a pivot of Î is a constant zero.
+
     Parameters
     ----------
     S : ndarray, shape (6, 6)
         Motion subspace.
     inertia : tuple of ndarray
         Articulated inertia Î.
-
-    Raises
-    ------
-    ZeroDivisionError
-        If a pivot of Î is a constant zero.
     """
 
     projected = (np.zeros((3, 3)),) * 3

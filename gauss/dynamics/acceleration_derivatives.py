@@ -27,8 +27,6 @@ class LoadedMechanism:
 
     Parameters
     ----------
-    system : System
-        The system.
     loads : sequence of BoundLoad
         Its loads, with traced laws.
     t : Expression or float
@@ -168,13 +166,7 @@ def _of_open_tree(system: System, composites: CompositeBodies, own, q, v, accele
 
 
 def _factored(system: System, M: np.ndarray) -> LDLT:
-    """Factors of a mass matrix.
-
-    Raises
-    ------
-    SimulationError
-        If a joint moves no inertia.
-    """
+    """Factors of a mass matrix; SimulationError if a joint moves no inertia."""
     still = [name for name, own in zip(system.coordinates, np.diag(M), strict=True) if as_number(own) == 0]
     if still:
         raise SimulationError(

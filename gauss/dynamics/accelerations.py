@@ -118,10 +118,7 @@ def forward_dynamics(system: System) -> Callable:
 def forward_dynamics_on_device(system: System, device) -> "DeviceFunction":
     """Function (q, v, load, t=0.0) → q̈ of batches on a device; rows that fail the check are repeated on this CPU.
 
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled as a whole, with the reasons.
+    SimulationError if the system cannot be compiled as a whole, with the reasons.
     """
     from gauss.codegen.gpu.device_function import DeviceFunction
     from gauss.codegen.gpu.devices import device_name

@@ -184,13 +184,7 @@ def relation_rows(motion: Kinematics):
 
 
 def checked_load(system: System, load) -> np.ndarray:
-    """Generalised forces (n_v,) of the user, checked.
-
-    Raises
-    ------
-    StateError
-        If they have the wrong size, or are not finite.
-    """
+    """Generalised forces (n_v,) of the user, checked; StateError if they have the wrong size, or are not finite."""
     if load is None:
         return np.zeros(system.n_v)
     found = real_numbers(load)

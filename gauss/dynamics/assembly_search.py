@@ -34,21 +34,11 @@ SPREAD = 2.0  # rad and lengths of the scene: largest distance of a start from t
 
 
 class AssembledPose(NamedTuple):
-    """Pose that was found.
+    """Pose that was found."""
 
-    Attributes
-    ----------
-    state : State
-        Coordinates.
-    residual : float
-        Position residual relative to the scales of the rows.
-    starts : int
-        Number of starts tried beside the guess itself.
-    """
-
-    state: State
-    residual: float
-    starts: int = 0
+    state: State  # coordinates
+    residual: float  # position residual relative to the scales of the rows
+    starts: int = 0  # number of starts tried beside the guess itself
 
     @property
     def is_met(self) -> bool:
@@ -61,10 +51,6 @@ def assembled(system: System, guess: State, held, restart: bool) -> AssembledPos
 
     Parameters
     ----------
-    system : System
-        The system.
-    guess : State
-        The guess.
     held : sequence of int
         Entries of v whose coordinates are fixed.
     restart : bool

@@ -42,8 +42,6 @@ class CallGraph:
     ----------
     subsystem : Subsystem
         One without relations and gear trains.
-    recorder : CallRecorder
-        Recorder of the calls.
     q, v : ndarray
         Slots of its coordinates and rates.
     """

@@ -26,27 +26,13 @@ WORK = "effort", "target", "rates", "multipliers", "left"  # vectors that a solu
 
 @dataclass(frozen=True, eq=False)
 class RecordedSystem:
-    """A system with loops whose recursions are recorded.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    sections : RecordedSections
-        Its recursions, recorded.
-    sizes : ndarray, shape (m,)
-        Scales of the residuals of its rows.
-    floor : float
-        Acceleration below which errors are no longer relative to it, in coordinates of the scene [1/s²].
-    gains : tuple of float, optional
-        Gains α and β [1/s] of the Baumgarte feedback −2α φ̇ − β² φ.
-    """
+    """A system with loops whose recursions are recorded."""
 
     system: System
-    sections: RecordedSections
-    sizes: np.ndarray
-    floor: float
-    gains: tuple[float, float] | None = None
+    sections: RecordedSections  # its recursions, recorded
+    sizes: np.ndarray  # (m,) scales of the residuals of its rows
+    floor: float  # acceleration below which errors are no longer relative to it, in coordinates of the scene [1/s²]
+    gains: tuple[float, float] | None = None  # gains α and β [1/s] of the Baumgarte feedback −2α φ̇ − β² φ
 
     @property
     def n_q(self) -> int:

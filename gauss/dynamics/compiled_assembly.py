@@ -14,6 +14,9 @@ from gauss.system import State, System
 class Assembler:
     """Compulsions of one system, assembled by a kernel traced from :func:`gauss.assemble`.
 
+    TypeError if a law cannot be traced.
+    SceneError if there are unilateral constraints, which have no fixed rows.
+
     Parameters
     ----------
     system : System
@@ -23,13 +26,6 @@ class Assembler:
     ----------
     power : ndarray, shape (3,)
         Power of drives, of forces on bodies, and lost in dampers at the last state [W].
-
-    Raises
-    ------
-    TypeError
-        If a law cannot be traced.
-    SceneError
-        If there are unilateral constraints, which have no fixed rows.
     """
 
     def __init__(self, system: System):

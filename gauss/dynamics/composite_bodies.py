@@ -52,8 +52,6 @@ class CompositeBodies:
 
     Parameters
     ----------
-    tree : KinematicTree
-        The tree.
     v : ndarray, shape (n_v,)
         Rates.
     rate_of : callable, optional

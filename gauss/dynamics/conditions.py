@@ -61,8 +61,6 @@ def refuse_motionless(system: System, what: str):
 
     Parameters
     ----------
-    system : System
-        The system.
     what : str
         Function that was called.
     """

@@ -161,10 +161,7 @@ def _is_met(system: System, state: State) -> bool:
 def refuse_off_constraints(system: System, state: State, what: str):
     """Refuse a state that is farther from its constraints than numbers of few digits explain.
 
-    Raises
-    ------
-    StateError
-        With the residuals of the constraints.
+    StateError with the residuals of the constraints.
     """
     if system.has_closures and _distance(system, state) > TYPED_DIGITS_RESIDUAL:
         raise StateError(

@@ -25,18 +25,10 @@ ITERATIONS = 3  # rows with pivots above √MU converge by a factor of 10⁴ or 
 
 
 class BaumgarteFeedback(NamedTuple):
-    """Accelerations −2α φ̇ − β² φ (Baumgarte 1972).
+    """Accelerations −2α φ̇ − β² φ (Baumgarte 1972)."""
 
-    Attributes
-    ----------
-    rows : ndarray, shape (m,)
-        Target of the loop constraints instead of zero.
-    rates : ndarray, shape (n_v,)
-        Accelerations added to those of loop joints.
-    """
-
-    rows: np.ndarray
-    rates: np.ndarray
+    rows: np.ndarray  # (m,) target of the loop constraints instead of zero
+    rates: np.ndarray  # (n_v,) accelerations added to those of loop joints
 
 
 class ConstrainedArticulatedBody:
@@ -44,8 +36,6 @@ class ConstrainedArticulatedBody:
 
     Parameters
     ----------
-    subsystem : Subsystem
-        The subsystem.
     q, v : ndarray, shape (n_q,), (n_v,)
         Its coordinates and rates; floats or expressions.
     relations : sequence of Rows

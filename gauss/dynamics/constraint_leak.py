@@ -7,6 +7,7 @@ thirty times the first and seven times the second in loops with bodies lighter o
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from gauss import math
 from gauss.codegen import Scalar
 from gauss.dynamics.given_link_frames import ungrouped
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
+from gauss.dynamics.store import cached
 from gauss.system import Subsystem, System
 
 LARGEST_LEAK = 1e-11  # relative: derivatives have eight digits; round-off of loops leaves 1e-15, near singular poses 1e-12
@@ -25,6 +27,11 @@ ALIKE = 1e3  # ratio of masses, and of moments of inertia, of one loop up to whi
 
 def may_leak(system: System) -> bool:
     """Whether bodies of loops differ so much in mass or inertia that elimination may lose digits: it is checked then."""
+    return cached(system, (_has_unlike_bodies,), partial(_has_unlike_bodies, system))
+
+
+def _has_unlike_bodies(system: System) -> bool:
+    """As of :func:`may_leak`, evaluated anew."""
     return any(one.n_loop_constraints and not _are_alike(one) for one in system.subsystems)
 
 
@@ -47,8 +54,6 @@ def with_alike_bodies(system: System, pattern: System | None = None) -> tuple[Su
 
     Parameters
     ----------
-    system : System
-        The system.
     pattern : System, optional
         A system of numbers, where those of this one are symbols.
     """

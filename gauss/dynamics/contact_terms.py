@@ -15,27 +15,14 @@ from gauss.system.relations import place_residuals
 
 
 class ContactTerms(NamedTuple):
-    """Contact terms of one state: of gaps, then of friction, then of set-valued elements.
+    """Contact terms of one state: of gaps, then of friction, then of set-valued elements."""
 
-    Attributes
-    ----------
-    width : ndarray, shape (m,)
-        Gap functions [m, rad].
-    apart : ndarray, shape (k,)
-        Distances of the shapes of guarded contacts as a whole [m].
-    rate : ndarray, shape (n,)
-        Rates: m of gaps, two tangential ones of each contact with friction, slip rates of set-valued elements.
-    J : ndarray, shape (n, n_v)
-        Jacobian of the rates with respect to q̇.
-    bias : ndarray, shape (n,)
-        Derivative of the rates with q̈ = 0.
-    """
-
-    width: np.ndarray
-    apart: np.ndarray
+    width: np.ndarray  # (m,) gap functions [m, rad]
+    apart: np.ndarray  # (k,) distances of the shapes of guarded contacts as a whole [m]
+    # (n,) rates: m of gaps, two tangential ones of each contact with friction, slip rates of set-valued elements
     rate: np.ndarray
-    J: np.ndarray
-    bias: np.ndarray
+    J: np.ndarray  # (n, n_v) Jacobian of the rates with respect to q̇
+    bias: np.ndarray  # (n,) derivative of the rates with q̈ = 0
 
 
 class ContactTermsKernel:

@@ -13,13 +13,6 @@ from gauss.system.elimination_cost import coupling_blocks
 class CouplingCalls:
     """Couplings of a subsystem in a call graph.
 
-    Parameters
-    ----------
-    subsystem : Subsystem
-        The subsystem.
-    recorder : CallRecorder
-        Recorder of the calls.
-
     Attributes
     ----------
     members : dict

@@ -25,47 +25,24 @@ LEAST_RELATIVE_PIVOT = 1e-6  # of a front, over its diagonal entry; acceleration
 
 
 class LoopRow(NamedTuple):
-    """Row of the loop constraints.
+    """Row of the loop constraints."""
 
-    Attributes
-    ----------
-    wrenches : dict
-        Wrenches (6,) on links of a unit multiplier.
-    tau : ndarray, shape (n_v,)
-        Generalised forces of a unit multiplier.
-    root : int
-        Link at which the row is eliminated; −1 for the ground.
-    """
-
-    wrenches: dict[int, np.ndarray]
-    tau: np.ndarray
-    root: int
+    wrenches: dict[int, np.ndarray]  # wrenches (6,) on links of a unit multiplier
+    tau: np.ndarray  # (n_v,) generalised forces of a unit multiplier
+    root: int  # link at which the row is eliminated; −1 for the ground
 
 
 class Front(NamedTuple):
-    """Rows and hubs that are eliminated at one root: F z + B b = r for the acceleration of the root and pending rows b.
+    """Rows and hubs that are eliminated at one root: F z + B b = r for the acceleration of the root and pending rows b."""
 
-    Attributes
-    ----------
-    rows, hubs, pending : list of int
-        Rows and hubs of z; rows that act on the same chains, and are eliminated further in.
-    factor : LDLT
-        Factorisation F = L D Lᵀ.
-    G : ndarray, shape (n, 6 + p)
-        L⁻¹ B.
-    carried : ndarray, shape (n, 6 + p)
-        D⁻¹ G.
-    inverse_pivots : list
-        Entries of the diagonal of F over those of D.
-    """
-
+    # rows, hubs, pending: rows and hubs of z; rows that act on the same chains, and are eliminated further in
     rows: list[int]
     hubs: list[int]
     pending: list[int]
-    factor: LDLT
-    G: np.ndarray
-    carried: np.ndarray
-    inverse_pivots: list
+    factor: LDLT  # factorisation F = L D Lᵀ
+    G: np.ndarray  # (n, 6 + p) l⁻¹ B
+    carried: np.ndarray  # (n, 6 + p) d⁻¹ G
+    inverse_pivots: list  # entries of the diagonal of F over those of D
 
 
 class HubJoint(NamedTuple):
@@ -81,10 +58,6 @@ class EmbeddedLoops(ArticulatedBody):
 
     Parameters
     ----------
-    tree : KinematicTree
-        The tree.
-    rows : sequence of LoopRow
-        Its loop constraints.
     hubs : dict
         Roots of the fronts of hubs, {hub: root}.
     """

@@ -47,8 +47,6 @@ def warn_of_slow_route(system: System, plan: Plan, evaluations: int):
 
     Parameters
     ----------
-    system : System
-        The system.
     plan : Plan
         Plan of the motion.
     evaluations : int

@@ -23,17 +23,10 @@ ELIMINATIONS = EmbeddedMechanism, EmbeddedChains
 
 @dataclass(frozen=True)
 class Embedding:
-    """Elimination of loops where they close.
+    """Elimination of loops where they close."""
 
-    Parameters
-    ----------
-    mechanism : type
-        Elimination with or without hubs.
-    dependent : sequence of collections of int
-        Rows that are left out; see :class:`gauss.dynamics.embedded_aba.EmbeddedMechanism`.
-    """
-
-    mechanism: type[EmbeddedMechanism] = EmbeddedMechanism
+    mechanism: type[EmbeddedMechanism] = EmbeddedMechanism  # elimination with or without hubs
+    # rows that are left out; see :class:`gauss.dynamics.embedded_aba.EmbeddedMechanism`
     dependent: Sequence[Collection[int]] = ()
 
     def __call__(self, system: System, q, v, t: Scalar = 0.0) -> EmbeddedMechanism:

@@ -24,50 +24,24 @@ RESTING = 1e-8  # opening rate over its scale and the fastest rate, below which 
 
 
 class Gaps(NamedTuple):
-    """Gap functions of one state, in the order of ``system.contacts``.
+    """Gap functions of one state, in the order of ``system.contacts``."""
 
-    Attributes
-    ----------
-    width, rate : ndarray, shape (m,)
-        d [m, rad] and ḋ.
-    J : ndarray, shape (m, 6n + p)
-        Gradients [A B] with respect to (v, q̇).
-    C, D : ndarray, shape (m,)
-        ḋ = J (v, q̇) − C and d̈ = J (a, q̈) − D.
-    """
-
-    width: np.ndarray
+    width: np.ndarray  # width, rate (m,): d [m, rad] and ḋ
     rate: np.ndarray
-    J: np.ndarray
-    C: np.ndarray
+    J: np.ndarray  # (m, 6n + p) gradients [A B] with respect to (v, q̇)
+    C: np.ndarray  # C, D (m,): ḋ = J (v, q̇) − C and d̈ = J (a, q̈) − D
     D: np.ndarray
 
 
 class Slips(NamedTuple):
-    """Tangential velocities of contacts with friction, in the order of ``system.slips``.
+    """Tangential velocities of contacts with friction, in the order of ``system.slips``."""
 
-    Attributes
-    ----------
-    gap : ndarray of int, shape (k,)
-        Gap of each.
-    friction : ndarray, shape (k,)
-        Coefficient of friction.
-    rate : ndarray, shape (k, 2)
-        Slip velocity along two tangential directions [m/s].
-    J : ndarray, shape (k, 2, 6n + p)
-        Its gradients with respect to (v, q̇).
-    D : ndarray, shape (k, 2)
-        The slip acceleration is J (a, q̈) − D.
-    axes : ndarray, shape (k, 2, 3)
-        The two directions, in world axes.
-    """
-
-    gap: np.ndarray
-    friction: np.ndarray
-    rate: np.ndarray
-    J: np.ndarray
-    D: np.ndarray
-    axes: np.ndarray
+    gap: np.ndarray  # (k,) gap of each
+    friction: np.ndarray  # (k,) coefficient of friction
+    rate: np.ndarray  # (k, 2) slip velocity along two tangential directions [m/s]
+    J: np.ndarray  # (k, 2, 6n + p) its gradients with respect to (v, q̇)
+    D: np.ndarray  # (k, 2) the slip acceleration is J (a, q̈) − D
+    axes: np.ndarray  # (k, 2, 3) the two directions, in world axes
 
 
 def gaps(motion: Kinematics) -> Gaps:
@@ -133,10 +107,7 @@ def closed(system: System, found: Gaps, v: np.ndarray) -> np.ndarray:
 def with_contacts(motion: Kinematics, compulsion: Compulsion) -> Compulsion:
     """Compulsion with the rows G x ≤ h of the closed gaps.
 
-    Raises
-    ------
-    SceneError
-        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: these are no rows.
+    SceneError if there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: these are no rows.
     """
     system = motion.system
     if system.slips.placed or system.set_valued.placed or system.losses:

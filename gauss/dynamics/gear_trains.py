@@ -14,18 +14,10 @@ from gauss.system import State, System
 
 
 class GearTrain(NamedTuple):
-    """Joints whose rates are proportional.
+    """Joints whose rates are proportional."""
 
-    Attributes
-    ----------
-    root : str
-        Joint whose direction of motion is that of the train.
-    rates : dict of str to float
-        Rate of every joint over that of the root.
-    """
-
-    root: str
-    rates: dict[str, float]
+    root: str  # joint whose direction of motion is that of the train
+    rates: dict[str, float]  # rate of every joint over that of the root
 
 
 def gear_trains(scene: Scene) -> list[GearTrain]:

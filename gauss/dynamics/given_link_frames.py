@@ -11,17 +11,10 @@ from gauss.system import Subsystem
 
 @dataclass(frozen=True)
 class GivenLinkFrames(Subsystem):
-    """Subsystem with given link frames, which do not follow from parameters.
+    """Subsystem with given link frames, which do not follow from parameters."""
 
-    Parameters
-    ----------
-    links : dict
-        Link of every body.
-    sides : dict
-        Frames of the loop joints on their two bodies, by index of the joint.
-    """
-
-    links: dict[int, Link] = field(default_factory=dict)
+    links: dict[int, Link] = field(default_factory=dict)  # link of every body
+    # frames of the loop joints on their two bodies, by index of the joint
     sides: dict[int, dict] = field(default_factory=dict)
 
 
@@ -63,8 +56,6 @@ def with_moved_joint(subsystem: Subsystem, index: int, body: int, shift) -> Give
 
     Parameters
     ----------
-    subsystem : Subsystem
-        The subsystem.
     index, body : int
         The joint, and the body on which it moves.
     shift : ndarray, shape (3,)

@@ -17,10 +17,7 @@ RESIDUAL_THRESHOLD = 30  # residuals by numpy that take as long as compiling the
 def scene_start(system: System) -> State:
     """Consistent start of the scene at time 0, assembled once; a new process reads it unless there is something to warn of.
 
-    Raises
-    ------
-    AssemblyError
-        If the constraints cannot be met from there.
+    AssemblyError if the constraints cannot be met from there.
     """
     find = lambda: consistent(system, system.start(), tuple(system.scene.starts))  # noqa: E731
     if not system.has_closures:
@@ -43,10 +40,7 @@ def scene_start(system: System) -> State:
 def projected(system: System, state: State) -> State:
     """State projected onto the constraints; one that meets them to round-off stays as it is.
 
-    Raises
-    ------
-    AssemblyError
-        If the constraints cannot be met from there.
+    AssemblyError if the constraints cannot be met from there.
     """
     state = within_limits(system, state)
     if not system.has_closures:

@@ -61,22 +61,12 @@ class InputForces:
 
 @dataclass(frozen=True)
 class HeldLaw:
-    """Law of a drive that stands for an input.
+    """Law of a drive that stands for an input."""
 
-    Parameters
-    ----------
-    law : callable
-        Time [s] → value of the input [N m, N].
-    low, high : float
-        Least and largest effort [N m, N].
-    along : tuple of float
-        Share of the effort along each rate of the joint.
-    """
-
-    law: Callable[[float], float]
-    low: float
+    law: Callable[[float], float]  # time [s] → value of the input [N m, N]
+    low: float  # low, high: least and largest effort [N m, N]
     high: float
-    along: tuple[float, ...] = (1.0,)
+    along: tuple[float, ...] = (1.0,)  # share of the effort along each rate of the joint
 
     def __call__(self, t) -> np.ndarray:
         """Efforts along the rates of the joint at a time [s]."""
@@ -88,8 +78,6 @@ def driven_scene(scene: Scene, laws: Mapping[str, Callable]) -> Scene:
 
     Parameters
     ----------
-    scene : Scene
-        Scene with inputs.
     laws : mapping of str to callable
         Input → law t ↦ value [N m, N], cut off at the limits of the input.
     """

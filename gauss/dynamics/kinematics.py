@@ -128,10 +128,6 @@ class KinematicsOnAccess(Kinematics):
 
     Parameters
     ----------
-    system : System
-        The system.
-    state : State
-        The state.
     poses : callable
         () → rotations (n + 1, 3, 3), centres of mass, angular velocities and velocities (n + 1, 3) of the bodies, then of
         the ground.

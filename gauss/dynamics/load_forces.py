@@ -53,8 +53,6 @@ class LoadForces:
 
     Parameters
     ----------
-    system : System
-        The system.
     called : sequence of BoundLoad
         Loads that Python evaluates.
     laws : Laws, optional
@@ -88,8 +86,6 @@ class LoadForces:
 
         Parameters
         ----------
-        state : State
-            The state.
         numbers : ndarray
             A :meth:`room` with its time, coordinates and rates, that nobody else writes to.
         place, found : int

@@ -18,18 +18,10 @@ AXES = np.eye(6)
 
 
 class LinkStates(NamedTuple):
-    """Links of a loop joint, without the rest of the tree.
+    """Links of a loop joint, without the rest of the tree."""
 
-    Attributes
-    ----------
-    subsystem : Subsystem
-        A subsystem with this joint.
-    omegas, poses : dict
-        As those of :class:`gauss.dynamics.rnea.KinematicTree`, of its two bodies and the ground.
-    """
-
-    subsystem: Subsystem
-    omegas: dict
+    subsystem: Subsystem  # A subsystem with this joint
+    omegas: dict  # omegas, poses: as those of :class:`gauss.dynamics.rnea.KinematicTree`, of its two bodies and the ground
     poses: dict
     links: dict = {}
 

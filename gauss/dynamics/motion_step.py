@@ -34,10 +34,11 @@ PROJECTIONS = 2  # Newton steps in position after a step
 class MotionStep:
     """Step of one system.
 
+    ArgumentError if there is no such method or parameter.
+    SimulationError if the system has no smooth dynamics in machine code, with the reasons.
+
     Parameters
     ----------
-    system : System
-        The system.
     integrator : str
         Explicit Runge–Kutta method: "rk4", "dopri5" or "dop853", with fixed steps.
     parameters : sequence of str
@@ -46,13 +47,6 @@ class MotionStep:
         Those of one value that do not act in its accelerations, as the limit of friction in one that sticks.
     moved_loops : ndarray, shape (m, n_p), optional
         Derivatives of the position residual by the parameters, as by the place of a stop that bears; zero when not given.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no such method or parameter.
-    SimulationError
-        If the system has no smooth dynamics in machine code, with the reasons.
     """
 
     moved_loops: np.ndarray | None = None

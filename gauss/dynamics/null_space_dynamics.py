@@ -26,30 +26,21 @@ CORRECTIONS = 2  # of the accelerations, from zero: the second removes the round
 
 
 class NullSpaceKernels(NamedTuple):
-    """Machine code of the unreduced system.
+    """Machine code of the unreduced system."""
 
-    Attributes
-    ----------
-    velocity : Kernel
-        (t, q, rates) → K v, and all rates, those of loop joints as they follow from the tree.
-    residual : Kernel
-        (t, q, v, load, q̈, λ) → r, s, and all accelerations.
-    change : Kernel
-        (t, q, v, load, q̈, λ, changes of q and v) → change of r, s, and of accelerations that follow from the tree.
-    """
-
-    velocity: Kernel
-    residual: Kernel
+    velocity: Kernel  # (t, q, rates) → K v, and all rates, those of loop joints as they follow from the tree
+    residual: Kernel  # (t, q, v, load, q̈, λ) → r, s, and all accelerations
+    # (t, q, v, load, q̈, λ, changes of q and v) → change of r, s, and of accelerations that follow from the tree
     change: Kernel
 
 
 class NullSpaceDynamics:
     """Accelerations of a system with loops in one state of numbers, and their changes.
 
+    SimulationError if too few digits are left.
+
     Parameters
     ----------
-    system : System
-        The system.
     laws : Laws
         Its loads; the traced ones are included.
     state : State
@@ -61,11 +52,6 @@ class NullSpaceDynamics:
     ----------
     rates : ndarray, shape (n_v,)
         Accelerations.
-
-    Raises
-    ------
-    SimulationError
-        If too few digits are left.
     """
 
     def __init__(self, system: System, laws: Laws, state: State, load):

@@ -1,6 +1,6 @@
 """Functions of a state in which the elimination of loop constraints leaves few digits, by the null space of these.
 
-They are numbers of one state, in a hundred times the time of machine code: rows of a batch take them one by one.
+They are evaluated on numbers, for one state at a time, in a hundred times the time of machine code.
 """
 
 from collections.abc import Sequence
@@ -20,21 +20,16 @@ from gauss.system import State, System
 def null_space_terms(system: System, requests: Sequence, state: State, given: dict) -> list[np.ndarray]:
     """Results of requests for functions of accelerations, and of others beside them, one after the other.
 
+    SimulationError if too few digits are left.
+
     Parameters
     ----------
-    system : System
-        The system.
     requests : sequence of Request
         Functions of a state.
     state : State
         State that meets the constraints.
     given : dict
         Rates, accelerations and generalised forces (n_v,), by their names.
-
-    Raises
-    ------
-    SimulationError
-        If too few digits are left.
     """
     laws, load, found = traced_loads(system), given["load"], list[np.ndarray]()
     dynamics = NullSpaceDynamics(system, laws, state, load)

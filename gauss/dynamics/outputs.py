@@ -33,19 +33,14 @@ def split(vector: np.ndarray, scene: Scene) -> dict[str, np.ndarray]:
 def output_function(program: Program, scene: Scene, of_step: bool = False) -> Function:
     """Function of a point → values of all outputs.
 
+    SimulationError if forces of an output are not unique, or not known in this motion.
+
     Parameters
     ----------
     program : Program
         The system, with inputs where the scene has some.
-    scene : Scene
-        Scene with the outputs.
     of_step : bool
         Whether the accelerations are those that the point holds, of a step of contacts, instead of those of its state.
-
-    Raises
-    ------
-    SimulationError
-        If forces of an output are not unique, or not known in this motion.
     """
     outputs = tuple(scene.outputs.values())
     asked = not of_step and any(output.kind in INERTIAL for output in outputs)
@@ -88,10 +83,7 @@ def _refuse_unknown(output: Output, program: Program, of_step: bool):
 def joint_forces(output: Output, system: System, t, q, v) -> np.ndarray:
     """Values (k, 3) of an output that is a force or moment of a joint, at k states.
 
-    Raises
-    ------
-    SimulationError
-        If they are not certain.
+    SimulationError if they are not certain.
     """
     found = sample_multipliers(system, t, q, v)
     if found is None or not found[1].all():

@@ -35,12 +35,8 @@ MOMENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx, yy, zz, xy, xz
 def size_of(system: System, parameter: str) -> int:
     """Number of values of a parameter such as "mass:arm"; see :meth:`gauss.System.parameter_derivatives`.
 
-    Raises
-    ------
-    ArgumentError
-        If there is none of this kind, or the derivative does not exist.
-    StateError
-        If there is no such body, joint or load.
+    ArgumentError if there is none of this kind, or the derivative does not exist.
+    StateError if there is no such body, joint or load.
     """
     require(parameter, (str,), "parameter")
     kind, _, name = parameter.partition(":")

@@ -53,8 +53,6 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
 
     Parameters
     ----------
-    system : System
-        One of the kind.
     values : sequence of float or Expression
         Numbers in the order of :func:`numbers`.
     dynamics : Dynamics

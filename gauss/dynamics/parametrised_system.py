@@ -11,21 +11,11 @@ from gauss.system import System
 
 @dataclass(frozen=True)
 class ParametrisedSystem:
-    """Systems of one kind.
+    """Systems of one kind."""
 
-    Parameters
-    ----------
-    pattern : System
-        One of them.
-    system : System
-        System with parameters, expressions of a shared graph, for the numbers that differ.
-    varied : ndarray of int
-        Places of the parameters among the numbers of a system.
-    """
-
-    pattern: System
-    system: System
-    varied: np.ndarray
+    pattern: System  # one of them
+    system: System  # system with parameters, expressions of a shared graph, for the numbers that differ
+    varied: np.ndarray  # places of the parameters among the numbers of a system
 
     @property
     def parameters(self) -> tuple[str, ...]:

@@ -298,10 +298,7 @@ def motion_plan(system: System) -> Plan:
 def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
     """Plan of a motion, cached with the system; of a plain one on disk, for its conditions reduce the system.
 
-    Raises
-    ------
-    SimulationError
-        If the conditions of no rule hold, or not those of the wanted one.
+    SimulationError if the conditions of no rule hold, or not those of the wanted one.
     """
     make = lambda: MOTIONS.plan(ask, wanted)  # noqa: E731
     if ask.system.dynamics is None or ask.laws.called:

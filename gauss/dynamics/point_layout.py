@@ -15,22 +15,12 @@ from gauss.system import State
 
 @dataclass(frozen=True)
 class PointLayout:
-    """Places of the parts of a point in its vector.
+    """Places of the parts of a point in its vector."""
 
-    Parameters
-    ----------
-    n_q, n_v : int
-        Numbers of coordinates and rates.
-    memory : int
-        Numbers of the state of the method.
-    parameters : tuple of str
-        Parameters of the system.
-    """
-
-    n_q: int
+    n_q: int  # n_q, n_v: numbers of coordinates and rates
     n_v: int
-    memory: int = 0
-    parameters: tuple[str, ...] = ()
+    memory: int = 0  # numbers of the state of the method
+    parameters: tuple[str, ...] = ()  # parameters of the system
 
     @cached_property
     def row(self) -> int:

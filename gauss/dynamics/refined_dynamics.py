@@ -30,21 +30,11 @@ UNIT_ROUNDOFF = float(np.finfo(float).eps)
 
 
 class RefinedIterate(NamedTuple):
-    """Accelerations of a subsystem, or a change of them.
+    """Accelerations of a subsystem, or a change of them."""
 
-    Attributes
-    ----------
-    rates : dict
-        Accelerations of the tree joints.
-    deviations : dict
-        a − a_free (6,) of each body at its centre of mass, in the axes of its link.
-    multipliers : ndarray, shape (m,)
-        Multipliers of the loop constraints.
-    """
-
-    rates: dict[int, np.ndarray]
-    deviations: dict[int, np.ndarray]
-    multipliers: np.ndarray
+    rates: dict[int, np.ndarray]  # accelerations of the tree joints
+    deviations: dict[int, np.ndarray]  # a − a_free (6,) of each body at its centre of mass, in the axes of its link
+    multipliers: np.ndarray  # (m,) multipliers of the loop constraints
 
     def plus(self, change: "RefinedIterate") -> "RefinedIterate":
         """Sum of an iterate and its change."""
@@ -54,45 +44,22 @@ class RefinedIterate(NamedTuple):
 
 
 class IterateResidual(NamedTuple):
-    """Residuals of an iterate.
+    """Residuals of an iterate."""
 
-    Attributes
-    ----------
-    accelerations : dict
-        Residual (6,) of the acceleration equation of each link, a_i + S q̈ + c − a.
-    tau : ndarray, shape (n_v,)
-        Residual generalised forces.
-    rows : ndarray, shape (m,)
-        Residual of the loop constraints.
-    forces : dict
-        Wrenches (6,) on bodies and what they carry, to be balanced by joints.
-    """
-
-    accelerations: dict[int, np.ndarray]
-    tau: np.ndarray
-    rows: np.ndarray
-    forces: dict[int, np.ndarray]
+    accelerations: dict[int, np.ndarray]  # residual (6,) of the acceleration equation of each link, a_i + S q̈ + c − a
+    tau: np.ndarray  # (n_v,) residual generalised forces
+    rows: np.ndarray  # (m,) residual of the loop constraints
+    forces: dict[int, np.ndarray]  # wrenches (6,) on bodies and what they carry, to be balanced by joints
 
 
 class RefinedAccelerations(NamedTuple):
-    """Joint accelerations with an error bound.
+    """Joint accelerations with an error bound."""
 
-    Attributes
-    ----------
-    rates : ndarray, shape (n_v,)
-        Joint accelerations.
-    error : ndarray, shape (n_v,)
-        Bound of their error: the last refinement, and the round-off of its residuals.
-    residual : ndarray, shape (m,)
-        Residual of the loop constraints, not zero near singular configurations and for inconsistent redundant rows.
-    power : Scalar
-        Power of rheonomic constraints [W].
-    """
-
-    rates: np.ndarray
-    error: np.ndarray
+    rates: np.ndarray  # (n_v,) joint accelerations
+    error: np.ndarray  # (n_v,) bound of their error: the last refinement, and the round-off of its residuals
+    # (m,) residual of the loop constraints, not zero near singular configurations and for inconsistent redundant rows
     residual: np.ndarray
-    power: Scalar
+    power: Scalar  # power of rheonomic constraints [W]
 
 
 class RefinedForwardDynamics(ConstrainedArticulatedBody):
@@ -198,22 +165,12 @@ class RefinedForwardDynamics(ConstrainedArticulatedBody):
 
 
 class BodyInertia(NamedTuple):
-    """Inertia of a body in the axes of its link.
+    """Inertia of a body in the axes of its link."""
 
-    Attributes
-    ----------
-    mass : Scalar
-        Mass [kg].
-    J, R : ndarray, shape (3,), (3, 3)
-        Principal moments [kg m²], and the rotation from link axes to principal axes.
-    c : ndarray, shape (3,)
-        Centre of mass [m].
-    """
-
-    mass: Scalar
-    J: np.ndarray
+    mass: Scalar  # mass [kg]
+    J: np.ndarray  # J (3,), R (3, 3): principal moments [kg m²], and the rotation from link axes to principal axes
     R: np.ndarray
-    c: np.ndarray
+    c: np.ndarray  # (3,) centre of mass [m]
 
     def free_motion(self, omega: np.ndarray) -> np.ndarray:
         """a_free (6,) at the centre, less gravity: Euler's equations."""

@@ -20,22 +20,12 @@ from gauss.system import Subsystem
 
 
 class JointKinematics(NamedTuple):
-    """Kinematics of a joint.
+    """Kinematics of a joint."""
 
-    Attributes
-    ----------
-    R, p : ndarray
-        From the link frame to the joint frame on the inner side: rotation (3, 3), origin (3,).
-    S : ndarray, shape (6, k)
-        Motion subspace in the link frame.
-    bias : ndarray, shape (6,)
-        Acceleration bias c: acceleration across the joint without joint acceleration, in the link frame.
-    """
-
-    R: np.ndarray
+    R: np.ndarray  # R, p: from the link frame to the joint frame on the inner side: rotation (3, 3), origin (3,)
     p: np.ndarray
-    S: np.ndarray
-    bias: np.ndarray
+    S: np.ndarray  # (6, k) motion subspace in the link frame
+    bias: np.ndarray  # (6,) acceleration bias c: acceleration across the joint without joint acceleration, in the link frame
 
 
 class KinematicTree:
@@ -43,8 +33,6 @@ class KinematicTree:
 
     Parameters
     ----------
-    subsystem : Subsystem
-        The subsystem.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
 
@@ -161,8 +149,6 @@ def kinematics_of_joint(
 
     Parameters
     ----------
-    pair : Pair
-        Kinematics of the joint.
     forward : bool
         Whether the link is the child of the joint.
     link : Link

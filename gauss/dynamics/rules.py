@@ -198,10 +198,7 @@ class RuleTable(NamedTuple):
     def plan(self, ask: Asked, wanted: Plan | None = None) -> Plan:
         """Plan of the first rule whose conditions hold; with ``wanted``, of the rule with that driver and dynamics.
 
-        Raises
-        ------
-        SimulationError
-            If the conditions of no rule hold, or not those of the wanted one.
+        SimulationError if the conditions of no rule hold, or not those of the wanted one.
         """
         rejected: list[Rejected] = []
         applicable = [rule for rule in self.rules if rule.when(ask)]

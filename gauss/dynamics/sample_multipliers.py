@@ -40,8 +40,6 @@ def sample_multipliers(system: System, t, q, v) -> tuple[np.ndarray, np.ndarray]
 
     Parameters
     ----------
-    system : System
-        The system.
     t, q, v : ndarray, shape (k,), (k, n_q), (k, n_v)
         Times, coordinates, rates.
 

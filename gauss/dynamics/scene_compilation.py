@@ -54,17 +54,14 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
 def floating(scene: Scene, tree: System) -> Scene:
     """Scene with a free joint "BODY floats" for every body, in which its own joints are loop joints.
 
+    SceneError if a body has no inertia about some axis: floating, it could not be accelerated.
+
     Parameters
     ----------
     scene : Scene
         The scene; it is not changed.
     tree : System
         The same scene in tree coordinates, with the start.
-
-    Raises
-    ------
-    SceneError
-        If a body has no inertia about some axis: floating, it could not be accelerated.
     """
     inertialess = [name for name, body in scene.bodies.items() if not (body.mass and body.principal()[0].all())]
     if inertialess:

@@ -93,10 +93,7 @@ def _acceleration(output: Output, motion: Kinematics, acceleration) -> np.ndarra
 def _of_subtree(output: Output, motion: Kinematics) -> np.ndarray:
     """Centre of mass of a body and all that hangs on it, its velocity, or the angular momentum (3,) about it, in world axes.
 
-    Raises
-    ------
-    SimulationError
-        If they have no mass.
+    SimulationError if they have no mass.
     """
     system = motion.system
     found = {system.frame(output.of).body}

@@ -60,13 +60,7 @@ class Drift(NamedTuple):
 
 
 def drift(system: System, stabilisation: "str | Baumgarte", start: State) -> Drift:
-    """Stabilisation of a name or a :class:`Baumgarte`.
-
-    Raises
-    ------
-    SimulationError
-        If there is no such name.
-    """
+    """Stabilisation of a name or a :class:`Baumgarte`; SimulationError if there is no such name."""
     if isinstance(stabilisation, Baumgarte):
         alpha = _gain(system, start) if stabilisation.alpha is None else stabilisation.alpha
         return Drift(False, (alpha, alpha if stabilisation.beta is None else stabilisation.beta) if system.closes else None)

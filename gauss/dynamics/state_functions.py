@@ -65,14 +65,9 @@ def state_function(
 ) -> Callable:
     """Compiled function of a state, or of several at once; see :meth:`gauss.System.function`.
 
-    Raises
-    ------
-    ArgumentError
-        If there is no such function, or it is called with options that it does not have.
-    StateError
-        If there is no such frame or joint, or coordinates cannot be independent.
-    SimulationError
-        If the law of a load cannot be compiled.
+    ArgumentError if there is no such function, or it is called with options that it does not have.
+    StateError if there is no such frame or joint, or coordinates cannot be independent.
+    SimulationError if the law of a load cannot be compiled.
     """
     requests, columns = _requested(system, names, reference, independent)
     laws = traced_loads(system).key if any(TERMS[one.name].has_loads for one in requests) else ""
@@ -93,10 +88,7 @@ def traced_function(
 
     The last outputs of the trace are error measures, one for each limit of the interface.
 
-    Raises
-    ------
-    ArgumentError, StateError, SimulationError
-        As of :func:`state_function`.
+    ArgumentError, StateError, SimulationError as of :func:`state_function`.
     """
     found = _function(system, *_requested(system, names, reference, independent))
     return found.trace(), found.interface
@@ -120,10 +112,7 @@ def _requested(system: System, names: Sequence[str], reference: str, independent
 def evaluate(system: System, names, given: dict, t, reference: str, independent) -> dict:
     """Results of several functions of a state, by their names; see :meth:`gauss.System.evaluate`.
 
-    Raises
-    ------
-    StateError
-        If an argument is missing or does not fit.
+    StateError if an argument is missing or does not fit.
     """
     names = (names,) if isinstance(names, str) else tuple(names)
     function = state_function(system, names, reference, independent)
@@ -180,23 +169,12 @@ def _columns(system: System, independent) -> tuple[int, ...]:
 
 
 class TracedFunction(NamedTuple):
-    """Function of a state before it is compiled.
+    """Function of a state before it is compiled."""
 
-    Attributes
-    ----------
-    trace : callable
-        () → its trace, whose last outputs are the error measures of :func:`error_measures`.
-    interface : Interface
-        Its arguments and results.
-    name : str
-        Its name in messages.
-    by_null_space : callable or None
-        (state, arguments by name) → its results where elimination leaves few digits; None where it is not by elimination.
-    """
-
-    trace: Callable[[], Function]
-    interface: Interface
-    name: str
+    trace: Callable[[], Function]  # () → its trace, whose last outputs are the error measures of :func:`error_measures`
+    interface: Interface  # its arguments and results
+    name: str  # its name in messages
+    # (state, arguments by name) → its results where elimination leaves few digits; None where it is not by elimination
     by_null_space: Callable[[State, dict], Sequence[np.ndarray]] | None = None
 
 
@@ -336,10 +314,7 @@ def distance_of_loops(system: System, state: State) -> float:
 def refused_state(system: System, state: State, name: str, columns) -> str:
     """Why a state with unit quaternions and finite numbers is refused.
 
-    Raises
-    ------
-    StateError
-        If a loop that cannot move has another pose than in the scene.
+    StateError if a loop that cannot move has another pose than in the scene.
     """
     if distance_of_loops(system, state) <= RESIDUAL_TOLERANCE:
         refuse_other_pose(system, state.q)

@@ -28,8 +28,6 @@ class StateTerms:
 
     Parameters
     ----------
-    system : System
-        The system.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates, symbols; rates, symbols or zeros.
     t : Expression or float

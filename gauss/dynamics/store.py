@@ -73,8 +73,6 @@ def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> 
 
     Parameters
     ----------
-    system : System
-        The system.
     key, make
         As of :meth:`Store.on_demand`; see :func:`gauss.codegen.from_disk`.
     *beside

@@ -48,13 +48,7 @@ class Term(NamedTuple):
 
 
 def traced_loads(system: System) -> Laws:
-    """Laws of the loads as they are now.
-
-    Raises
-    ------
-    SimulationError
-        If one of them cannot be compiled.
-    """
+    """Laws of the loads as they are now; SimulationError if one of them cannot be compiled."""
     laws = Laws(system)
     if laws.reasons:
         words = "; ".join(f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items())

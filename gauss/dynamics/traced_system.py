@@ -48,21 +48,12 @@ FINITE = float(np.finfo(float).max)  # limit of a sum of absolute values that no
 
 
 class Kernels(NamedTuple):
-    """Machine code of the functions that Python forms steps from.
+    """Machine code of the functions that Python forms steps from."""
 
-    Attributes
-    ----------
-    forward : Kernel
-        (t, q, v, generalised forces added) → (q̈, power of the loads).
-    check : Kernel
-        (point, generalised forces added) → error of its accelerations, and residual of the loop constraints under them.
-    project : Kernel or None
-        (t, q, v) → (q and v on the constraints, …, position residual); None where nothing is projected.
-    """
-
-    forward: Kernel
+    forward: Kernel  # (t, q, v, generalised forces added) → (q̈, power of the loads)
+    # (point, generalised forces added) → error of its accelerations, and residual of the loop constraints under them
     check: Kernel
-    project: Kernel | None
+    project: Kernel | None  # (t, q, v) → (q and v on the constraints, …, position residual); None where nothing is projected
 
 
 class Program:

@@ -147,8 +147,6 @@ class _LinkCode:
     ----------
     pair : Pair
         Its joint.
-    kind : LinkKind
-        The kind.
     constants : ndarray
         Numbers of a link of this kind.
     varying : ndarray of int

@@ -131,12 +131,8 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
 def folder_of(folder) -> Path:
     """Folder of a path, made if it is not there.
 
-    Raises
-    ------
-    ArgumentError
-        If it is no path.
-    FileError
-        If it cannot be made.
+    ArgumentError if it is no path.
+    FileError if it cannot be made.
     """
     if not isinstance(folder, str | PathLike):
         raise ArgumentError(f"export: folder: expected a path, got {folder!r:.80}.")
@@ -147,13 +143,7 @@ def folder_of(folder) -> Path:
 
 
 def identifier(name: str) -> str:
-    """Name with underscores for all that is neither letter nor digit.
-
-    Raises
-    ------
-    ArgumentError
-        If it is no text.
-    """
+    """Name with underscores for all that is neither letter nor digit; ArgumentError if it is no text."""
     if not isinstance(name, str):
         raise ArgumentError(f"export: name: expected a text, got {name!r:.80}.")
     found = re.sub(r"\W", "_", name, flags=re.ASCII)
@@ -198,10 +188,7 @@ def _loaded(system: System, name: str) -> ExportedFunction:
 def without_calls(function: Function) -> Function:
     """The same function with the operations of called functions in their places.
 
-    Raises
-    ------
-    SimulationError
-        If it calls a function that is machine code and has no graph.
+    SimulationError if it calls a function that is machine code and has no graph.
     """
     if not any(node.op == "call" for node in function.nodes):
         return function

@@ -32,10 +32,6 @@ class SymbolicTerms(StateTerms):
 
     Parameters
     ----------
-    system : System
-        The system.
-    subsystem : GivenLinkFrames
-        The whole system with symbols.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates, symbols.
     """
@@ -59,10 +55,7 @@ def in_symbols(system: System, name: str) -> tuple[ExportedFunction, dict[str, f
     "l_rod_x" [m] from the joint of the inner body to that of the body, in link frames, "g" [m/s²], and those of constants of
     loads as "stiffness_spring".
 
-    Raises
-    ------
-    SimulationError
-        If the law of a load cannot be traced.
+    SimulationError if the law of a load cannot be traced.
     """
     names, laws = _Symbols(system), Laws(system)
     if laws.reasons:

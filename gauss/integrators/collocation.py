@@ -14,23 +14,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class SymplecticTableau:
-    """Coefficients of a symplectic method.
+    """Coefficients of a symplectic method."""
 
-    Parameters
-    ----------
-    a, b, c : ndarray, shape (s, s), (s,), (s,)
-        Coefficients, weights and nodes of the positions.
-    a_nodes : ndarray, shape (r, s)
-        Coefficients ā of the constraint nodes but the first.
-    b_nodes, c_nodes : ndarray, shape (r + 1,)
-        Weights and times of all constraint nodes.
-    """
-
-    a: np.ndarray
+    a: np.ndarray  # a (s, s), b (s,), c (s,): coefficients, weights and nodes of the positions
     b: np.ndarray
     c: np.ndarray
-    a_nodes: np.ndarray
-    b_nodes: np.ndarray
+    a_nodes: np.ndarray  # (r, s) coefficients ā of the constraint nodes but the first
+    b_nodes: np.ndarray  # b_nodes, c_nodes (r + 1,): weights and times of all constraint nodes
     c_nodes: np.ndarray
 
     @property

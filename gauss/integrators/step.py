@@ -67,25 +67,13 @@ class Reached(NamedTuple):
 
 
 class CompensatedSums(NamedTuple):
-    """Method state of methods in momenta: compensated sums (Kahan 1965).
+    """Method state of methods in momenta: compensated sums (Kahan 1965)."""
 
-    Attributes
-    ----------
-    compensation : ndarray, shape (n_v,)
-        Compensation of the coordinates.
-    momentum, momentum_compensation : ndarray, shape (n_v,)
-        Momentum in axes of parents, and its compensation.
-    work_compensation : ndarray, shape (3,)
-        Compensation of the work.
-    begun : float
-        0 before the first step, when the momentum is not yet computed.
-    """
-
-    compensation: np.ndarray
-    momentum: np.ndarray
+    compensation: np.ndarray  # (n_v,) compensation of the coordinates
+    momentum: np.ndarray  # momentum, momentum_compensation (n_v,): momentum in axes of parents, and its compensation
     momentum_compensation: np.ndarray
-    work_compensation: np.ndarray
-    begun: Scalar
+    work_compensation: np.ndarray  # (3,) compensation of the work
+    begun: Scalar  # 0 before the first step, when the momentum is not yet computed
 
     @classmethod
     def of(cls, method_state: np.ndarray, n_v: int) -> "CompensatedSums":

@@ -12,21 +12,11 @@ ONE = 2**400  # units of the exact sums in one: coefficients and their products 
 
 @dataclass(frozen=True)
 class Tableau:
-    """Explicit Runge–Kutta method.
+    """Explicit Runge–Kutta method."""
 
-    Parameters
-    ----------
-    order : int
-        Order of convergence.
-    A : ndarray, shape (s, s)
-        Stage coefficients.
-    b, c : ndarray, shape (s,)
-        Weights and nodes.
-    """
-
-    order: int
-    A: np.ndarray
-    b: np.ndarray
+    order: int  # order of convergence
+    A: np.ndarray  # (s, s) stage coefficients
+    b: np.ndarray  # b, c (s,): weights and nodes
     c: np.ndarray
 
 

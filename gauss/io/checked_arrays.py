@@ -17,10 +17,7 @@ ASYMMETRY_RELATIVE = 1e-9  # of the largest entry: Hessians of others are symmet
 def read_arrays(path: Path) -> dict[str, np.ndarray | None]:
     """Arrays of an .npz file by name; None where the pickle of a single object stands for nothing, as qpsolvers writes it.
 
-    Raises
-    ------
-    ValueError
-        If it is no such file, holds other objects, or more than :data:`LARGEST_FILE`.
+    ValueError if it is no such file, holds other objects, or more than :data:`LARGEST_FILE`.
     """
     with zipfile.ZipFile(path) as archive:
         members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
@@ -46,13 +43,7 @@ def _header(name: str, file, size: int) -> np.dtype:
 
 
 def require_small(size: float):
-    """Refuse a file whose arrays need too many bytes.
-
-    Raises
-    ------
-    ValueError
-        If there are more than :data:`LARGEST_FILE`.
-    """
+    """Refuse a file whose arrays need too many bytes; ValueError if there are more than :data:`LARGEST_FILE`."""
     if size > LARGEST_FILE:
         raise ValueError(f"its arrays need {size / 1e9:.3g} GB, more than {LARGEST_FILE / 1e9:g}.")
 
@@ -108,11 +99,8 @@ def require_symmetric(name: str, matrix):
 def require_programme(P, q, A, b, G, h):
     """Refuse matrices and vectors that are no quadratic programme.
 
-    Raises
-    ------
-    ValueError
-        If shapes do not belong together, P is not symmetric, numbers but right-hand sides of inequalities are not finite,
-        or nothing is asked.
+    ValueError if shapes do not belong together, P is not symmetric, numbers but right-hand sides of inequalities are not
+    finite, or nothing is asked.
     """
     n = np.size(q)
     expected = {"P": (n, n), "q": (n,), "A": (np.size(b), n), "b": (np.size(b),), "G": (np.size(h), n), "h": (np.size(h),)}

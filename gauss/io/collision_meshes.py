@@ -15,8 +15,6 @@ def mesh_path(file: Path, named: str) -> Path | None:
 
     Parameters
     ----------
-    file : Path
-        The file of the robot.
     named : str
         As it stands there.
     """
@@ -32,13 +30,7 @@ def mesh_path(file: Path, named: str) -> Path | None:
 
 
 def mesh_vertices(path: Path, scale) -> np.ndarray:
-    """Vertices (k, 3) of a mesh file, each once, scaled along its axes [m].
-
-    Raises
-    ------
-    FileError
-        If it cannot be read.
-    """
+    """Vertices (k, 3) of a mesh file, each once, scaled along its axes [m]; FileError if it cannot be read."""
     import coal  # few files have meshes
 
     try:

@@ -104,8 +104,6 @@ def write_local(file, W, q: np.ndarray, mu: np.ndarray, info: Mapping[str, str])
 
     Parameters
     ----------
-    file : h5py.File
-        The file.
     W : ndarray or sparse array, shape (3 m, 3 m)
         Delassus operator.
     q, mu : ndarray, shape (3 m,), (m,)
@@ -130,10 +128,7 @@ def write_local(file, W, q: np.ndarray, mu: np.ndarray, info: Mapping[str, str])
 def read_local(file):
     """Group of a problem in local form, its W (3 m, 3 m), a sparse array, q (3 m,) and μ (m,).
 
-    Raises
-    ------
-    ValueError, KeyError, TypeError, OSError
-        If there is none, or it is not as FCLIB says; see :data:`NOT_OF_FCLIB`.
+    ValueError, KeyError, TypeError, OSError if there is none, or it is not as FCLIB says; see :data:`NOT_OF_FCLIB`.
     """
     if "fclib_local" not in file:
         raise ValueError(f"expected the group 'fclib_local', found {', '.join(map(repr, file)) or 'none'}.")
@@ -198,13 +193,7 @@ def _names(local, count: int) -> tuple[str, ...]:
 
 
 def hdf5():
-    """Package h5py.
-
-    Raises
-    ------
-    MissingPackageError
-        If it is not installed.
-    """
+    """Package h5py; MissingPackageError if it is not installed."""
     with extra("results"):
         import h5py
     return h5py

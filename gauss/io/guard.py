@@ -23,21 +23,11 @@ NAMES = ("name", "link", "joint", "body")  # attributes that may look like numbe
 
 @dataclass(frozen=True)
 class Source:
-    """One file that may be parsed.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    root : Element
-        What it holds.
-    places : dict
-        File and line of every element, as "robot.urdf:12".
-    """
+    """One file that may be parsed."""
 
     path: Path
-    root: Element
-    places: dict[Element, str] = field(repr=False)
+    root: Element  # what it holds
+    places: dict[Element, str] = field(repr=False)  # file and line of every element, as "robot.urdf:12"
 
     def place(self, element: Element | None) -> str:
         """File and line of an element; the file alone where there is none."""
@@ -47,10 +37,10 @@ class Source:
 def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = (), loose_comments: bool = False) -> Source:
     """Read an untrusted file.
 
+    FileError if it cannot be read, or holds what is refused; the message says where.
+
     Parameters
     ----------
-    path : str or Path
-        The file.
     roots : tuple of str
         What its outermost element may be.
     limits : tuple of str
@@ -58,11 +48,6 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = (), loose_c
     loose_comments : bool
         Whether comments may hold "--", and blanks precede the declaration: only where no other parser reads the file again,
         which might see other elements.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or holds what is refused; the message says where.
     """
     path = Path(path)
     content = contents(path)
@@ -105,13 +90,7 @@ def require_inside(source: Source, element: Element, home: Path, named: str, roo
 
 
 def resolved(path: Path, place: str) -> Path:
-    """Path without links.
-
-    Raises
-    ------
-    FileError
-        If its links go round in a circle.
-    """
+    """Path without links; FileError if its links go round in a circle."""
     try:
         return path.resolve()
     except (OSError, RuntimeError) as error:
@@ -119,13 +98,7 @@ def resolved(path: Path, place: str) -> Path:
 
 
 def checked_root(path, root_folder) -> Path | None:
-    """Folder that a file may name files in, as the user gave it.
-
-    Raises
-    ------
-    FileError
-        If it is no folder.
-    """
+    """Folder that a file may name files in, as the user gave it; FileError if it is no folder."""
     if root_folder is None:
         return None
     if not isinstance(root_folder, str | Path) or not Path(root_folder).is_dir():

@@ -94,12 +94,8 @@ def _neither(name: str, path: Path, everything: list[str]) -> str:
 def writer(path: Path, kind: str) -> Callable:
     """Function (thing, path) that writes things of a kind, a key of :data:`WRITERS`, with the ending of this path.
 
-    Raises
-    ------
-    FileError
-        If the ending does not fit, or there is no such folder.
-    MissingPackageError
-        If the library of such files is not installed.
+    FileError if the ending does not fit, or there is no such folder.
+    MissingPackageError if the library of such files is not installed.
     """
     writers = WRITERS[kind]
     if path.suffix.lower() not in writers:

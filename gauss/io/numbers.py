@@ -27,10 +27,7 @@ def numbers(text: str | None, count: int) -> tuple[float, ...] | None:
 def check_option(path, name: str, given: str, options: tuple[str, ...]):
     """Refuse an option of a reader that is none.
 
-    Raises
-    ------
-    FileError
-        With the file, the name of the option, its values, and the one that may have been meant.
+    FileError with the file, the name of the option, its values, and the one that may have been meant.
     """
     if given not in options:
         raise FileError(f"{path}: {name}: expected {' or '.join(map(repr, options))}. {did_you_mean(str(given), options)}")

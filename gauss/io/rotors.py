@@ -110,13 +110,7 @@ def save_rotors(network: Network, path) -> Path:
 
 
 def toml_text(network: Network) -> str:
-    """Network as TOML.
-
-    Raises
-    ------
-    FileError
-        If a law or curve is a Python function, which no file can hold.
-    """
+    """Network as TOML; FileError if a law or curve is a Python function, which no file can hold."""
     lines = [_line("name", network.name)]
     things: list[Any] = [*network.shafts.values(), *network.links.values()]
     for thing in things:

@@ -23,10 +23,7 @@ TABLES = ("weights", "preload")
 def servo_from_tables(data: dict) -> Servo:
     """Servo of the tables of a file, with the scene that it is about.
 
-    Raises
-    ------
-    SceneError
-        If a section or key is unknown, or says something impossible.
+    SceneError if a section or key is unknown, or says something impossible.
     """
     data = dict(data)
     given = data.pop("servo")

@@ -21,28 +21,18 @@ with extra():
 
 @dataclass(frozen=True)
 class Visual:
-    """Mesh on a body.
+    """Mesh on a body."""
 
-    Parameters
-    ----------
-    body : str
-        The body, or "ground".
-    vertices : ndarray, shape (k, 3)
-        In the frame of the body [m].
-    faces : ndarray, shape (m, 3)
-        Vertices of the triangles.
-    colour : tuple of float
-        Red, green, blue, from 0 to 1.
-    """
-
-    body: str
-    vertices: np.ndarray
-    faces: np.ndarray
-    colour: tuple[float, float, float]
+    body: str  # the body, or "ground"
+    vertices: np.ndarray  # (k, 3) in the frame of the body [m]
+    faces: np.ndarray  # (m, 3) vertices of the triangles
+    colour: tuple[float, float, float]  # red, green, blue, from 0 to 1
 
 
 def read_visuals(source, root: str = "fixed") -> list[Visual]:
     """Meshes of a robot; none if the source is no URDF file.
+
+    FileError if a mesh cannot be read.
 
     Parameters
     ----------
@@ -50,11 +40,6 @@ def read_visuals(source, root: str = "fixed") -> list[Visual]:
         A .urdf file or "robot:NAME", as for :func:`gauss.load`.
     root : str
         As for :func:`gauss.load`.
-
-    Raises
-    ------
-    FileError
-        If a mesh cannot be read.
     """
     name = str(source)
     path = robot(name.removeprefix("robot:")) if name.startswith("robot:") else Path(source)

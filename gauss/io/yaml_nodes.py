@@ -21,10 +21,7 @@ class Marked(NamedTuple):
 def yaml_entries(path: Path) -> dict[str, Marked]:
     """Entries of the mapping that a YAML file holds.
 
-    Raises
-    ------
-    FileError
-        If it cannot be read, or holds aliases, tags, or a key twice.
+    FileError if it cannot be read, or holds aliases, tags, or a key twice.
     """
     with extra("yaml"):
         import yaml  # few robots need it

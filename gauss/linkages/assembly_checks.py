@@ -18,10 +18,7 @@ SINGULAR_CONDITION = 2.0**52  # condition number of a matrix that is singular in
 def check_assembled(motion: LinkageKinematics) -> None:
     """Check that all groups can be assembled at all crank angles.
 
-    Raises
-    ------
-    LinkageError
-        If one cannot; the message names it and the angles at which the linkage closes.
+    LinkageError if one cannot; the message names it and the angles at which the linkage closes.
     """
     for group, slack in zip(motion.chain.groups, motion.slack, strict=True):
         for words, value in slack.items():
@@ -51,10 +48,7 @@ def degrees(angle: float) -> str:
 def check_regular(found: Cycle, kappa: np.ndarray) -> None:
     """Refuse crank angles at which too few digits are left, and warn of nearly singular ones.
 
-    Raises
-    ------
-    LinkageError
-        If fewer than six digits are left.
+    LinkageError if fewer than six digits are left.
     """
     if not kappa.size:
         return

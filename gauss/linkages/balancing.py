@@ -84,10 +84,7 @@ def counterweights(chain: Chain, links: tuple[str, ...]) -> Counterweights:
 
     A four-bar is balanced entirely by weights on both links that turn about the ground (Berkof and Lowen 1969).
 
-    Raises
-    ------
-    LinkageError
-        If a link has no pivot on the ground.
+    LinkageError if a link has no pivot on the ground.
     """
     _refuse_none(chain, links)
     found = cycle(chain, full_turn(chain, ANGLES))
@@ -151,10 +148,7 @@ def _ground_pivot(chain: Chain, link: str):
 def weighted(chain: Chain, name: str, moment, radius: float) -> PlanarLink:
     """Link with a point mass, whose mass × place relative to the ground pivot is given, at a radius from it.
 
-    Raises
-    ------
-    LinkageError
-        If the radius is not positive.
+    LinkageError if the radius is not positive.
     """
     if not isinstance(radius, Real) or not np.isfinite(radius) or radius <= 0:
         raise LinkageError(f"radius of the counterweight on {name!r}: expected a positive length [m], got {radius!r}.")

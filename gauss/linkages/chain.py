@@ -12,15 +12,7 @@ WITH_MODES = ("RRR", "RRP", "RPR")  # two assembly modes; the others have one
 
 @dataclass(frozen=True)
 class Leg:
-    """Link of a group with its outer joint, on a carrier placed before.
-
-    Parameters
-    ----------
-    link : PlanarLink
-        The link.
-    joint : LinkJoint
-        Its outer joint.
-    """
+    """Link of a group with its outer joint, on a carrier placed before."""
 
     link: PlanarLink
     joint: LinkJoint

@@ -115,10 +115,7 @@ def near(chain: Chain, angles) -> dict[str, np.ndarray]:
 def follow(chain: Chain) -> AssemblyBranch:
     """Follow the ternary links from the start of the cycle: through a turn of the crank, or both ways as far as they lead.
 
-    Raises
-    ------
-    LinkageError
-        If they cannot be placed at the start of the cycle, or come back from a turn in another assembly.
+    LinkageError if they cannot be placed at the start of the cycle, or come back from a turn in another assembly.
     """
     start, first = chain.driver.start, _first(chain)
     forth = _walk(chain, first, start, 1.0)

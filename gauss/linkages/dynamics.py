@@ -214,13 +214,7 @@ def _warn_of_motor(chain: Chain, switches: Timetable, found: CrankMotion, durati
 
 
 def _check_settings(duration: float, rtol: float, atol: float | None, step: float | None, added_inertia: float) -> None:
-    """Check the arguments of :func:`run`.
-
-    Raises
-    ------
-    SimulationError, LinkageError
-        If one makes no sense.
-    """
+    """Check the arguments of :func:`run`; SimulationError, LinkageError if one makes no sense."""
     given = {name: value for name, value in (("atol", atol), ("step", step)) if value is not None}
     for what, value in {"duration": duration, "rtol": rtol, **given}.items():
         if not np.isfinite(value) or value <= 0:

@@ -197,17 +197,12 @@ class Flywheel(NamedTuple):
 def flywheel(chain: Chain, fluctuation: float) -> Flywheel:
     """Size of a flywheel: J_F = ΔE / (ω̄² δ), of first order in δ = (ω_max − ω_min) / ω̄.
 
+    LinkageError if δ is not positive, or the crank rests.
+
     Parameters
     ----------
     chain : Chain
         The linkage; its crank must turn fully.
-    fluctuation : float
-        δ.
-
-    Raises
-    ------
-    LinkageError
-        If δ is not positive, or the crank rests.
     """
     if not isinstance(fluctuation, Real) or not 0 < fluctuation <= LARGEST_FLOAT or not chain.driver.speed:
         raise LinkageError(

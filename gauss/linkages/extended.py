@@ -61,8 +61,6 @@ class GivenJoint:
 
     Parameters
     ----------
-    joint : LinkJoint
-        The joint.
     points, directions : dict
         Link → point [m] and direction of the guide in its frame.
     """

@@ -31,10 +31,7 @@ def given(load: Load, motion: LinkageKinematics) -> Wrench:
 def acting(load: Load, motion: LinkageKinematics) -> Wrench:
     """Wrench of a load, at its point of application.
 
-    Raises
-    ------
-    LinkageError
-        If a law returns something else than three numbers for each crank angle.
+    LinkageError if a law returns something else than three numbers for each crank angle.
     """
     moving = motion.links[load.link]
     x, force, moment = wrench = given(load, motion)

@@ -23,8 +23,6 @@ class LinkageKinematics:
 
     Parameters
     ----------
-    chain : Chain
-        The linkage.
     crank_angle, crank_speed : ndarray
         Angle [rad] and speed [rad/s] of the crank.
     links : dict of LinkMotion

@@ -153,10 +153,7 @@ def _grow(root: int, number: int, links, gears, group, K) -> list[GearBranch]:
 def _redundant(branches: list[GearBranch], root: int, links, driven, driver, group, K, names) -> list[int]:
     """Gears beside the tree, which close cycles and are redundant.
 
-    Raises
-    ------
-    SceneError
-        If the ratios or the losses of a cycle leave its motion or its torques undetermined.
+    SceneError if the ratios or the losses of a cycle leave its motion or its torques undetermined.
     """
     above = {branch.child: branch for branch in branches}
     inside = {branch.link for branch in branches}
@@ -203,10 +200,7 @@ def _path(shaft: int, above: dict) -> list[GearBranch]:
 def _initial_speeds(network: Network, names, group, K, count: int) -> np.ndarray:
     """Initial speeds (n_g,) of the roots, from those of the shafts [rad/s].
 
-    Raises
-    ------
-    SceneError
-        If speeds of geared shafts contradict each other.
+    SceneError if speeds of geared shafts contradict each other.
     """
     speed = np.zeros(count)
     said: list[str | None] = [None] * count

@@ -107,13 +107,7 @@ class Torque:
 
 
 def as_law(given, what: str) -> Law:
-    """Torque law from a law, a constant [N m] or a function of (t, angle, speed).
-
-    Raises
-    ------
-    SceneError
-        If it is none of these.
-    """
+    """Torque law from a law, a constant [N m] or a function of (t, angle, speed); SceneError if it is none of these."""
     if isinstance(given, Law):
         return given
     if isinstance(given, type) and issubclass(given, Law):

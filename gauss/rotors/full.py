@@ -40,16 +40,11 @@ class Snapshot(NamedTuple):
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> now = rotors.snapshot(fan)
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> now = rotors.snapshot(drum)
     >>> now.accelerations.round(3), now.torques.round(3), now.forward
-    (array([1303.167,  651.584]), array([325.792]), array([ True]))
+    (array([13.944, 28.457, 42.686]), array([85.78 , 61.785]), array([ True,  True]))
     """
 
     accelerations: np.ndarray
@@ -83,17 +78,12 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> rotors.snapshot(fan, speeds=[50.0, 25.0]).torques.round(3)
-    array([219.91])
-    >>> rotors.snapshot(fan, speeds=[50.0, 25.0], form="full").torques.round(3)
-    array([219.91])
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> rotors.snapshot(drum, speeds=[49.0, 100.0, 150.0]).torques.round(3)
+    array([178.852, 121.669])
+    >>> rotors.snapshot(drum, speeds=[49.0, 100.0, 150.0], form="full").torques.round(3)
+    array([178.852, 121.669])
     """
     if form not in FORMS:
         raise StateError(f"no form {form!r}. {did_you_mean(form, FORMS)}")

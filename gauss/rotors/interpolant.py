@@ -54,13 +54,7 @@ class Interpolant:
 
 
 def points(x, y, what: str, x_key: str, x_unit: str, y_key: str, y_unit: str) -> tuple[tuple, tuple]:
-    """Two checked tuples of one length, the first increasing.
-
-    Raises
-    ------
-    SceneError
-        If they are not.
-    """
+    """Two checked tuples of one length, the first increasing; SceneError if they are not."""
     if not all(isinstance(column, (tuple, list, np.ndarray)) for column in (x, y)):
         raise SceneError(f"{what}: {x_key} and {y_key} are lists of numbers in [{x_unit}] and [{y_unit}].")
     x, y = (

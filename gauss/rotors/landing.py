@@ -38,6 +38,8 @@ def land(
 ) -> None:
     """Step from the start of a step to the first margin that becomes negative, and find the new phase.
 
+    SimulationError if too many events follow each other without progress in time.
+
     Parameters
     ----------
     run : RotorRun
@@ -52,11 +54,6 @@ def land(
         Names of the margins, and their values at the start.
     negative : ndarray of int
         Indices of the negative margins.
-
-    Raises
-    ------
-    SimulationError
-        If too many events follow each other without progress in time.
     """
     step = _Step(run, dense, begin, until)
     first, t = step.first_zero(before, negative)

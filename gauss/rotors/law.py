@@ -45,17 +45,14 @@ POSITIVE, NOT_NEGATIVE = {"positive": True}, {"non_negative": True}
 def check_fields(law: Law, **rules: tuple[str, dict[str, bool]]) -> None:
     """Keep fields of a law as finite floats.
 
+    SceneError if a field is no finite number of this sign.
+
     Parameters
     ----------
     law : Law
         The law, a frozen dataclass.
     **rules : (str, dict)
         Unit and sign of each field.
-
-    Raises
-    ------
-    SceneError
-        If a field is no finite number of this sign.
     """
     for key, (unit, sign) in rules.items():
         checked = values.number(getattr(law, key), f"law {type(law).__name__.lower()!r}: {key}", unit, **sign)

@@ -15,26 +15,14 @@ from gauss.scene.losses import checked_slip, keep_efficiencies, torque_factor
 
 
 class LinkKinematics(NamedTuple):
-    """Relative kinematics of the two shafts of a link.
+    """Relative kinematics of the two shafts of a link."""
 
-    Attributes
-    ----------
-    t : float
-        Time [s].
-    twist, lead : float
-        α_driver/i − α_driven, lead of the driver [rad], and its rate [rad/s].
-    v_d, v : float
-        Speeds ω_driver and i ω_driven [rad/s].
-    v_0 : float
-        Speed below which a friction drive counts as at rest [rad/s].
-    """
-
-    t: Scalar
-    twist: Scalar
+    t: Scalar  # time [s]
+    twist: Scalar  # twist, lead: α_driver/i − α_driven, lead of the driver [rad], and its rate [rad/s]
     lead: Scalar
-    v_d: Scalar
+    v_d: Scalar  # v_d, v: speeds ω_driver and i ω_driven [rad/s]
     v: Scalar
-    v_0: float
+    v_0: float  # speed below which a friction drive counts as at rest [rad/s]
 
 
 @dataclass(frozen=True)

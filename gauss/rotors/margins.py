@@ -25,8 +25,6 @@ def margins(phase: NetworkPhase, t: float, theta, w, scale: float) -> tuple[list
 
     Parameters
     ----------
-    phase : NetworkPhase
-        The phase.
     t, theta, w
         Time [s], angles since the start [rad] and speeds [rad/s] of the roots.
     scale : float

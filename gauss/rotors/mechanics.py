@@ -52,27 +52,13 @@ class Conditions(NamedTuple):
 
 
 class NetworkInstant(NamedTuple):
-    """Accelerations, torques and powers of one instant.
+    """Accelerations, torques and powers of one instant."""
 
-    Attributes
-    ----------
-    acceleration : ndarray, shape (n_g,)
-        Of the roots [rad/s²].
-    torque : ndarray, shape (n_l,)
-        Q_em of the links [N m].
-    applied : ndarray, shape (n,)
-        Sum of torques on each shaft but those of gears [N m].
-    power : ndarray, shape (3,)
-        Of motors, loads and losses [W].
-    slipped, meshed : ndarray, shape (n_l,)
-        Power lost between the shafts of each link, and by its efficiency [W].
-    """
-
-    acceleration: np.ndarray
-    torque: np.ndarray
-    applied: np.ndarray
-    power: np.ndarray
-    slipped: np.ndarray
+    acceleration: np.ndarray  # (n_g,) of the roots [rad/s²]
+    torque: np.ndarray  # (n_l,) q_em of the links [N m]
+    applied: np.ndarray  # (n,) sum of torques on each shaft but those of gears [N m]
+    power: np.ndarray  # (3,) of motors, loads and losses [W]
+    slipped: np.ndarray  # slipped, meshed (n_l,): power lost between the shafts of each link, and by its efficiency [W]
     meshed: np.ndarray
 
 
@@ -87,8 +73,6 @@ def evaluate(reduced: ReducedNetwork, t, theta, w, conditions: Conditions) -> Ne
 
     Parameters
     ----------
-    reduced : ReducedNetwork
-        The network.
     t : Scalar
         Time [s].
     theta, w : array_like, shape (n_g,)

@@ -42,18 +42,10 @@ class Mode:
 
 @dataclass(frozen=True)
 class Indicator:
-    """Quantity whose change of sign is an event that changes no equation.
+    """Quantity whose change of sign is an event that changes no equation."""
 
-    Parameters
-    ----------
-    element : str
-        Shaft, link or torque.
-    falling, rising : str
-        Kind of event when it becomes negative or positive.
-    """
-
-    element: str
-    falling: str
+    element: str  # shaft, link or torque
+    falling: str  # falling, rising: kind of event when it becomes negative or positive
     rising: str
 
 

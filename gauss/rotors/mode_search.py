@@ -38,10 +38,10 @@ def find_phase(
 ) -> NetworkPhase:
     """Phase that fits an instant.
 
+    SimulationError if no consistent mode is found.
+
     Parameters
     ----------
-    equations : NetworkEquations
-        Equations of the network.
     t, theta, w
         Time [s], angles since the start [rad] and speeds [rad/s] of the roots.
     previous : NetworkPhase, optional
@@ -52,11 +52,6 @@ def find_phase(
         TimePoint beyond the event, where the signs of what is zero at the event are clear: torques are evaluated there.
     slack : float
         Speeds below this, over the largest of the network, count as zero.
-
-    Raises
-    ------
-    SimulationError
-        If no consistent mode is found.
     """
     reduced = equations.reduced
     speed, small = reduced.K * w[reduced.group], slack * reduced.largest
@@ -107,13 +102,7 @@ def _kinematic(equations: NetworkEquations, t: float, theta, speed, small: float
 
 
 def _slipping(link: ShaftLink, ends: LinkKinematics) -> float:
-    """Sign of the slip of a link.
-
-    Raises
-    ------
-    SceneError
-        If a one-way clutch would have to engage by an impact.
-    """
+    """Sign of the slip of a link; SceneError if a one-way clutch would have to engage by an impact."""
     if isinstance(link, OneWayClutch) and ends.lead > 0:
         raise SceneError(
             f"{link.what}: at t = {ends.t:.6g} s the driver is {ends.lead:.3g} rad/s faster than the driven shaft; it "

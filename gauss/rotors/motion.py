@@ -29,17 +29,12 @@ class RotorEnergy:
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> run = rotors.simulate(drum, 0.5, times=[0.0, 0.5])
     >>> energy = run.energy()
     >>> energy.kinetic.round(2), bool(abs(energy.balance).max() < 1e-9 * energy.scale)
-    (array([   0.  , 2104.57]), True)
+    (array([  0.  , 274.26]), True)
     """
 
     input: np.ndarray
@@ -107,16 +102,11 @@ class RotorMotion:
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
-    >>> run.speed("wheel").round(3), run.torque("gear").round(3)
-    (array([ 0.   , 68.387]), array([325.792,  49.041]))
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> run = rotors.simulate(drum, 0.5, times=[0.0, 0.5])
+    >>> run.speed("drum").round(3), run.torque("belt").round(3)
+    (array([0.327, 7.883]), array([85.78 , 97.557]))
     >>> run.t
     array([0. , 0.5])
     """

@@ -34,17 +34,13 @@ class OperatingPoint:
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> point = rotors.operating_points(fan)[0]
-    >>> round(point.speed("wheel"), 3), point.stable
-    (68.831, True)
-    >>> bool(abs(point.input - point.useful - point.mesh_loss.sum()) < 1e-9 * point.input)
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> point = rotors.operating_points(drum)[0]
+    >>> round(point.speed("drum"), 3), point.stable
+    (50.387, True)
+    >>> lost = point.bearings + point.slip_loss.sum() + point.mesh_loss.sum()
+    >>> bool(abs(point.input - point.useful - lost) < 1e-9 * point.input)
     True
     """
 

@@ -16,23 +16,16 @@ MOST_PATTERNS = 200
 def group_pattern(reduced: ReducedNetwork, group: int, applied, turning, forward) -> tuple[float, np.ndarray]:
     """Acceleration of the root [rad/s²] and directions of all links, those of the group found.
 
+    SimulationError if no pattern is found, which only rounding can cause.
+
     Parameters
     ----------
-    reduced : ReducedNetwork
-        The network.
-    group : int
-        Group.
     applied : ndarray, shape (n,)
         Torques on the shafts but those of gears [N m].
     turning : ndarray, shape (n,)
         Sense of rotation of each shaft, 1 or −1.
     forward : ndarray of bool, shape (n_l,)
         First guess of the directions.
-
-    Raises
-    ------
-    SimulationError
-        If no pattern is found, which only rounding can cause.
     """
     branches, root, forward = reduced.branches(group), reduced.roots[group], forward.copy()
     low, high = -np.inf, np.inf

@@ -22,36 +22,16 @@ REDUNDANT_LOCK = 1e-13  # singular value, relative to the largest, of locks that
 
 
 class Lock(NamedTuple):
-    """Sticking link or group: a torque within bounds keeps the slip rate u = row · w at zero.
+    """Sticking link or group: a torque within bounds keeps the slip rate u = row · w at zero."""
 
-    Attributes
-    ----------
-    kind : str
-        "link", or "group" (stuck by dry friction and its own losses).
-    place : int
-        Number of the link or group.
-    row : ndarray, shape (n_g,)
-        u over the speeds of the roots.
-    column : ndarray, shape (n_g,)
-        Accelerations of the roots for the unit torque [1/(kg m²)].
-    """
-
-    kind: str
-    place: int
-    row: np.ndarray
-    column: np.ndarray
+    kind: str  # "link", or "group" (stuck by dry friction and its own losses)
+    place: int  # number of the link or group
+    row: np.ndarray  # (n_g,) u over the speeds of the roots
+    column: np.ndarray  # (n_g,) accelerations of the roots for the unit torque [1/(kg m²)]
 
 
 class NetworkPhase:
-    """Equations of a network in a mode.
-
-    Parameters
-    ----------
-    equations : NetworkEquations
-        Equations of the network.
-    mode : Mode
-        Mode.
-    """
+    """Equations of a network in a mode."""
 
     def __init__(self, equations: NetworkEquations, mode: Mode):
         reduced = equations.reduced

@@ -46,8 +46,6 @@ class ReducedNetwork:
 
     Parameters
     ----------
-    network : Network
-        The network.
     names : tuple of str
         Shafts, n of them.
     links : tuple of Link

@@ -24,16 +24,11 @@ def report(motion: RotorMotion) -> str:
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> run = rotors.simulate(drum, 0.5, times=[0.0, 0.5])
     >>> print(rotors.report(run).splitlines()[0])
-    RotorMotion('fan', 2 samples, 0 … 0.5 s, 0 events)
+    RotorMotion('gear runup', 2 samples, 0 … 0.5 s, 0 events)
     """
     reduced, stats, energy = motion.reduced, motion.stats, motion.energy()
     how = "; ".join([stats.plan.dynamics, *map(str, stats.plan.rejected)])
@@ -83,17 +78,12 @@ def table(motion: RotorMotion) -> dict[str, np.ndarray]:
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> run = rotors.simulate(fan, 0.5, times=[0.0, 0.5])
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> run = rotors.simulate(drum, 0.5, times=[0.0, 0.5])
     >>> columns = rotors.table(run)
     >>> list(columns)[:3]
-    ['time [s]', 'motor: angle [rad]', 'motor: speed [rad/s]']
+    ['time [s]', 'drum: angle [rad]', 'drum: speed [rad/s]']
     """
     columns = {"time [s]": motion.t}
     for name in motion.reduced.names:
@@ -122,18 +112,13 @@ def steady_table(points: list[OperatingPoint], t: float = 0.0) -> str:
 
     Examples
     --------
-    >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> gear = fan.gear("gear", driven=wheel, driver=motor, ratio=2.0, efficiency=0.96)
-    >>> drive = fan.torque(motor, rotors.Linear(stiffness=2.0, omega_0=150.0))
-    >>> load = fan.torque(wheel, rotors.Quadratic(0.01))
-    >>> print(rotors.steady_table(rotors.operating_points(fan)))
+    >>> from gauss import load_rotors, rotors
+    >>> drum = load_rotors("gear_runup")
+    >>> print(rotors.steady_table(rotors.operating_points(drum)))
     <BLANKLINE>
     steady operating points with the torques at 0 s: 1
-      1. stable: speeds [rad/s] motor 137.662, wheel 68.8311
-         input 3396.9 W, useful 3261.02 W, losses [W] gear 135.88
+      1. stable: speeds [rad/s] drum 50.3869, layshaft 102.83, motor 154.246
+         input 6406.86 W, useful 5878.04 W, losses [W] belt 336.61, gear 192.21
     """
     if not points:
         return f"\nno steady operating point with the torques at {t:g} s: at every speed in its range something accelerates"

@@ -4,6 +4,11 @@ A step is accepted if the margins of its phase stay positive and no torque law s
 steps are those of :mod:`gauss.rotors.stops`. Explicit steps keep h |λ| ≤ 1/2 for the fastest decay λ: nearer to the limit of
 stability the error estimate of DOP853 fails. Where that asks for too many steps, Radau IIA takes over (Hairer and Wanner,
 Solving ODEs II, IV.2 and IV.8).
+
+The loop is not that of :mod:`gauss.simulation.phases`, which gives the same motions of ``to_scene(network)``, to 2e-10 of
+the largest speed, but has no implicit steps, no limit by the decay, and machine code for each phase: the shipped networks
+took it 2.6 to 40 times the CPU time (``parallel_branches`` 0.92 s for 0.36 s, ``hoist`` 4.1 s for 0.14 s, second runs),
+and ``harvester`` more than 170 s for 0.3 s of motion, which take 0.4 s here.
 """
 
 import time
@@ -48,10 +53,6 @@ class BeltSlipWarning(UserWarning):
     Examples
     --------
     >>> from gauss import rotors
-    >>> fan = rotors.Network("fan")
-    >>> motor = fan.shaft("motor", inertia=0.1)
-    >>> wheel = fan.shaft("wheel", inertia=0.5)
-    >>> import warnings
     >>> issubclass(rotors.BeltSlipWarning, UserWarning)
     True
     """
@@ -74,8 +75,6 @@ class RotorRun:
 
     Parameters
     ----------
-    equations : NetworkEquations
-        Equations of the network.
     method : str
         "auto", "dop853" or "radau".
     rtol : float
@@ -208,13 +207,7 @@ class RotorRun:
                 return
 
     def _step(self, solver: OdeSolver, rate: float) -> None:
-        """One step of an integrator.
-
-        Raises
-        ------
-        SimulationError
-            If steps become too many or too short, or the rates are not finite.
-        """
+        """One step of an integrator; SimulationError if steps become too many or too short, or the rates are not finite."""
         message = solver.step()
         self.steps += 1
         if self.steps > MOST_STEPS:
@@ -241,10 +234,7 @@ class RotorRun:
     def _hop(self, until: float) -> None:
         """Cross a discontinuity of a law by an Euler step near the resolution of time, and find the phase beyond it.
 
-        Raises
-        ------
-        SimulationError
-            If crossings follow each other so fast that the run would not come to an end.
+        SimulationError if crossings follow each other so fast that the run would not come to an end.
         """
         (count, since), duration = self.crossings, self.switching.duration
         chatters = self.t - since <= (count + 1) * CHATTER_SHARE * duration / MOST_STEPS

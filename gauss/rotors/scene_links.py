@@ -12,21 +12,11 @@ from gauss.scene import Coupling, Drive, ElasticLink, Freewheel, JointLink, Loss
 
 @dataclass(frozen=True)
 class SlippingLink(JointLink):
-    """Clutch or friction drive between two joints.
-
-    Parameters
-    ----------
-    ratio : float
-        Of the link.
-    link : ShaftLink
-        Link that determines its torques.
-    ends : callable
-        (t, motion) → :class:`LinkKinematics`.
-    """
+    """Clutch or friction drive between two joints."""
 
     ratio: float
-    link: ShaftLink
-    ends: Callable
+    link: ShaftLink  # link that determines its torques
+    ends: Callable  # (t, motion) → :class:`LinkKinematics`
 
     @property
     def what(self) -> str:

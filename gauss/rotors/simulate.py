@@ -110,13 +110,7 @@ def simulate(
 
 
 def _checked(duration: float, times, rtol: float, atol: float | None, method: str, max_step: float) -> np.ndarray | None:
-    """Times of the samples [s].
-
-    Raises
-    ------
-    SimulationError
-        If an argument makes no sense.
-    """
+    """Times of the samples [s]; SimulationError if an argument makes no sense."""
     given = {} if atol is None else {"atol": atol}
     for name, value in {"duration": duration, "rtol": rtol, "max_step": max_step, **given}.items():
         if (

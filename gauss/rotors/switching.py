@@ -26,24 +26,12 @@ RESOLVED = 1e-14  # of the duration: crossings closer than that are one, and sho
 
 
 class NetworkSwitching(NamedTuple):
-    """Switching times and switching functions that the steps of a run resolve.
+    """Switching times and switching functions that the steps of a run resolve."""
 
-    Attributes
-    ----------
-    times : Timetable
-        Switching times of laws of time, and a mesh that resolves these laws.
-    surfaces : Surfaces
-        Switching functions of angles and speeds.
-    opaque : tuple of str
-        Elements with opaque laws.
-    duration : float
-        Duration of the run [s].
-    """
-
-    times: Timetable
-    surfaces: Surfaces
-    opaque: tuple[str, ...]
-    duration: float
+    times: Timetable  # switching times of laws of time, and a mesh that resolves these laws
+    surfaces: Surfaces  # switching functions of angles and speeds
+    opaque: tuple[str, ...]  # elements with opaque laws
+    duration: float  # duration of the run [s]
 
     @property
     def finest(self) -> float:

@@ -197,10 +197,7 @@ Curve = Hyperbola | Measured | Characteristic
 def as_curve(given: Any, what: str) -> Curve:
     """Characteristic from a characteristic, (A, B, C), a table {slip, torque} or a function.
 
-    Raises
-    ------
-    SceneError
-        If it has none of these forms.
+    SceneError if it has none of these forms.
     """
     if isinstance(given, Curve):
         return given

@@ -137,18 +137,10 @@ def _tensor(entries: tuple) -> np.ndarray:
 
 
 class Unphysical(NamedTuple):
-    """Why no body has some mass and inertia.
+    """Why no body has some mass and inertia."""
 
-    Attributes
-    ----------
-    kind : str
-        "negative", "triangle" or "no mass".
-    words : str
-        In words, with the remedy.
-    """
-
-    kind: str
-    words: str
+    kind: str  # "negative", "triangle" or "no mass"
+    words: str  # in words, with the remedy
 
     @property
     def impossible(self) -> bool:

@@ -23,23 +23,12 @@ FAR_APART = 1e3  # relative to the length of the scene: gap function of edges th
 
 @dataclass(frozen=True)
 class CornerOnBox(FeaturePair):
-    """Corner of a shape, or the ball around it, and a box.
+    """Corner of a shape, or the ball around it, and a box."""
 
-    Parameters
-    ----------
-    shape : Collider
-        The shape.
-    index : int
-        Which of its corners.
-    box : Box
-        The box.
-    face : tuple of int, optional
-        Axis and side, −1 or 1, of the face that counts; the nearest feature when not given.
-    """
-
-    shape: Collider
+    shape: Collider  # the shape
     index: int
     box: Box
+    # axis and side, −1 or 1, of the face that counts; the nearest feature when not given
     face: tuple[int, int] | None = None
 
     def touch(self, at) -> Touch:
@@ -106,25 +95,15 @@ class Edges(FeaturePair):
 
     The four edges along an axis come in two pairs that lie opposite to each other; of a pair only the one that faces the
     other box counts.
-
-    Parameters
-    ----------
-    first, second : Box
-        The boxes.
-    axis, other : int
-        Axes of the two boxes along which the edges lie.
-    pair, other_pair : int
-        Product of the sides, −1 or 1, on which an edge lies: which pair it belongs to.
-    signs : tuple of int, optional
-        Sides of the normal and of the two edges, −1 or 1, that count; those of facing edges when not given.
     """
 
     first: Box
     second: Box
-    axis: int
+    axis: int  # axis, other: axes of the two boxes along which the edges lie
     other: int
-    pair: int
+    pair: int  # pair, other_pair: product of the sides, −1 or 1, on which an edge lies: which pair it belongs to
     other_pair: int
+    # sides of the normal and of the two edges, −1 or 1, that count; those of facing edges when not given
     signs: tuple[int, int, int] | None = None
 
     def touch(self, at) -> Touch:

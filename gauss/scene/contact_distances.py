@@ -144,24 +144,12 @@ class Capsules(FeaturePair):
 
 @dataclass(frozen=True)
 class OnEdge(FeaturePair):
-    """A capsule across an edge of a box.
-
-    Parameters
-    ----------
-    capsule : Capsule
-        The capsule.
-    box : Box
-        The box.
-    axis : int
-        Along which of its axes the edge lies.
-    sides : tuple of int
-        On which sides of the next two axes, −1 or 1.
-    """
+    """A capsule across an edge of a box."""
 
     capsule: Capsule
     box: Box
-    axis: int
-    sides: tuple[int, int]
+    axis: int  # along which of its axes the edge lies
+    sides: tuple[int, int]  # on which sides of the next two axes, −1 or 1
 
     def touch(self, at) -> Touch:
         """Distance of the edge from the axis of the capsule, less its radius."""

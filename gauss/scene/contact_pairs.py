@@ -19,10 +19,7 @@ BOTH_SIDES = (-1, 1)
 def places(first: Collider, second: Collider) -> list[FeaturePair]:
     """Pairs of features by which the first shape may touch the second; normals point out of the second.
 
-    Raises
-    ------
-    SceneError
-        If there is no rule for the two kinds.
+    SceneError if there is no rule for the two kinds.
     """
     kinds = type(first), type(second)
     if kinds in RULES:
@@ -39,10 +36,7 @@ def places(first: Collider, second: Collider) -> list[FeaturePair]:
 def place_count(first: Collider, second: Collider) -> int:
     """Number of pairs of features: that of the kinds, but for sets of points.
 
-    Raises
-    ------
-    SceneError
-        If there is no rule for the two kinds.
+    SceneError if there is no rule for the two kinds.
     """
     kinds = type(first), type(second)
     if Points in kinds:

@@ -132,13 +132,7 @@ class SolidPair:
         return spread([nearest, *(point for point in found if point.gap > nearest.gap)])
 
     def nearest(self, one: SolidPose, other: SolidPose) -> ContactPoint:
-        """Nearest points, or those of the least way out.
-
-        Raises
-        ------
-        ArithmeticError
-            If coal finds none.
-        """
+        """Nearest points, or those of the least way out; ArithmeticError if coal finds none."""
         if self.given is None:
             import coal  # few scenes need it
 

@@ -36,23 +36,12 @@ class RimOnHalfSpace(FeaturePair):
 
     The lowest point of the rim moves along it, the faster the less the rim is tilted; a solid that stands rests on points
     that are fixed to the rim.
-
-    Parameters
-    ----------
-    shape : Cylinder or Cone
-        The solid.
-    ground : HalfSpace
-        The half-space.
-    side : int
-        On which end of its axis the rim lies, −1 or 1.
-    direction : tuple of float
-        Cosine and sine of the angle of a point fixed to the rim; (0, 0) for the lowest point.
     """
 
-    shape: Cylinder | Cone
+    shape: Cylinder | Cone  # the solid
     ground: HalfSpace
-    side: int
-    direction: tuple = LOWEST
+    side: int  # on which end of its axis the rim lies, −1 or 1
+    direction: tuple = LOWEST  # cosine and sine of the angle of a point fixed to the rim; (0, 0) for the lowest point
 
     @property
     def is_traced(self) -> bool:

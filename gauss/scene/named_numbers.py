@@ -31,10 +31,7 @@ PARAMETER = re.compile(r"^(?P<name>.+?)(?:\[(?P<number>\d+)\]|\.(?P<axis>[xyz]))
 def scene_of(scene: Scene | Callable[..., Scene], values: Mapping[str, float]) -> Scene:
     """Scene with these values; a function that makes scenes is called with them by name.
 
-    Raises
-    ------
-    SceneError
-        If the scene has no such number, or does not accept a value.
+    SceneError if the scene has no such number, or does not accept a value.
     """
     if isinstance(scene, Scene):
         for name, value in values.items():
@@ -74,10 +71,7 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
 def value_of(scene: Scene, name: str) -> float:
     """Value of a number of a scene, by the names of :func:`changed`.
 
-    Raises
-    ------
-    SceneError
-        If there is no such number; the message says what there is.
+    SceneError if there is no such number; the message says what there is.
     """
     changed(scene, name, 0.0 if name.rpartition(".")[2] not in POSITIVE else 1.0)  # its checks and messages
     path, index = parsed(name)

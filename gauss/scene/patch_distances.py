@@ -25,22 +25,12 @@ PairOfSolids = SolidPair | BallOnTerrain | SolidOnTerrain
 
 @dataclass(frozen=True)
 class PatchPoint(FeaturePair):
-    """A point of the patch of contact of two solids; far where the patch has fewer, and from terrain that is not near.
+    """A point of the patch of contact of two solids; far where the patch has fewer, and from terrain that is not near."""
 
-    Parameters
-    ----------
-    shape, other : Collider
-        The shapes.
-    index : int
-        Which point.
-    corner : int
-        Which ball of the first shape, where it is a set of points.
-    """
-
-    shape: Collider
+    shape: Collider  # shape, other: the shapes
     other: Collider
     index: int
-    corner: int = 0
+    corner: int = 0  # which ball of the first shape, where it is a set of points
 
     @property
     def is_traced(self) -> bool:
@@ -50,10 +40,7 @@ class PatchPoint(FeaturePair):
     def touch(self, at) -> Touch:
         """Distance, point and normal, by a view in numbers.
 
-        Raises
-        ------
-        SceneError
-            If the view is in symbols: the distance is found by iteration.
+        SceneError if the view is in symbols: the distance is found by iteration.
         """
         poses = _pose(self.shape, at, self.corner), _pose(self.other, at)
         if any(isinstance(entry, Expression) for pose in poses for entry in (*np.ravel(pose.R), *pose.x)):
@@ -85,13 +72,7 @@ def patch_points(first: Collider, second: Collider) -> list[FeaturePair]:
 
 
 def feet_points(first: Points, second: Collider) -> list[FeaturePair]:
-    """Points of the patches of balls around points and a shape.
-
-    Raises
-    ------
-    SceneError
-        If the points have no radius.
-    """
+    """Points of the patches of balls around points and a shape; SceneError if the points have no radius."""
     if not first.is_round:
         raise SceneError(f"{first.what} and {second.what}: points touch it as balls; give them a radius [m].")
     return [PatchPoint(first, second, k, corner) for corner in range(len(first.corners)) for k in range(SLOTS)]

@@ -146,10 +146,7 @@ PROFILES = {kind.__name__.lower(): kind for kind in (Ramp, Sine, Move, Polynomia
 def from_table(table: dict) -> Profile:
     """Profile of a table of a file: its kind under the key "profile", and its fields.
 
-    Raises
-    ------
-    SceneError
-        If there is no such profile, or a field is missing or unknown.
+    SceneError if there is no such profile, or a field is missing or unknown.
     """
     given = dict(table)
     kind = given.pop("profile", None)

@@ -175,13 +175,7 @@ class Slipping:
 
 
 def limit_at(limit, t: float, what: str) -> float:
-    """Limit at a time [s], checked.
-
-    Raises
-    ------
-    SceneError
-        If a law gives no limit.
-    """
+    """Limit at a time [s], checked; SceneError if a law gives no limit."""
     if not callable(limit):
         return limit
     found = values.evaluated(limit, (t,), f"{what}: limit", 1)[0]

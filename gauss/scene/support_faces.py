@@ -14,24 +14,13 @@ TINY = 1e-30
 
 
 class Face(NamedTuple):
-    """Polygon, edge or point of a solid.
+    """Polygon, edge or point of a solid."""
 
-    Attributes
-    ----------
-    points : ndarray, shape (k, 3)
-        Its corners in order, counterclockwise seen from outside [m].
-    normal : ndarray, shape (3,), or None
-        Outward normal of a polygon.
-    sides : ndarray, shape (k, 4), or None
-        Inward normals of its sides in its plane, and their distances from the centre of the solid [m]: n · p + d ≥ 0 inside.
-    radius : float
-        Thickness around it [m].
-    """
-
-    points: np.ndarray
-    normal: np.ndarray | None
+    points: np.ndarray  # (k, 3) its corners in order, counterclockwise seen from outside [m]
+    normal: np.ndarray | None  # outward normal of a polygon
+    # inward normals of its sides in its plane, and their distances from the centre of the solid [m]: n · p + d ≥ 0 inside
     sides: np.ndarray | None = None
-    radius: float = 0.0
+    radius: float = 0.0  # thickness around it [m]
 
 
 def polygon(points: np.ndarray, normal: np.ndarray) -> Face:

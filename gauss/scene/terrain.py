@@ -18,24 +18,12 @@ ALIGNED = 1e-4  # rad: angle of two normals that are the same, above the errors 
 
 
 class Triangles(NamedTuple):
-    """Triangles of a surface, counterclockwise from above.
+    """Triangles of a surface, counterclockwise from above."""
 
-    Attributes
-    ----------
-    corners : ndarray of int, shape (m, 3)
-        Numbers of their vertices, row by row of the grid.
-    points : ndarray, shape (m, 3, 3)
-        These vertices [m].
-    normals : ndarray, shape (m, 3)
-        Unit normals, upward.
-    is_upper : ndarray of bool, shape (m,)
-        Whether it is the one of its cell at the greater y.
-    """
-
-    corners: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
-    is_upper: np.ndarray
+    corners: np.ndarray  # (m, 3) numbers of their vertices, row by row of the grid
+    points: np.ndarray  # (m, 3, 3) these vertices [m]
+    normals: np.ndarray  # (m, 3) unit normals, upward
+    is_upper: np.ndarray  # (m,) whether it is the one of its cell at the greater y
 
     def where(self, kept: np.ndarray) -> "Triangles":
         """Those of a mask."""

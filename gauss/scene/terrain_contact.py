@@ -94,10 +94,7 @@ class SolidOnTerrain:
     def points(self, one: SolidPose, other: SolidPose, reach: float) -> list[ContactPoint]:
         """Contact points nearer than ``reach`` [m]: places on the field, normals out of it.
 
-        Raises
-        ------
-        ArithmeticError
-            If coal finds no nearest points.
+        ArithmeticError if coal finds no nearest points.
         """
         R, x = other.R.T @ one.R, other.R.T @ (one.x - other.x)
         extents = self.first.extent(np.concatenate([R, -R]))

@@ -80,10 +80,7 @@ def tables(path: Path) -> dict:
 def read_file(source, shipped: dict[str, Path], kind: str, make):
     """Result of a function of the tables of a .toml file, or of a shipped one by name.
 
-    Raises
-    ------
-    FileError
-        If there is no such thing, or the function refuses it; the message names file and place.
+    FileError if there is no such thing, or the function refuses it; the message names file and place.
     """
     name, path = str(source), Path(source)
     if path.suffix.lower() != ".toml":
@@ -175,10 +172,7 @@ def _frozen(value):
 def write_toml(scene: Scene, path: Path) -> Path:
     """Write a scene; reading it back gives an equal one.
 
-    Raises
-    ------
-    FileError
-        If a law is a Python function, which no file can hold.
+    FileError if a law is a Python function, which no file can hold.
     """
     path = Path(path)
     path.write_text(toml_text(scene), encoding="utf-8")
@@ -186,13 +180,7 @@ def write_toml(scene: Scene, path: Path) -> Path:
 
 
 def toml_text(scene: Scene) -> str:
-    """Contents of the file of a scene.
-
-    Raises
-    ------
-    FileError
-        If a law is a Python function, which no file can hold.
-    """
+    """Contents of the file of a scene; FileError if a law is a Python function, which no file can hold."""
     lines = [_line("name", scene.name), _line("gravity", scene.gravity)]
     for element in _elements(scene):
         section = next((name for name, kind in SECTIONS.items() if type(element) is kind), None)

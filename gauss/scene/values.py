@@ -126,10 +126,7 @@ def law(value, what: str, unit: str, size: int = 1):
 def evaluated(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
     """Value of a law (size,): finite floats, or expressions where it is traced; see :func:`returned`.
 
-    Raises
-    ------
-    SceneError
-        As :func:`returned`, or if it returns numbers that are not finite.
+    SceneError as :func:`returned`, or if it returns numbers that are not finite.
     """
     entries = returned(law, given, what, size)
     if entries.dtype == float and not (math.isfinite(entries[0]) if size == 1 else np.isfinite(entries).all()):
@@ -139,6 +136,8 @@ def evaluated(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
 
 def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
     """Value of a law (size,): floats, or objects where it is traced.
+
+    SceneError if it raises, or returns something else; the message names the law and the time.
 
     Parameters
     ----------
@@ -150,11 +149,6 @@ def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
         Its name in messages.
     size : int
         Number of values that it must return.
-
-    Raises
-    ------
-    SceneError
-        If it raises, or returns something else; the message names the law and the time.
     """
     try:
         value = branches(lambda: law(*given)) if isinstance(given[0], Expression) else law(*given)
@@ -194,15 +188,9 @@ def _when(t) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ConstantLaw:
-    """Function of (t, motion) with the same value at all times.
+    """Function of (t, motion) with the same value at all times."""
 
-    Parameters
-    ----------
-    value : float or tuple of float
-        The value; expressions where parameters are.
-    """
-
-    value: Any
+    value: Any  # the value; expressions where parameters are
 
     def __call__(self, t, motion):
         """The value."""

@@ -19,6 +19,8 @@ class SlackError(SimulationError):
 def allocate(instant: ServoInstant, servo: Servo, t: float) -> np.ndarray:
     """Efforts u (j,) with S u = b, least Σ weight (u − reference)², and u ≥ least.
 
+    SlackError if a bound is violated; the message names time and efforts.
+
     Parameters
     ----------
     instant : ServoInstant
@@ -27,11 +29,6 @@ def allocate(instant: ServoInstant, servo: Servo, t: float) -> np.ndarray:
         Weights, preloads and lower bounds (−∞ for none) of the efforts, and their names.
     t : float
         Time [s], for messages.
-
-    Raises
-    ------
-    SlackError
-        If a bound is violated; the message names time and efforts.
     """
     u, rounding = _least_norm(instant, servo)
     if (u >= servo.least - rounding).all():
@@ -47,13 +44,7 @@ def allocate(instant: ServoInstant, servo: Servo, t: float) -> np.ndarray:
 
 
 def require_tension(instant: ServoInstant, servo: Servo, t: float):
-    """Check that no cable goes slack where S loses rank.
-
-    Raises
-    ------
-    SlackError
-        If one does.
-    """
+    """Check that no cable goes slack where S loses rank; SlackError if one does."""
     u = allocate(instant, servo, t)
     at_bound = u <= servo.least + _least_norm(instant, servo)[1]
     if at_bound.any() and instant.S.shape[0] == u.size:

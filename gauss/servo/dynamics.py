@@ -24,18 +24,10 @@ AGREEMENT = 1e-9  # relative difference of compiled accelerations and the saddle
 
 
 class ServoQuestion(NamedTuple):
-    """Question for the plan of a servo-controlled motion.
+    """Question for the plan of a servo-controlled motion."""
 
-    Attributes
-    ----------
-    servo : Servo
-        The servo.
-    stabilisation : str
-        States are projected onto contacts and relations.
-    """
-
-    servo: Servo
-    stabilisation: str = "projection"
+    servo: Servo  # the servo
+    stabilisation: str = "projection"  # states are projected onto contacts and relations
 
 
 SERVOS = RuleTable(
@@ -52,8 +44,6 @@ class ServoEngine(Engine):
 
     Parameters
     ----------
-    servo : Servo
-        The servo.
     plan : RelationPlan
         Rows by which its relations are held.
 
@@ -83,12 +73,8 @@ class ServoEngine(Engine):
     def instant(self, state: State) -> ServoInstant:
         """Rows that determine the efforts, and responses.
 
-        Raises
-        ------
-        UnrealisableError
-            If S loses rank, or did so since the start: the sign of its determinant changes.
-        SlackError
-            If a cable would be in compression.
+        UnrealisableError if S loses rank, or did so since the start: the sign of its determinant changes.
+        SlackError if a cable would be in compression.
         """
         if self.certified:
             here = saddle(self.servo, state, self.plan).instant
@@ -150,10 +136,7 @@ class ServoEngine(Engine):
     def check(self, point: Point, last: bool = False):
         """Compare with the saddle system in maximal coordinates, an independent formulation.
 
-        Raises
-        ------
-        DistrustError
-            If the two differ by more than the conditioning explains; then the saddle system is used.
+        DistrustError if the two differ by more than the conditioning explains; then the saddle system is used.
         """
         found = saddle(self.servo, point.state, self.plan)
         exact = found.solve("saddle")

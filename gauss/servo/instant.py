@@ -29,40 +29,18 @@ def number(value: Scalar) -> float:
 
 @dataclass(frozen=True)
 class ServoInstant:
-    """Rows, directions and responses at one state, in m accelerations.
+    """Rows, directions and responses at one state, in m accelerations."""
 
-    Parameters
-    ----------
-    position, velocity : ndarray, shape (r,)
-        Residuals of the relations at position and velocity level.
-    G : ndarray, shape (r, m)
-        Rows of the relations.
-    gamma : ndarray, shape (r,)
-        Right-hand side of G x = γ.
-    W : ndarray, shape (j, m)
-        Generalised force of one unit of each effort.
-    free : ndarray, shape (m,)
-        Accelerations x̂ without servos.
-    X_W : ndarray, shape (m, j)
-        Accelerations that one unit of each effort adds.
-    X_G : ndarray, shape (m, r)
-        Accelerations that a unit force along each row adds.
-    speeds : ndarray, shape (j,)
-        Speed against which each effort works: W times the velocities.
-    power : ndarray, shape (3,)
-        Power of drives, of forces on bodies, power lost in dampers [W].
-    """
-
-    position: Shaped[np.ndarray, " r"]
+    position: Shaped[np.ndarray, " r"]  # position, velocity (r,): residuals of the relations at position and velocity level
     velocity: Shaped[np.ndarray, " r"]
-    G: Shaped[np.ndarray, "r m"]
-    gamma: Shaped[np.ndarray, " r"]
-    W: Shaped[np.ndarray, "j m"]
-    free: Shaped[np.ndarray, " m"]
-    X_W: Shaped[np.ndarray, "m j"]
-    X_G: Shaped[np.ndarray, "m r"]
-    speeds: Shaped[np.ndarray, " j"]
-    power: Shaped[np.ndarray, " 3"]
+    G: Shaped[np.ndarray, "r m"]  # (r, m) rows of the relations
+    gamma: Shaped[np.ndarray, " r"]  # (r,) right-hand side of G x = γ
+    W: Shaped[np.ndarray, "j m"]  # (j, m) generalised force of one unit of each effort
+    free: Shaped[np.ndarray, " m"]  # (m,) accelerations x̂ without servos
+    X_W: Shaped[np.ndarray, "m j"]  # (m, j) accelerations that one unit of each effort adds
+    X_G: Shaped[np.ndarray, "m r"]  # (m, r) accelerations that a unit force along each row adds
+    speeds: Shaped[np.ndarray, " j"]  # (j,) speed against which each effort works: W times the velocities
+    power: Shaped[np.ndarray, " 3"]  # (3,) power of drives, of forces on bodies, power lost in dampers [W]
 
     @cached_property
     def S(self) -> Shaped[np.ndarray, "r j"]:

@@ -24,8 +24,6 @@ class ShapedKernel:
     ----------
     inputs : sequence of Expression
         Symbols.
-    outputs : sequence of array_like
-        Arrays of expressions.
     """
 
     def __init__(self, inputs, outputs):

@@ -184,13 +184,7 @@ class LagrangeForm:
 
 
 def require_written(system: System):
-    """Refuse systems with quaternions, and with opaque laws of loads on bodies.
-
-    Raises
-    ------
-    SceneError
-        If there is one.
-    """
+    """Refuse systems with quaternions, and with opaque laws of loads on bodies; SceneError if there is one."""
     if not system.is_flat:
         names = ", ".join(repr(joint.name) for joint in system.joints if joint.pair.quaternion is not None)
         raise SceneError(f"joint {names} has a quaternion: its rates are no derivatives of coordinates; use solve instead.")

@@ -58,30 +58,14 @@ class Observed(Kinematics):
 
 @dataclass(frozen=True)
 class MotionSymbols:
-    """Symbols of the motion of one system.
+    """Symbols of the motion of one system."""
 
-    Parameters
-    ----------
-    inputs : list of Expression
-        Positions, velocities and time.
-    rates : list
-        Time derivative of each input.
-    velocities : list of Expression
-        Those of the inputs that are velocities.
-    accelerations : list of Expression
-        Unknowns, in which the rows are linear.
-    t : Expression
-        Time.
-    motion : Observed
-        Argument of residuals and actuators.
-    """
-
-    inputs: list
-    rates: list
-    velocities: list
-    accelerations: list
-    t: Expression
-    motion: Observed
+    inputs: list  # positions, velocities and time
+    rates: list  # time derivative of each input
+    velocities: list  # those of the inputs that are velocities
+    accelerations: list  # unknowns, in which the rows are linear
+    t: Expression  # time
+    motion: Observed  # argument of residuals and actuators
 
     def derivative(self, outputs) -> np.ndarray:
         """Time derivative of expressions of the inputs."""

@@ -27,21 +27,11 @@ FAST = 1.0  # units of the scene: rates of neighbouring states
 
 
 class RelationPlan(NamedTuple):
-    """Rows by which relations are held.
+    """Rows by which relations are held."""
 
-    Attributes
-    ----------
-    scalars : tuple of Scalar
-        Relations of contacts, of servos, and hidden ones.
-    active : tuple of int
-        Those whose accelerations determine the efforts, counted after the contacts.
-    degree : int
-        Highest relative degree.
-    """
-
-    scalars: tuple[ScalarRelation, ...]
-    active: tuple[int, ...]
-    degree: int
+    scalars: tuple[ScalarRelation, ...]  # relations of contacts, of servos, and hidden ones
+    active: tuple[int, ...]  # those whose accelerations determine the efforts, counted after the contacts
+    degree: int  # highest relative degree
 
     @property
     def reduced(self) -> bool:

@@ -66,13 +66,7 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
 
 
 def planned(servo: Servo, state: State) -> RelationPlan:
-    """Rows by which the relations are held from a state on.
-
-    Raises
-    ------
-    UnrealisableError
-        If they cannot be held.
-    """
+    """Rows by which the relations are held from a state on; UnrealisableError if they cannot be held."""
     verdict = realisable(servo, state)
     if not verdict:
         raise UnrealisableError(f"t = {state.t:.6g} s: {verdict}.", verdict)

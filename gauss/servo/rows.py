@@ -24,33 +24,18 @@ class ScalarRelation(NamedTuple):
 
 
 class ServoRows(NamedTuple):
-    """Rows of several scalar relations, in symbols or numbers.
+    """Rows of several scalar relations, in symbols or numbers."""
 
-    Attributes
-    ----------
-    position : ndarray, shape (r,)
-        Residual at position level; zero for relations of velocities and accelerations.
-    velocity : ndarray, shape (r,)
-        Residual at velocity level; zero for relations of accelerations.
-    G : ndarray, shape (r, m)
-        Rows on the accelerations.
-    gamma : ndarray, shape (r,)
-        Right-hand side of G q̈ = γ.
-    """
-
-    position: np.ndarray
-    velocity: np.ndarray
-    G: np.ndarray
-    gamma: np.ndarray
+    position: np.ndarray  # (r,) residual at position level; zero for relations of velocities and accelerations
+    velocity: np.ndarray  # (r,) residual at velocity level; zero for relations of accelerations
+    G: np.ndarray  # (r, m) rows on the accelerations
+    gamma: np.ndarray  # (r,) right-hand side of G q̈ = γ
 
 
 def scalars(relations, symbols: MotionSymbols) -> list[ScalarRelation]:
     """Entries of relations, by calling each residual once with symbols.
 
-    Raises
-    ------
-    SceneError
-        If a residual is no function of the motion that can be differentiated; the message says why.
+    SceneError if a residual is no function of the motion that can be differentiated; the message says why.
     """
     return [scalar for relation in relations for scalar in _scalars(relation, symbols)]
 
@@ -73,13 +58,7 @@ def _scalars(relation: ServoRelation, symbols: MotionSymbols) -> list[ScalarRela
 
 
 def _check(name: str, entry, level: str, symbols: MotionSymbols) -> None:
-    """Check that a residual depends on the motion at its level.
-
-    Raises
-    ------
-    SceneError
-        If it does not.
-    """
+    """Check that a residual depends on the motion at its level; SceneError if it does not."""
     what = f"relation {name!r}"
     if not isinstance(entry, Expression):
         raise SceneError(f"{what}: its residual is {entry!r}, whatever the motion; it must depend on what moves.")

@@ -88,8 +88,6 @@ class Saddle:
 
     Parameters
     ----------
-    servo : Servo
-        The servo.
     state : State
         Consistent state.
     load : array_like, shape (n_v,), optional

@@ -184,10 +184,7 @@ class ServoRun(PythonRun):
     def _projected(self, point: Point, t: float | None) -> Point:
         """Point projected onto contacts and relations; residuals far beyond the error of a step are jumps.
 
-        Raises
-        ------
-        UnrealisableError
-            If a relation jumps.
+        UnrealisableError if a relation jumps.
         """
         if not isinstance(self.method, FixedStep):
             self._refuse_jump(point.state, JUMP * self._allowed(point.state))

@@ -30,8 +30,6 @@ def servo_switching(servo: Servo, plan: RelationPlan, start: State, end: float, 
 
     Parameters
     ----------
-    servo : Servo
-        The servo.
     plan : RelationPlan
         Rows by which its relations are held.
     start : State

@@ -25,8 +25,6 @@ def plot_atlas(methods, cases, verdicts, figures, order, path=None, title: str =
         All verdicts, the best first.
     path : str or Path, optional
         Where to save it.
-    title : str
-        Title.
     """
     figure = Figure(figsize=(2.6 + 0.52 * len(cases), 2.6 + 0.27 * len(methods)), layout="constrained")
     axes = figure.subplots()

@@ -23,8 +23,6 @@ def plot_errors(names, problems, errors, broken, path=None, title: str = "") -> 
         Where the backend claims success with residuals above the tolerance asked for; framed.
     path : str or Path, optional
         Where to save it.
-    title : str
-        Title.
     """
     figure = Figure(figsize=(1.8 + 0.62 * len(problems), 1.9 + 0.3 * len(names)), layout="constrained")
     axes = figure.subplots()

@@ -28,8 +28,6 @@ def plot_fronts(names, overall: Panel, panels: Mapping[str, Panel], path=None, t
         The same by problem: times over that of the fastest answer to it, and errors.
     path : str or Path, optional
         Where to save it.
-    title : str
-        Title.
     """
     rows = -(-len(panels) // COLUMNS)
     figure = Figure(figsize=(13, 5.0 + 2.3 * rows), layout="constrained")

@@ -26,8 +26,6 @@ class Drawing:
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
-        Where it is drawn.
     found : Cycle
         Motion; its extent sets the limits of the axes.
     """

@@ -19,10 +19,7 @@ PAGE_DPI = 140  # of figures beside pages of results
 def check_format(path):
     """Refuse, before anything is computed, a path that no figure can be saved to.
 
-    Raises
-    ------
-    FileError
-        If its format is none of :data:`FORMATS`, or there is no such folder.
+    FileError if its format is none of :data:`FORMATS`, or there is no such folder.
     """
     if path is None:
         return
@@ -33,13 +30,7 @@ def check_format(path):
 
 
 def saved(figure: Figure, path, dpi: int = DPI) -> Figure:
-    """Figure, saved if there is a path.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written.
-    """
+    """Figure, saved if there is a path; FileError if the file cannot be written."""
     if path is not None:
         with writing(path):
             figure.savefig(path, dpi=dpi)

@@ -9,7 +9,7 @@ import pytest
 import gauss
 from gauss.analysis.consistent_inertias import pseudo_inertia
 from gauss.analysis.regressor import standard_parameters
-from gauss.errors import ArgumentError, GaussError, StateError
+from gauss.errors import ArgumentError, FileError, GaussError, StateError
 from gauss.system import random_state
 
 AGREEMENT = 1e-12  # of sums in another order
@@ -305,8 +305,10 @@ def test_the_figure_shows_each_coordinate():
     pytest.importorskip("matplotlib")
     system = gauss.compile_scene(gauss.load("double_pendulum"))
     q, v, a = samples(system)
-    figure = gauss.identify(system, q, v, a, system.inverse_dynamics(q, v, a)).plot()
-    assert [axes.get_ylabel() for axes in figure.axes] == [f"{name} [N m]" for name in system.coordinates]
+    found = gauss.identify(system, q, v, a, system.inverse_dynamics(q, v, a))
+    assert [axes.get_ylabel() for axes in found.plot().axes] == [f"{name} [N m]" for name in system.coordinates]
+    with pytest.raises(FileError, match="no_format"):
+        found.plot("figure.no_format")
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.errors import ArgumentError, SceneError, SimulationError, StateError
+from gauss.errors import ArgumentError, FileError, SceneError, SimulationError, StateError
 
 EXACT = 1e-5  # relative: the steps of the fit have errors of 1e-9, times the condition of the parameters
 NOISE = 1e-3  # rad
@@ -216,6 +216,9 @@ def test_the_figure_shows_each_column(tmp_path):
     scene = gauss.load("pendulum")
     t, measured = motion(scene, 0.5, ("A", "A rate"), 11)
     found = gauss.fit_motion(scene, t, measured, ["gravity.y"], step=0.05)
-    assert [axes.get_ylabel() for axes in found.plot().axes[::2]] == ["A", "A rate"]
+    assert [axes.get_ylabel() for axes in found.plot(tmp_path / "fit.svg").axes[::2]] == ["A", "A rate"]
+    assert (tmp_path / "fit.svg").exists()
+    with pytest.raises(FileError, match="no_format"):
+        found.plot(tmp_path / "fit.no_format")
     text = found.report(tmp_path / "fit.html").read_text(encoding="utf-8")
     assert "gravity.y" in text and text.count("<svg") == 2

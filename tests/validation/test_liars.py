@@ -36,33 +36,35 @@ def tree():
     return gauss.assemble(system, random_state(system, np.random.default_rng(0)))
 
 
+def started(scene, **given):
+    """Compulsion of a scene in its initial state."""
+    system = gauss.compile_scene(scene)
+    return gauss.assemble(system, system.initial_state(**given))
+
+
 def planar_loop():
     system = gauss.compile_scene(mechanisms.four_bar())
     return gauss.assemble(system, system.initial_state(), [1.0, 0.5, 0.0, 0.0])
 
 
 def loop_with_a_copy():
-    system = gauss.compile_scene(mechanisms.four_bar(twice=True))
-    return gauss.assemble(system, system.initial_state())
+    return started(mechanisms.four_bar(twice=True))
 
 
 def coupled():
     scene = mechanisms.chain([1.0, 2.0, 0.5])
     scene.couple("mimic", "joint2", "joint0", ratio=-1.5)
-    system = gauss.compile_scene(scene)
-    return gauss.assemble(system, system.initial_state(v=[1.0, 0.3, 0.2], q=[0.2, 0.5, -0.1]))
+    return started(scene, v=[1.0, 0.3, 0.2], q=[0.2, 0.5, -0.1])
 
 
 def tipping_box():
-    system = gauss.compile_scene(gauss.load("box_on_plane_4"))
-    return gauss.assemble(system, system.initial_state())
+    return started(gauss.load("box_on_plane_4"))
 
 
 def standing_box():
     scene = gauss.load("box_on_plane_8")
     scene.loads.clear()
-    system = gauss.compile_scene(scene)
-    return gauss.assemble(system, system.initial_state())
+    return started(scene)
 
 
 def stops():
@@ -311,16 +313,10 @@ def test_whatever_a_backend_returns_or_raises_becomes_a_status(cases, kind):
         assert not status.certified and words in str(status)
 
 
-class Solving:
+class Solving(Telling):
     """QP solver that says one thing of a programme."""
 
     name = "solving"
-
-    def __init__(self, said):
-        self.said = said
-
-    def __call__(self, programme):
-        return self.said(programme)
 
 
 OUTCOMES = {

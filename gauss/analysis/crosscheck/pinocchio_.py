@@ -32,50 +32,25 @@ class TreeJoint:
 
 @dataclass(frozen=True)
 class Configuration:
-    """A state in the coordinates of Pinocchio: v_pin = T v, a_pin = T a + γ.
+    """A state in the coordinates of Pinocchio: v_pin = T v, a_pin = T a + γ."""
 
-    Parameters
-    ----------
-    q : ndarray, shape (nq,)
-        Configuration.
-    T : ndarray, shape (nv, n_v)
-        Rates of Pinocchio from rates of gauss; zero rows for fixed joints, zero columns for joints that close loops.
-    v, bias : ndarray, shape (nv,)
-        Rates and γ.
-    """
-
-    q: np.ndarray
+    q: np.ndarray  # (nq,) configuration
+    # (nv, n_v) rates of Pinocchio from rates of gauss; zero rows for fixed joints, zero columns for joints that close loops
     T: np.ndarray
-    v: np.ndarray
+    v: np.ndarray  # v, bias (nv,): rates and γ
     bias: np.ndarray
 
 
 @dataclass(frozen=True)
 class Twin:
-    """A system and its Pinocchio model.
+    """A system and its Pinocchio model."""
 
-    Parameters
-    ----------
-    system : System
-        The original.
-    model : pinocchio.Model
-        The spanning tree; fixed joints are hinges kept at zero, so that their reactions are reported.
-    reduced : pinocchio.Model
-        The same with the fixed joints locked, for the articulated-body algorithm.
-    tree_joints : tuple of TreeJoint
-        Joints of the tree, in the order of Pinocchio.
-    placements : dict
-        Placement of every body, by index; −1 is the ground.
-    kept : tuple of int
-        Index in ``model`` of every joint of ``reduced``.
-    """
-
-    system: System
-    model: pin.Model
-    reduced: pin.Model
-    tree_joints: tuple[TreeJoint, ...]
-    placements: dict[int, BodyPlacement]
-    kept: tuple[int, ...]
+    system: System  # the original
+    model: pin.Model  # the spanning tree; fixed joints are hinges kept at zero, so that their reactions are reported
+    reduced: pin.Model  # the same with the fixed joints locked, for the articulated-body algorithm
+    tree_joints: tuple[TreeJoint, ...]  # joints of the tree, in the order of Pinocchio
+    placements: dict[int, BodyPlacement]  # placement of every body, by index; −1 is the ground
+    kept: tuple[int, ...]  # index in ``model`` of every joint of ``reduced``
 
     @property
     def kept_q(self) -> np.ndarray:
@@ -115,13 +90,7 @@ class Twin:
 
 
 def twin(system: System) -> Twin:
-    """Pinocchio model of a system.
-
-    Raises
-    ------
-    GaussError
-        If Pinocchio has no counterpart of some joint.
-    """
+    """Pinocchio model of a system; GaussError if Pinocchio has no counterpart of some joint."""
     model = pin.Model()
     model.gravity = pin.Motion(np.array(system.scene.gravity), np.zeros(3))
     placements, tree_joints = {GROUND: BodyPlacement(0, pin.SE3.Identity())}, []

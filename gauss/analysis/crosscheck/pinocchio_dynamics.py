@@ -16,27 +16,13 @@ with extra():
 
 @dataclass(frozen=True)
 class PinocchioInstant:
-    """A twin in one state, with all applied loads.
+    """A twin in one state, with all applied loads."""
 
-    Parameters
-    ----------
-    twin : Twin
-        The model.
-    at : Configuration
-        The state in the coordinates of Pinocchio.
-    data : pinocchio.Data
-        Placements and velocities of the joints in this state; workspace of the algorithms.
-    P : ndarray, shape (n_v,)
-        Generalised forces in the order of gauss.
-    wrenches : list of pinocchio.Force
-        Forces other than gravity on the bodies of each joint of the model, about the origin of the world.
-    """
-
-    twin: Twin
-    at: Configuration
-    data: pin.Data
-    P: np.ndarray
-    wrenches: list
+    twin: Twin  # the model
+    at: Configuration  # the state in the coordinates of Pinocchio
+    data: pin.Data  # placements and velocities of the joints in this state; workspace of the algorithms
+    P: np.ndarray  # (n_v,) generalised forces in the order of gauss
+    wrenches: list  # forces other than gravity on the bodies of each joint of the model, about the origin of the world
 
     @property
     def external(self) -> pin.StdVec_Force:
@@ -83,10 +69,7 @@ def _wrenches(twin: Twin, data: pin.Data, applied: Applied) -> list:
 def articulated_accelerations(now: PinocchioInstant) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of a tree by the articulated-body algorithm ``aba``.
 
-    Raises
-    ------
-    GaussError
-        If a joint moves no inertia.
+    GaussError if a joint moves no inertia.
     """
     return _to_gauss(now, _aba(now))
 
@@ -98,10 +81,7 @@ def refined_accelerations(now: PinocchioInstant) -> np.ndarray:
     the articulated inertia behind free and ball joints and loses digits: 3e-10 relative was seen with 40 bodies, where
     the refined answer kept 13 digits.
 
-    Raises
-    ------
-    GaussError
-        If a joint moves no inertia.
+    GaussError if a joint moves no inertia.
     """
     a, (model, q, v, tau, external) = _aba(now), _reduced(now)
     short = tau - pin.rnea(model, model.createData(), q, v, a, external)

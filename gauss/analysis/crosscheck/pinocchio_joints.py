@@ -24,24 +24,12 @@ ONE, NULL = np.eye(3), np.zeros((3, 3))
 
 @dataclass(frozen=True)
 class JointMap:
-    """Joint of Pinocchio that stands for a pair, and the maps to it.
-
-    Parameters
-    ----------
-    model : pinocchio.JointModel
-        The joint.
-    configuration : callable
-        q (n_q,) ↦ q_pin.
-    T : callable
-        q ↦ T (nv_pin, k).
-    bias : callable
-        q, v ↦ γ (nv_pin,), acceleration of Pinocchio's rates at zero acceleration of gauss's.
-    """
+    """Joint of Pinocchio that stands for a pair, and the maps to it."""
 
     model: object
-    configuration: Callable
-    T: Callable
-    bias: Callable
+    configuration: Callable  # q (n_q,) ↦ q_pin
+    T: Callable  # q ↦ T (nv_pin, k)
+    bias: Callable  # q, v ↦ γ (nv_pin,), acceleration of Pinocchio's rates at zero acceleration of gauss's
 
 
 def forward(joint: PlacedJoint) -> JointMap:

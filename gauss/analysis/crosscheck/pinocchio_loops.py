@@ -32,10 +32,7 @@ AXES = pin.LOCAL_WORLD_ALIGNED  # motion of the origin of a frame, in world axes
 def constrained_accelerations(now: PinocchioInstant, state: State) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of any system, trees included.
 
-    Raises
-    ------
-    GaussError
-        If some relation is unknown here, or some motion meets no inertia.
+    GaussError if some relation is unknown here, or some motion meets no inertia.
     """
     K, k = _rows(now, state)
     lengths = np.linalg.norm(K, axis=1)

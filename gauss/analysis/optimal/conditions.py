@@ -26,21 +26,11 @@ INDEPENDENT = 1e-8  # share of the largest pivot, below which a condition follow
 
 @dataclass(frozen=True)
 class EndCondition:
-    """Condition on one coordinate or rate at an end of a motion.
+    """Condition on one coordinate or rate at an end of a motion."""
 
-    Parameters
-    ----------
-    name : str
-        "pin" or "pin rate".
-    place : int
-        Entry of (q, v).
-    low, high : float
-        Least and largest value; of a periodic motion, of the increase over the period.
-    """
-
-    name: str
-    place: int
-    low: float
+    name: str  # "pin" or "pin rate"
+    place: int  # entry of (q, v)
+    low: float  # low, high: least and largest value; of a periodic motion, of the increase over the period
     high: float
 
     @property
@@ -51,18 +41,10 @@ class EndCondition:
 
 @dataclass(frozen=True)
 class MotionEnd:
-    """Conditions on one end, and a consistent state near them.
+    """Conditions on one end, and a consistent state near them."""
 
-    Parameters
-    ----------
-    conditions : tuple of EndCondition
-        Independent conditions.
-    guess : State
-        State that meets what is fixed.
-    """
-
-    conditions: tuple[EndCondition, ...]
-    guess: State
+    conditions: tuple[EndCondition, ...]  # independent conditions
+    guess: State  # state that meets what is fixed
 
 
 def entries(system: System) -> dict[str, int]:
@@ -94,21 +76,16 @@ def value_range(name: str, given, what: str) -> tuple[float, float]:
 def end_of(system: System, given, what: str, near: State) -> MotionEnd:
     """Conditions at an end.
 
+    ArgumentError, StateError if names or values do not fit, or constraints contradict them.
+
     Parameters
     ----------
-    system : System
-        The system.
     given : State, mapping of str to float or pair, or None
         The whole state, conditions by name, or none.
     what : str
         "start" or "end", for messages.
     near : State
         What is not given is sought near this state.
-
-    Raises
-    ------
-    ArgumentError, StateError
-        If names or values do not fit, or constraints contradict them.
     """
     if given is None:
         return MotionEnd((), near)
@@ -133,19 +110,14 @@ def end_of(system: System, given, what: str, near: State) -> MotionEnd:
 def increments(system: System, given, start: State) -> tuple[EndCondition, ...]:
     """Conditions of a periodic motion: increases of independent coordinates and rates over the period.
 
+    ArgumentError if names or values do not fit.
+
     Parameters
     ----------
-    system : System
-        The system.
     given : bool or mapping of str to float
         Whether the motion is periodic, or increases of coordinates over a period that are not zero, as of a crank.
     start : State
         State near the start.
-
-    Raises
-    ------
-    ArgumentError
-        If names or values do not fit.
     """
     if given is False or given is None:
         return ()
@@ -163,10 +135,7 @@ def increments(system: System, given, start: State) -> tuple[EndCondition, ...]:
 def motion_limits(system: System, equations, given) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Limits of (q, v) and of the inputs: those of joints and inputs, and of names of a mapping.
 
-    Raises
-    ------
-    ArgumentError
-        If a name or a value does not fit.
+    ArgumentError if a name or a value does not fit.
     """
     n_x, known = system.n_q + system.n_v, entries(system)
     lowest, highest = np.full(n_x, -np.inf), np.full(n_x, np.inf)
@@ -193,13 +162,7 @@ def motion_limits(system: System, equations, given) -> tuple[np.ndarray, np.ndar
 
 
 def refuse_beyond(ends: dict[str, MotionEnd], lowest: np.ndarray, highest: np.ndarray):
-    """Refuse conditions that no motion within the limits meets.
-
-    Raises
-    ------
-    ArgumentError
-        If there is one, by its name.
-    """
+    """Refuse conditions that no motion within the limits meets; ArgumentError if there is one, by its name."""
     for what, end in ends.items():
         for one in end.conditions:
             if one.low > highest[one.place] or one.high < lowest[one.place]:

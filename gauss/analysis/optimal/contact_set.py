@@ -166,8 +166,6 @@ def impact_between(
         Gaps that are closed at the impact.
     struck : ContactSet
         Those that rebound, each with its own coefficient of restitution.
-    units : ndarray
-        Units of the state after it.
     """
     whole = touching.whole
     restitution = {name: struck.sides[k].whole.restitution for k, name in zip(struck.places, struck.names, strict=True)}

@@ -13,8 +13,6 @@ def followed(system: System, start: State, targets: Mapping[int, float], shares)
 
     Parameters
     ----------
-    system : System
-        System with loops.
     start : State
         State that meets the constraints.
     targets : mapping of int to float

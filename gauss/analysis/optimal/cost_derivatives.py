@@ -11,6 +11,8 @@ from gauss.codegen import Graph, Kernel, forward, reverse, write
 class CostDerivatives:
     """A function of vectors to a number, with its gradient and Hessian.
 
+    ArgumentError if it cannot be traced, or returns something other than a number.
+
     Parameters
     ----------
     function : callable
@@ -19,11 +21,6 @@ class CostDerivatives:
         Sizes of its arguments; derivatives are by all but the first one.
     what : str
         Name for messages.
-
-    Raises
-    ------
-    ArgumentError
-        If it cannot be traced, or returns something other than a number.
     """
 
     def __init__(self, function: Callable, sizes: tuple[int, ...], what: str):

@@ -33,10 +33,7 @@ Casadi = Any  # functions and expressions of CasADi, which has no types
 class OptimalEquations:
     """Functions of one system, on which collocation is written.
 
-    Parameters
-    ----------
-    system : System
-        System with inputs.
+    SimulationError if the scene has no inputs, or elements that no smooth function describes, by their names.
 
     Attributes
     ----------
@@ -44,11 +41,6 @@ class OptimalEquations:
         Units of coordinates and rates.
     lowest, highest : ndarray, shape (n_u,)
         Limits of the inputs; the traced inputs have none.
-
-    Raises
-    ------
-    SimulationError
-        If the scene has no inputs, or elements that no smooth function describes, by their names.
     """
 
     def __init__(self, system: System):
@@ -126,8 +118,6 @@ class OptimalEquations:
             (q, v) → numbers, or several vectors of them.
         what : str
             Name of the argument, for messages.
-        units : float or ndarray
-            Units of the values.
         size : int, optional
             Number of the values; any when not given.
         """

@@ -22,10 +22,10 @@ def first_guess(
 ) -> MotionValues:
     """Values on a mesh.
 
+    ArgumentError if the motion is none of this system.
+
     Parameters
     ----------
-    equations : OptimalEquations
-        Equations of motion.
     given : OptimalMotion, Trajectory or None
         A motion of the same system; None for straight lines.
     ends : tuple of State
@@ -38,11 +38,6 @@ def first_guess(
         Duration [s].
     stages : int
         Collocation points of an interval.
-
-    Raises
-    ------
-    ArgumentError
-        If the motion is none of this system.
     """
     if given is None:
         states = _line(equations.system, *ends, led, mesh, duration)

@@ -18,10 +18,7 @@ NEAR = 0.01  # of an equal interval: a mesh point nearer to a switching time giv
 def law_mesh(system: System, start: State, span: tuple[float, float], intervals: int) -> np.ndarray:
     """First mesh (n + 1,) on [0, 1]: equal intervals, divided where laws of time switch if the duration is given [s].
 
-    Raises
-    ------
-    SimulationError
-        If a prescribed position or velocity jumps.
+    SimulationError if a prescribed position or velocity jumps.
     """
     equal, (duration, longest) = np.linspace(0.0, 1.0, intervals + 1), span
     if duration != longest:
@@ -39,15 +36,12 @@ def law_mesh(system: System, start: State, span: tuple[float, float], intervals:
 def warn_of_passed(system: System, start: State, t: np.ndarray):
     """Warn of features of laws of time that pass between all times at which a mesh t (n + 1,) was checked [s].
 
+    SimulationError if a prescribed position or velocity jumps.
+
     Warns
     -----
     SwitchingWarning
         With the scene.
-
-    Raises
-    ------
-    SimulationError
-        If a prescribed position or velocity jumps.
     """
     times = smooth_timetable(system, Laws(system), start, float(t[-1]))
     edges = distinct(np.clip(np.concatenate([t[[0, -1]], times.switches, times.mesh]), t[0], t[-1]))

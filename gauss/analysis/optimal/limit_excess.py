@@ -17,18 +17,10 @@ from gauss.errors import LimitWarning, user_level
 
 @dataclass(frozen=True)
 class LimitExcess:
-    """What a motion is beyond its limits by.
+    """What a motion is beyond its limits by."""
 
-    Parameters
-    ----------
-    of_intervals : ndarray, shape (n,)
-        The largest of each interval, in shares of the units; 0 within the limits.
-    where : str
-        What is beyond its limit most, by how much, and when; empty within the limits.
-    """
-
-    of_intervals: np.ndarray
-    where: str
+    of_intervals: np.ndarray  # (n,) the largest of each interval, in shares of the units; 0 within the limits
+    where: str  # what is beyond its limit most, by how much, and when; empty within the limits
 
     @property
     def largest(self) -> float:
@@ -41,8 +33,6 @@ def limit_excess(problem: MotionProblem, t: np.ndarray, moved: np.ndarray, u: np
 
     Parameters
     ----------
-    problem : MotionProblem
-        The phase.
     t : ndarray, shape (n + 1,)
         Mesh points [s].
     moved : ndarray, shape (n, m + 1, n_q + n_v)
@@ -67,7 +57,7 @@ def warn_of_excess(found: Sequence[LimitExcess], accepted: float):
     Warns
     -----
     LimitWarning
-        With what is beyond its limit most.
+        Names what exceeds its limit most.
     """
     worst = max(found, key=lambda one: one.largest)
     if worst.largest > accepted:

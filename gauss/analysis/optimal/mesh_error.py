@@ -51,13 +51,7 @@ class LinearInputStep(MotionStep):
 
 
 class MeshError:
-    """Errors of found motions of one system.
-
-    Parameters
-    ----------
-    equations : OptimalEquations
-        Equations of motion.
-    """
+    """Errors of found motions of one system."""
 
     def __init__(self, equations: OptimalEquations):
         self.equations = equations

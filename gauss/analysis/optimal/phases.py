@@ -59,17 +59,14 @@ class MotionPhase:
 class MeshSettings:
     """How phases are discretised and solved; as for :func:`gauss.optimal_motion`.
 
+    ArgumentError if one is no number of its kind.
+
     Parameters
     ----------
     intervals, order, refinements, iterations : int
         Intervals of the first mesh of a phase, order of the collocation, most refinements, most iterations.
     tolerance : float
         Largest error of an interval.
-
-    Raises
-    ------
-    ArgumentError
-        If one is no number of its kind.
     """
 
     intervals: int
@@ -93,12 +90,12 @@ class MeshSettings:
 class PhaseProblems:
     """Problems of collocation of a motion, and first guesses.
 
+    ArgumentError, StateError, SimulationError as for :func:`gauss.optimal_motion`.
+
     Parameters
     ----------
     whole : System
         System with all its unilateral constraints.
-    phases : sequence of MotionPhase
-        The phases.
     start : State, mapping or None
         Conditions on the start.
     periodic, reset, meets, cost, limits
@@ -112,11 +109,6 @@ class PhaseProblems:
         Problem of each phase.
     guesses : list of MotionValues
         Their first guesses.
-
-    Raises
-    ------
-    ArgumentError, StateError, SimulationError
-        As for :func:`gauss.optimal_motion`.
     """
 
     def __init__(

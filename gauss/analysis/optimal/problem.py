@@ -1,4 +1,4 @@
-"""What is to be optimal in a phase of a motion, its values on a mesh, and the answer of a programme."""
+"""Optimal-control problem of a phase, values of a motion on a mesh, and the solution of the nonlinear programme."""
 
 from dataclasses import dataclass, replace
 
@@ -20,8 +20,6 @@ class MotionProblem:
     ----------
     system : System
         The system, whose inputs have limits.
-    equations : OptimalEquations
-        Equations of motion.
     cost : casadi.Function or None
         (t, x, u) → cost per time; None: the duration is the cost.
     start_time : float
@@ -93,27 +91,13 @@ class MotionProblem:
 
 @dataclass(frozen=True)
 class MotionValues:
-    """Values of a motion on a mesh, in shares of the units.
+    """Values of a motion on a mesh, in shares of the units."""
 
-    Parameters
-    ----------
-    mesh : ndarray, shape (n + 1,)
-        Mesh from 0 to 1.
-    x : ndarray, shape (n_x, n + 1)
-        States at the mesh points.
-    z : ndarray, shape (s, n_x, n)
-        States at the collocation points.
-    u : ndarray, shape (2, n_u, n)
-        Inputs at begin and end of the intervals.
-    duration : float
-        Duration [s].
-    """
-
-    mesh: np.ndarray
-    x: np.ndarray
-    z: np.ndarray
-    u: np.ndarray
-    duration: float
+    mesh: np.ndarray  # (n + 1,) mesh from 0 to 1
+    x: np.ndarray  # (n_x, n + 1) states at the mesh points
+    z: np.ndarray  # (s, n_x, n) states at the collocation points
+    u: np.ndarray  # (2, n_u, n) inputs at begin and end of the intervals
+    duration: float  # [s]
 
     def on(self, mesh: np.ndarray, stages: int) -> "MotionValues":
         """The same motion on another mesh, interpolated."""
@@ -140,12 +124,8 @@ class Solved:
     ----------
     values : tuple of MotionValues
         The motion of each phase.
-    costs : tuple of float
-        Their costs.
     status : str
         Status in the words of IPOPT.
-    iterations : int
-        Iterations.
     kkt, residual : float
         Largest entry of the gradient of the Lagrangian, relative to the largest multiplier or 1, and largest residual of a
         constraint, both in shares of the units.

@@ -15,8 +15,8 @@ from gauss.analysis.optimal.result import OptimalMotion
 from gauss.errors import SimulationError
 from gauss.system import State
 
-LIMIT_REFINEMENTS = 4  # most of them that limits alone ask for: each may make the intervals there four times shorter
-LIMIT_SHARE = 2.0  # of the tolerance, within which limits are kept: the motions that are looked at have errors of it
+LIMIT_REFINEMENTS = 4  # refinements for the sake of limits alone, each of which divides intervals by up to four
+LIMIT_SHARE = 2.0  # times the tolerance: how far limits may be missed, by motions that have errors of this size
 
 
 def on_refined_meshes(
@@ -24,21 +24,16 @@ def on_refined_meshes(
 ) -> list[OptimalMotion]:
     """Optimum of all phases on the first meshes that are fine enough.
 
+    SimulationError if there is no optimum, or more refinements are needed.
+
     Parameters
     ----------
-    problems : sequence of MotionProblem
-        The phases.
     guesses : sequence of MotionValues
         Motions near the optimum, on the first meshes.
     tolerance : float
         Largest error of an interval, in shares of the units.
     refinements : int
         Most refinements.
-
-    Raises
-    ------
-    SimulationError
-        If there is no optimum, or more refinements are needed.
     """
     checks = [MeshError(problem.equations) for problem in problems]
     accurate, meshes, iterations = _optima(problems, checks, guesses, tolerance, refinements)
@@ -78,24 +73,13 @@ def _optima(problems, checks, guesses, tolerance: float, refinements: int):
 
 @dataclass(frozen=True)
 class MeshedMotion:
-    """Optimum on the meshes of all phases, and its check; each of the lists has an entry for each phase.
+    """Optimum on the meshes of all phases, and its check; each of the lists has an entry for each phase."""
 
-    Parameters
-    ----------
-    solved : Solved
-        Answer of IPOPT.
-    samples : list of tuple of ndarray
-        Times (n + 1,), states (n + 1, n_q + n_v), and inputs (n, 2, n_u) at the ends of the intervals.
-    errors : list of ndarray
-        Error (n,) of each interval.
-    excess : list of LimitExcess
-        What it is beyond its limits by.
-    """
-
-    solved: Solved
+    solved: Solved  # answer of IPOPT
+    # times (n + 1,), states (n + 1, n_q + n_v), and inputs (n, 2, n_u) at the ends of the intervals
     samples: list[tuple[np.ndarray, ...]]
-    errors: list[np.ndarray]
-    excess: list[LimitExcess]
+    errors: list[np.ndarray]  # error (n,) of each interval
+    excess: list[LimitExcess]  # excess of each phase over its limits
 
     @property
     def mesh_error(self) -> float:

@@ -1,4 +1,4 @@
-"""An optimal motion: states at the mesh points, inputs as functions of time, and what its accuracy is."""
+"""An optimal motion: states at the mesh points, inputs as functions of time, and its accuracy."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING

@@ -29,8 +29,6 @@ class Transcription:
 
     Parameters
     ----------
-    problem : MotionProblem
-        The phase.
     mesh : ndarray, shape (n + 1,)
         Mesh from 0 to 1.
     rows : list of int

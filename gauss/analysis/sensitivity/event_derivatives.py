@@ -22,8 +22,6 @@ class EventDerivatives:
     ----------
     system : System
         The whole system, for gap functions, or a smooth one of closed gaps and sticking elements.
-    state : State
-        The state.
     """
 
     def __init__(self, system: System, state: State):

@@ -23,12 +23,8 @@ PLACE_STEP = 2.0**-10  # of a place [rad, m]; residuals are linear in it
 def is_of_event(scene: Scene, parameter: str) -> bool:
     """Whether a parameter such as "restitution:floor" is one of an event.
 
-    Raises
-    ------
-    StateError
-        If there is no such unilateral constraint.
-    ArgumentError
-        If it has no such number, or the derivative by it does not exist.
+    StateError if there is no such unilateral constraint.
+    ArgumentError if it has no such number, or the derivative by it does not exist.
     """
     require(parameter, (str,), "parameter")
     kind, _, name = parameter.partition(":")

@@ -19,8 +19,6 @@ def warn_of_jumps(system: System, t: np.ndarray, x: np.ndarray):
 
     Parameters
     ----------
-    system : System
-        The system.
     t, x : ndarray, shape (k,), (k, n_q + n_v)
         Times [s] and states of the motion.
     """

@@ -47,22 +47,12 @@ class Piece(Protocol):
 
 @dataclass(frozen=True)
 class SmoothStep:
-    """Linear map of one smooth step.
+    """Linear map of one smooth step."""
 
-    Parameters
-    ----------
-    step : MotionStep
-        Dynamics.
-    t, h : float
-        Its start and its length [s].
-    x, u : ndarray, shape (n_x,), (n_u,)
-        State at its start, and inputs.
-    """
-
-    step: MotionStep
-    t: float
+    step: MotionStep  # dynamics
+    t: float  # t, h: its start and its length [s]
     h: float
-    x: np.ndarray
+    x: np.ndarray  # x (n_x,), u (n_u,): state at its start, and inputs
     u: np.ndarray
 
     def change(self, directions: np.ndarray) -> np.ndarray:

@@ -26,19 +26,13 @@ from gauss.system import State
 class ParametrisedStep(MotionStep):
     """Step of the systems of one kind.
 
+    ArgumentError if there is no such method.
+    SimulationError if the system has no smooth dynamics in machine code, with the reasons.
+
     Parameters
     ----------
-    family : ParametrisedSystem
-        The systems.
     integrator : str
         Explicit Runge–Kutta method: "rk4", "dopri5" or "dop853", with fixed steps.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no such method.
-    SimulationError
-        If the system has no smooth dynamics in machine code, with the reasons.
     """
 
     def __init__(self, family: ParametrisedSystem, integrator: str):

@@ -25,30 +25,14 @@ RELATIVE_TOLERANCE = 1e-12  # of the steps, as simulate has it
 
 @dataclass
 class RecordedPhase:
-    """A smooth phase, and the event that ends it.
-
-    Parameters
-    ----------
-    phase : Phase
-        The phase.
-    start : State
-        Its first state.
-    struck : tuple of int
-        Gaps that close with an impact at its end.
-    bearing : tuple of int
-        Closed gaps that bear an impulse there.
-    other : tuple of str
-        Elements other than gaps that take part in the impact.
-    end : State
-        State before the event; that of the end of the motion in the last phase.
-    """
+    """A smooth phase, and the event that ends it."""
 
     phase: Phase
-    start: State
-    struck: tuple[int, ...] = ()
-    bearing: tuple[int, ...] = ()
-    other: tuple[str, ...] = ()
-    end: State = field(init=False)
+    start: State  # its first state
+    struck: tuple[int, ...] = ()  # gaps that close with an impact at its end
+    bearing: tuple[int, ...] = ()  # closed gaps that bear an impulse there
+    other: tuple[str, ...] = ()  # elements other than gaps that take part in the impact
+    end: State = field(init=False)  # state before the event; that of the end of the motion in the last phase
 
     def system(self, whole: System) -> System:
         """Smooth system of the phase, made of another system of the same elements."""
@@ -95,10 +79,7 @@ def recorded_motion(
 ) -> tuple[list[RecordedPhase], np.ndarray]:
     """Phases of a motion with events, and its states (k, n_q + n_v) at times (k,), inputs being held between these.
 
-    Raises
-    ------
-    SimulationError
-        If the motion needs time stepping, begins with an impact, or cannot continue.
+    SimulationError if the motion needs time stepping, begins with an impact, or cannot continue.
     """
     driven, breaks = system, ()
     if inputs.size and inputs.any():
@@ -120,7 +101,7 @@ def recorded_motion(
             kept += [packed(state) for state in inside]
             reached = max(reached, point.state.t)
             last = point.state
-        kept += [packed(last)] * (len(nodes) - len(kept))  # the last node but for the rounding of its time
+        kept += [packed(last)] * (len(nodes) - len(kept))  # the last node, to the rounding of its time
     run.record[-1].end = last
     return run.record, np.array(kept)
 

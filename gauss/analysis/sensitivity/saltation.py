@@ -31,14 +31,9 @@ SUPPRESSED = 1e-3  # rate after an impact, relative to that with restitution, be
 
 
 class Saltation(NamedTuple):
-    """Linear map of small changes over an event.
+    """Linear map of small changes over an event."""
 
-    Attributes
-    ----------
-    matrix : ndarray, shape (n_x, n_x + n_u + n_p)
-        Changes of the state after it by those of the state before, of inputs and of parameters.
-    """
-
+    # (n_x, n_x + n_u + n_p) changes of the state after it by those of the state before, of inputs and of parameters
     matrix: np.ndarray
 
     def change(self, directions: np.ndarray) -> np.ndarray:
@@ -51,34 +46,16 @@ class Saltation(NamedTuple):
 
 
 class Transition(NamedTuple):
-    """Event between two phases.
+    """Event between two phases."""
 
-    Attributes
-    ----------
-    whole : System
-        The system with events.
-    before, after : RecordedPhase
-        The phases.
-    steps : tuple of MotionStep
-        Their smooth dynamics.
-    inputs : ndarray, shape (n_u,)
-        Inputs at the event.
-    """
-
-    whole: System
-    before: RecordedPhase
+    whole: System  # the system with events
+    before: RecordedPhase  # before, after: the phases
     after: RecordedPhase
-    steps: tuple[MotionStep, MotionStep]
-    inputs: np.ndarray
+    steps: tuple[MotionStep, MotionStep]  # their smooth dynamics
+    inputs: np.ndarray  # (n_u,) inputs at the event
 
     def saltation(self) -> Saltation:
-        """Saltation matrix.
-
-        Raises
-        ------
-        SimulationError
-            If the motion has no derivative at the event, by the names of its elements.
-        """
+        """Saltation matrix; SimulationError if the motion has no derivative at the event, by the names of its elements."""
         one, end, start = self.steps[0], self.before.end, self.after.start
         n, found = one.n_x, np.zeros((one.n_x, one.n_given))
         found[:, :n] = np.eye(n)

@@ -15,14 +15,12 @@ def timed_steps(
 ) -> list[list[tuple[float, float]]]:
     """Begin and length of the smooth steps from each of some times to the next [s].
 
+    SimulationError if a prescribed position or velocity jumps.
+
     Parameters
     ----------
-    system : System
-        The system.
     laws : Laws
         Its loads.
-    start : State
-        State at the start.
     nodes : ndarray, shape (k + 1,)
         Times [s].
     lengths : ndarray, shape (k,)
@@ -32,11 +30,6 @@ def timed_steps(
     -----
     SwitchingWarning
         If a law of time has a smooth feature that is shorter than the steps resolve.
-
-    Raises
-    ------
-    SimulationError
-        If a prescribed position or velocity jumps.
     """
     times, step = smooth_timetable(system, laws, start, float(nodes[-1])), float(lengths.max())
     if times.unresolved(start.t, float(nodes[-1]), step):

@@ -1,4 +1,4 @@
-"""Methods of the atlas: a formulation, a solver, an integrator, and what is done against drift."""
+"""Methods of the atlas: a formulation, a solver, an integrator, and a stabilisation."""
 
 import warnings
 from dataclasses import dataclass
@@ -28,25 +28,13 @@ RTOL, ATOL = 1e-10, 1e-12  # of adaptive integrators
 
 @dataclass(frozen=True)
 class Method:
-    """One way to compute a motion.
+    """One way to compute a motion."""
 
-    Parameters
-    ----------
-    backend : str
-        What solves for accelerations.
-    form : str
-        Form of the compulsion that a QP solver gets.
-    integrator, stabilisation : str
-        As in :func:`gauss.simulate`.
-    certified : bool
-        Whether every evaluation is certified, as users get it, or believed as the backend claims.
-    """
-
-    backend: str = AUTO
-    form: str = "F2s"
-    integrator: str = "rk4"
+    backend: str = AUTO  # what solves for accelerations
+    form: str = "F2s"  # form of the compulsion that a QP solver gets
+    integrator: str = "rk4"  # integrator, stabilisation: as in :func:`gauss.simulate`
     stabilisation: str = "projection"
-    certified: bool = True
+    certified: bool = True  # whether every evaluation is certified, as users get it, or believed as the backend claims
 
     @property
     def name(self) -> str:
@@ -66,13 +54,7 @@ class Method:
         return {} if self.ours else {"form": self.form}
 
     def instant(self, compulsion: Compulsion) -> Answer:
-        """Accelerations of one instant.
-
-        Raises
-        ------
-        BackendError
-            If the method says that it has none.
-        """
+        """Accelerations of one instant; BackendError if the method says that it has none."""
         if self.certified:
             solution = solve(compulsion, self.backend, **self._options)
             if not solution.status.certified:
@@ -86,10 +68,7 @@ class Method:
     def motion(self, system: System, duration: float, step: float, state: State | None = None, times=None) -> Trajectory:
         """Motion; ``step`` is for integrators of fixed step.
 
-        Raises
-        ------
-        GaussError
-            If the method says that it cannot go on.
+        GaussError if the method says that it cannot go on.
         """
         fixed = isinstance(INTEGRATORS[self.integrator], FixedStep)
         settings: dict[str, Any] = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}
@@ -100,7 +79,7 @@ class Method:
                 "stabilisation": self.stabilisation,
             }
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", BalanceWarning)  # it is looked at below, whatever that takes
+                warnings.simplefilter("ignore", BalanceWarning)  # warned of below
                 trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
             warn_of_balance(trajectory)
             return trajectory

@@ -11,6 +11,7 @@ from tqdm import tqdm
 from gauss.bench.atlas import CASES
 from gauss.bench.atlas.case import HONEST, SILENT, SLOW, judged
 from gauss.bench.atlas.methods import METHODS
+from gauss.bench.contest import with_time
 from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers
@@ -35,6 +36,8 @@ def explore(
 ) -> ResultTable:
     """Examine all cells that have no verdict yet, and return the table.
 
+    BackendError if there is no such case or method.
+
     Parameters
     ----------
     folder : Path
@@ -45,11 +48,6 @@ def explore(
         Examine again what has a verdict.
     progress : bool
         Show a bar.
-
-    Raises
-    ------
-    BackendError
-        If there is no such case or method.
     """
     cases, methods = chosen(cases, CASES, "case"), chosen(methods, METHODS, "method")
     table = STABILITY.table(folder, fresh)
@@ -68,9 +66,8 @@ def explore(
 def _cell(case: str, method: str, data) -> dict:
     """One cell, in a worker."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    begin = time.perf_counter()
-    verdict = judged(CASES[case], METHODS[method], data)
-    return verdict | {"seconds": time.perf_counter() - begin}
+    verdict, seconds = with_time(lambda: judged(CASES[case], METHODS[method], data), time.perf_counter)
+    return verdict | {"seconds": seconds}
 
 
 def _row(reply: Reply) -> dict:

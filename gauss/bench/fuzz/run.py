@@ -37,6 +37,8 @@ def fuzz(
 ) -> ResultTable:
     """Examine all blocks that are not examined yet, and return the table.
 
+    BackendError if there is no such backend.
+
     Parameters
     ----------
     folder : Path
@@ -53,11 +55,6 @@ def fuzz(
         Examine again what has been examined.
     progress : bool
         Show a bar.
-
-    Raises
-    ------
-    BackendError
-        If there is no such backend.
     """
     names = chosen(backends, dict.fromkeys((*OURS, *available())), "backend")
     table = FUZZ.table(folder, fresh)

@@ -38,8 +38,6 @@ class MovedScene:
         How long it moves [s].
     times : ndarray
         Samples [s].
-    integrator : str
-        By which it moves.
     step : float, optional
         Step of methods that have one [s].
 

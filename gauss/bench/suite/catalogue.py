@@ -1,6 +1,6 @@
 """The instances of the suite by class: ``instances()`` makes them, each with its reference, which is checked on the way.
 
-References are not trusted: nothing leaves the suite whose verdict is not proven to the digits that it claims.
+An instance whose verdict is not proven to the digits that its reference claims is refused.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -15,7 +15,7 @@ from gauss.bench.suite.optimality import certificate_residual, ray_residual, res
 from gauss.bench.suite.refine import refined
 from gauss.errors import BackendError, did_you_mean
 
-VERSION = "1.0.0"  # of the suite: another number for other numbers
+VERSION = "1.0.0"  # of the random numbers of the suite
 CLASSES = {
     "equality": "Accelerations of open and closed mechanisms: equality rows alone, all independent.",
     "scales": "The same mechanisms in other units, and with masses up to twelve orders apart.",

@@ -26,10 +26,7 @@ INSIDE, APEX, BOUNDARY = "inside", "apex", "boundary"
 def refined_with_cones(instance: SuiteInstance) -> SuiteReference:
     """Solution of a programme with cones, or of Coulomb's law.
 
-    Raises
-    ------
-    BackendError
-        If the guess does not converge, or refinement does not.
+    BackendError if the guess does not converge, or refinement does not.
     """
     x, y, plain, z = _guess(instance)
     states, start = _states(instance, x, z)

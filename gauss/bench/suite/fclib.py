@@ -19,13 +19,7 @@ from gauss.io.fclib import hdf5, read_local, write_local
 
 
 def write_fclib(path: Path, instance: SuiteInstance):
-    """Write an instance of Coulomb's law.
-
-    Raises
-    ------
-    MissingPackageError
-        If h5py is not installed.
-    """
+    """Write an instance of Coulomb's law; MissingPackageError if h5py is not installed."""
     reference, W = instance.proof, sparse.csc_array(instance.P)
     u = (product(W, reference.x) + instance.q).rounded()
     with hdf5().File(path, "w") as file:

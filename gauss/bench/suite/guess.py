@@ -24,17 +24,14 @@ class Guess(NamedTuple):
 def guessed(instance: SuiteInstance, sliding: np.ndarray | None = None) -> Guess:
     """Answer to about ten digits.
 
+    BackendError if the interior-point method says that there is no answer.
+
     Parameters
     ----------
     instance : SuiteInstance
         The programme.
     sliding : ndarray, shape (n,), optional
         What is added to q.
-
-    Raises
-    ------
-    BackendError
-        If the interior-point method says that there is no answer.
     """
     import clarabel
 

@@ -109,13 +109,7 @@ class SuiteInstance:
     reference: SuiteReference | None = None
 
     def __post_init__(self):
-        """Refuse names and units that are not one a variable.
-
-        Raises
-        ------
-        BackendError
-            If their numbers differ.
-        """
+        """Refuse names and units that are not one a variable; BackendError if their numbers differ."""
         sizes = {"variables": len(self.variables), "units": len(self.units), "lb": self.lb.size, "ub": self.ub.size}
         wrong = [f"{size} {name}" for name, size in sizes.items() if size != self.n]
         if wrong:

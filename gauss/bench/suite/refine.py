@@ -88,10 +88,7 @@ def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -
 def hold(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> Held:
     """Answer with the equality rows ``equal`` and the plain rows ``active`` as equations.
 
-    Raises
-    ------
-    BackendError
-        If refinement does not converge.
+    BackendError if refinement does not converge.
     """
     right = instance.plain_rows()[1]
     K = _equations(instance, equal, active)
@@ -107,10 +104,7 @@ def hold(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> Held
 def solve_wide(K, target: np.ndarray, name: str) -> tuple[Doubled, float]:
     """Solution of the symmetric system K u = target, and its last relative correction.
 
-    Raises
-    ------
-    BackendError
-        If the system is singular to working precision.
+    BackendError if the system is singular to working precision.
     """
     scale = _equilibrated(K)
     D = sparse.diags_array(scale)

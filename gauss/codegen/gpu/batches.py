@@ -22,15 +22,7 @@ FEWER = "take fewer samples: one motion does not fit into the memory of the devi
 
 
 class DeviceKernel(OnDevice):
-    """Traced function on a device, called as :class:`gauss.codegen.Kernel`.
-
-    Parameters
-    ----------
-    name : str
-        Name of the devices.
-    function : Function or NativeFunction
-        The function.
-    """
+    """Traced function on a device, called as :class:`gauss.codegen.Kernel`."""
 
     def __init__(self, name: str, function: Function | NativeFunction):
         super().__init__(name, device(name).lowered(states_code(function)))
@@ -55,8 +47,6 @@ class DeviceFixedStepLoop(OnDevice):
 
     Parameters
     ----------
-    name : str
-        Name of the devices.
     method, start, written, inputs
         As of that class.
     """
@@ -72,8 +62,6 @@ class DeviceFixedStepLoop(OnDevice):
 
         Parameters
         ----------
-        span : BatchSpan
-            Motions and steps.
         points, worst, out, inputs : ndarray
             As of that class; the first three are changed.
         """
@@ -105,8 +93,6 @@ class DeviceAdaptiveLoop(OnDevice):
 
     Parameters
     ----------
-    name : str
-        Name of the devices.
     method, written
         As of :class:`gauss.codegen.kernels.AdaptiveBatchLoop`.
     """

@@ -25,10 +25,8 @@ WARP = 32
 class CudaDevice:
     """One GPU.
 
-    Parameters
-    ----------
-    number : int
-        Which one.
+    MissingPackageError if cuda-bindings is not installed.
+    DeviceError if there is no driver, no such device, or it is too old.
 
     Attributes
     ----------
@@ -36,13 +34,6 @@ class CudaDevice:
         Its name, such as "cuda:0".
     stream : int
         Stream of copies and programs; 0 is the default stream.
-
-    Raises
-    ------
-    MissingPackageError
-        If cuda-bindings is not installed.
-    DeviceError
-        If there is no driver, no such device, or it is too old.
     """
 
     def __init__(self, number: int = 0):
@@ -122,17 +113,14 @@ class CudaDevice:
 class CudaProgram:
     """Thread code on a GPU.
 
+    DeviceError if the driver refuses the code.
+
     Attributes
     ----------
     threads_per_block : int
         Threads that start together; fewer where each takes many registers.
     memory_bytes : int
         Memory that the driver takes for the frames of all threads at once [bytes].
-
-    Raises
-    ------
-    DeviceError
-        If the driver refuses the code.
     """
 
     def __init__(self, device: CudaDevice, lowered: Lowered):

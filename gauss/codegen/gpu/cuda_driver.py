@@ -27,12 +27,8 @@ REMEDIES = {
 class CudaDriver:
     """Functions of the CUDA driver: a status that is no success is a DeviceError.
 
-    Raises
-    ------
-    MissingPackageError
-        If cuda-bindings is not installed.
-    DeviceError
-        If there is no driver.
+    MissingPackageError if cuda-bindings is not installed.
+    DeviceError if there is no driver.
     """
 
     def __init__(self):
@@ -71,13 +67,7 @@ class CudaDriver:
 
     @contextmanager
     def entered(self, context) -> Iterator[None]:
-        """Calls of this thread go to a context.
-
-        Raises
-        ------
-        DeviceError
-            If this process was forked from the one that began.
-        """
+        """Calls of this thread go to a context; DeviceError if this process was forked from the one that began."""
         if os.getpid() != self.process:
             raise DeviceError("device 'cuda': a forked process cannot use the GPU of its parent: start it by 'spawn'.")
         self.call("cuCtxPushCurrent", context)

@@ -21,8 +21,6 @@ class CudaArray:
 
     Parameters
     ----------
-    device : CudaDevice
-        The GPU.
     shape : tuple of int
         Its shape.
     """
@@ -78,17 +76,12 @@ class CudaArray:
 class CudaView:
     """Array of another library on a GPU.
 
+    DeviceError if it lies on another GPU.
+
     Parameters
     ----------
-    device : CudaDevice
-        The GPU.
     given : object
         Array with ``__cuda_array_interface__``.
-
-    Raises
-    ------
-    DeviceError
-        If it lies on another GPU.
     """
 
     def __init__(self, device: "CudaDevice", given):
@@ -128,13 +121,7 @@ class CudaView:
 
 
 def stream_handle(stream) -> int:
-    """Handle of a stream: a whole number, or a stream of cuda.core, torch or CuPy.
-
-    Raises
-    ------
-    DeviceError
-        If it is no stream.
-    """
+    """Handle of a stream: a whole number, or a stream of cuda.core, torch or CuPy; DeviceError if it is no stream."""
     protocol = getattr(stream, "__cuda_stream__", None)
     if callable(protocol):
         return int(protocol()[1])

@@ -17,15 +17,9 @@ class Lowered(NamedTuple):
 
 
 class DeviceArray(Protocol):
-    """Array of doubles in the memory of a device.
+    """Array of doubles in the memory of a device."""
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Its shape; rows are contiguous.
-    """
-
-    shape: tuple[int, ...]
+    shape: tuple[int, ...]  # its shape; rows are contiguous
 
     def numpy(self) -> np.ndarray:
         """A copy in the memory of this process."""
@@ -35,72 +29,39 @@ class DeviceArray(Protocol):
 
 
 class DeviceView(Protocol):
-    """Array of another library in the memory of a device.
+    """Array of another library in the memory of a device."""
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Its shape.
-    strides : tuple of int
-        Its strides [bytes].
-    dtype : str
-        Type of its entries, as numpy writes it.
-    """
-
-    shape: tuple[int, ...]
-    strides: tuple[int, ...]
-    dtype: str
+    shape: tuple[int, ...]  # its shape
+    strides: tuple[int, ...]  # its strides [bytes]
+    dtype: str  # type of its entries, as numpy writes it
 
     def numpy(self) -> np.ndarray:
         """A copy in the memory of this process."""
 
 
 class DeviceProgram(Protocol):
-    """Thread code that can be run.
+    """Thread code that can be run."""
 
-    Attributes
-    ----------
-    memory_bytes : int
-        Memory of the device that the frames of all threads at once take [bytes].
-    """
-
-    memory_bytes: int
+    memory_bytes: int  # memory of the device that the frames of all threads at once take [bytes]
 
     def __call__(self, threads: int, arguments: Sequence, stream: int = 0):
         """Run a number of threads in a stream of the device, and wait for them."""
 
 
 class Device(Protocol):
-    """Processor with a memory of its own.
+    """Processor with a memory of its own."""
 
-    Attributes
-    ----------
-    name : str
-        Its name, such as "cuda:0".
-    stream : int
-        Stream of copies and programs; 0 is the default stream.
-    """
-
-    name: str
-    stream: int
+    name: str  # its name, such as "cuda:0"
+    stream: int  # stream of copies and programs; 0 is the default stream
 
     def on(self, stream) -> "Device":
         """The device with another stream; None is the default stream.
 
-        Raises
-        ------
-        DeviceError
-            If it has no streams, or this is none.
+        DeviceError if it has no streams, or this is none.
         """
 
     def lowered(self, code: ThreadCode) -> Lowered:
-        """Thread code for this device.
-
-        Raises
-        ------
-        DeviceError
-            If it calls what a GPU does not have.
-        """
+        """Thread code for this device; DeviceError if it calls what a GPU does not have."""
 
     def program(self, lowered: Lowered) -> DeviceProgram:
         """Thread code, ready to run."""

@@ -22,12 +22,8 @@ class DeviceFunction:
 
     Parameters
     ----------
-    rows : RowsOnDevice
-        The function.
     own : callable
         The same function on this CPU, for rows that exceed the limits; it says why it refuses one.
-    name : str
-        Its name.
 
     Attributes
     ----------

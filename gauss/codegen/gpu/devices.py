@@ -15,16 +15,13 @@ NAME = re.compile(rf"(?:cuda(?::(?P<number>\d{{1,3}}))?|(?P<lanes>lanes))(?P<sin
 def device_name(given) -> str:
     """Name of one device, or of several: "cuda:0", "cuda:0,cuda:1", "cuda:0 float32".
 
+    ArgumentError if it is no such name, or GPUs and this CPU are to share a batch.
+
     Parameters
     ----------
     given : str or sequence of str
         "cuda" or "cuda:0" for the first GPU, "cuda:1" for the second; "lanes" for this CPU, one thread after the other;
         with " float32" behind it for single precision. A sequence of such names shares a batch.
-
-    Raises
-    ------
-    ArgumentError
-        If it is no such name, or GPUs and this CPU are to share a batch.
     """
     matches = _matches(given)
     if not matches or None in matches:
@@ -52,17 +49,13 @@ def is_single(name: str) -> bool:
 def double_precision(given) -> str:
     """Name of devices that move motions, which are checked to more digits than single precision has.
 
+    ArgumentError if it is no such name.
+    DeviceError if it asks for single precision.
+
     Parameters
     ----------
     given : str or sequence of str
         As of :func:`device_name`.
-
-    Raises
-    ------
-    ArgumentError
-        If it is no such name.
-    DeviceError
-        If it asks for single precision.
     """
     name = device_name(given)
     if is_single(name):
@@ -73,19 +66,14 @@ def double_precision(given) -> str:
 def devices(name: str) -> tuple[Device, ...]:
     """Devices of a name.
 
+    ArgumentError if it is no such name.
+    MissingPackageError if cuda-bindings is not installed.
+    DeviceError if there is no driver, or no such device.
+
     Parameters
     ----------
     name : str
         As of :func:`device_name`.
-
-    Raises
-    ------
-    ArgumentError
-        If it is no such name.
-    MissingPackageError
-        If cuda-bindings is not installed.
-    DeviceError
-        If there is no driver, or no such device.
     """
     own = device_name(name).removesuffix(f" {SINGLE}").replace(f" {SINGLE},", ",").split(",")
     return tuple(_device(None if one == "lanes" else int(one.partition(":")[2])) for one in own)

@@ -55,7 +55,7 @@ _pointer = _python("PyCapsule_GetPointer", ctypes.c_void_p, ctypes.c_void_p, cty
 
 @_DESTRUCTOR
 def _release(own):
-    """Called with a capsule that goes; one that no consumer took still has its name, and its array."""
+    """Destructor of a capsule: one that no consumer took still has its name, and its array is released."""
     if _is_valid(own, NAME):
         _lent.pop(_pointer(own, NAME), None)
 
@@ -65,8 +65,6 @@ def capsule(owner, pointer: int, shape: tuple[int, ...], kind: int, number: int)
 
     Parameters
     ----------
-    owner : object
-        Owner of the memory.
     pointer : int
         Its address.
     shape : tuple of int

@@ -15,15 +15,7 @@ SHARE_OF_MEMORY = 0.8  # of the free memory of a device: other libraries and its
 
 
 class OnDevice:
-    """Base of code for a device, or for several: what is kept on disk is its text, which is loaded at the first use.
-
-    Parameters
-    ----------
-    name : str
-        Name of the devices.
-    lowered : Lowered
-        The code.
-    """
+    """Base of code for a device, or for several: what is kept on disk is its text, which is loaded at the first use."""
 
     def __init__(self, name: str, lowered: Lowered):
         self.device_name, self.lowered = name, lowered
@@ -64,10 +56,10 @@ def in_parts(
 ):
     """Work on all parts of a batch; devices take the parts that are left, one after the other, until one fails.
 
+    DeviceError if one member alone does not fit.
+
     Parameters
     ----------
-    devices : sequence of Device
-        The devices.
     free_bytes : callable
         Memory of a device that a batch may take [bytes].
     count : int
@@ -78,11 +70,6 @@ def in_parts(
         ``work(device, part)``.
     what : str
         What one member is, and what makes it smaller, for the message.
-
-    Raises
-    ------
-    DeviceError
-        If one member alone does not fit.
     """
     lock, begun = Lock(), 0
 

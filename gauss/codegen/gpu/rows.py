@@ -25,7 +25,7 @@ SINGLE_LIMIT = 1e-2  # relative error of accelerations, and residual, above whic
 def rows_code(function: Function, interface: Interface, single: bool = False) -> ThreadCode:
     """``rows(count, (vector, row stride, entry stride)…, numbers, results…, mark)`` of a function of vectors and a number.
 
-    The strides are whole numbers of doubles; results and numbers are contiguous. In single precision it computes only.
+    The strides are whole numbers of doubles; results and numbers are contiguous. Single precision is for computing alone.
     """
     sizes, results = interface.sizes, interface.result_sizes(len(function.outputs))
     kinds = [INTEGER, *[POINTER, INTEGER, INTEGER] * len(sizes), POINTER, *[POINTER] * len(results), POINTER]
@@ -62,8 +62,6 @@ class RowsOnDevice(OnDevice):
 
     Parameters
     ----------
-    name : str
-        Name of the devices.
     function : Function
         Its inputs are the vectors and the number, concatenated; its outputs the results and the limited quantities.
     interface : Interface

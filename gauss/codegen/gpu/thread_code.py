@@ -66,7 +66,7 @@ class ThreadCode:
         return self._with_entry(self._cpu_entry)
 
     def _with_entry(self, write: Callable) -> str:
-        """Text of the module with an entry, which is taken away again."""
+        """Text of the module with an entry, which is removed from the module afterwards."""
         module, (_, *kinds) = self.writer.module, self.function.ftype.args
         known = dict(module.globals)
         write(module, kinds)

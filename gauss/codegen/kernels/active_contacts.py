@@ -21,8 +21,6 @@ class ActiveContacts:
         Emitter of accelerations.
     functions : StepFunctions
         Traced functions of a step.
-    solver : llvmlite.ir.Function
-        Solver of a problem.
     """
 
     def __init__(self, memory: StepMemory, free: FreeMotion, functions, solver: ir.Function):

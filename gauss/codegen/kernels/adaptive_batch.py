@@ -104,8 +104,6 @@ class AdaptiveBatchLoop(BatchLoop):
             Times of the samples, then infinity.
         out : ndarray, shape (columns, rows, row)
             Changed.
-        budget : int
-            Steps.
         """
         self._call(queue, (lanes, motions, grid, out), budget)
 

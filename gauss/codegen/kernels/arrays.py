@@ -273,10 +273,7 @@ class Routine:
 def routine(function: NativeFunction, module: ir.Module, width: int) -> tuple[Routine, Strided, Strided]:
     """Begin the code of a function for one state at a time, with its inputs and outputs.
 
-    Raises
-    ------
-    TypeError
-        If code for several states at a time is asked for.
+    TypeError if code for several states at a time is asked for.
     """
     r = Routine(function.begin_scalar(module, width))
     (given, result), (in_stride, out_stride) = r.arrays, r.integers

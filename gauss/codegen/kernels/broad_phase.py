@@ -14,7 +14,7 @@ from gauss.codegen import INTEGER
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 
 CELLS = 2.0 + 1e-6  # edge of a cell over the largest half edge of boxes in it; more than 2 by rounding of places
-OUTLIER = 4.0  # boxes larger than the mean so many times are compared with all others
+OUTLIER = 4.0  # times the mean size: larger boxes are compared with all others
 FARTHEST = 2.0**31  # cells from the origin: farther ones count as the last
 HASH = 73856093, 19349663, 83492791  # primes, of Teschner et al.
 AROUND = list(product((-1, 0, 1), repeat=3))

@@ -33,21 +33,11 @@ class Slot:
 
 
 class Pattern(NamedTuple):
-    """Structure of an array: arrays of equal pattern share specialised code.
+    """Structure of an array: arrays of equal pattern share specialised code."""
 
-    Attributes
-    ----------
-    shape : tuple of int
-        Their shape.
-    codes : tuple of int
-        Code of each entry: k for the k-th distinct slot, −k for its negative, 0 for a number.
-    numbers : tuple of float
-        The numbers among the entries.
-    """
-
-    shape: tuple
-    codes: tuple
-    numbers: tuple
+    shape: tuple  # their shape
+    codes: tuple  # code of each entry: k for the k-th distinct slot, −k for its negative, 0 for a number
+    numbers: tuple  # the numbers among the entries
 
     def filled(self, slots) -> np.ndarray:
         """Object array with an entry for each slot, negated by the pattern."""

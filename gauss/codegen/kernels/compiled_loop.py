@@ -48,10 +48,7 @@ class Loop:
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
         """Run to the end, or until the budget is used up; it changes ``control`` and all arrays except ``grid``.
 
-        Raises
-        ------
-        ValueError
-            If an array is not a contiguous one of doubles.
+        ValueError if an array is not a contiguous one of doubles.
         """
         self._run.call(ctypes.byref(control), *_addresses((point, confirmed, grid, out)), budget)
 
@@ -124,10 +121,7 @@ class BatchLoop(machine.CodeCaller):
     def _call(self, control: Numbers, arrays: Sequence[np.ndarray], last: int):
         """Call the loop; arrays go by address: Ctrl-C while ctypes converts them would be another error.
 
-        Raises
-        ------
-        ValueError
-            If an array is not a contiguous one of doubles.
+        ValueError if an array is not a contiguous one of doubles.
         """
         self._run.call(ctypes.byref(control), *_addresses(arrays), last)
 

@@ -85,8 +85,6 @@ class FixedStepBatchLoop(BatchLoop):
 
         Parameters
         ----------
-        span : BatchSpan
-            Motions and steps.
         points : ndarray, shape (size, columns)
             Points of the motions, changed; before step 0 their rates may be missing.
         worst : ndarray, shape (len(WORST_RECORD), columns)

@@ -1,8 +1,9 @@
-"""Least way out of two convex hulls in each other, in machine code.
+"""Penetration of two convex hulls, the shortest translation that separates them, in machine code.
 
     D = {a − b} around the origin;   depth = distance of the origin from the nearest face of D
 
-A polytope of corners of D grows where it is nearest to the origin, until D ends there (EPA: van den Bergen, GDC 2001).
+A polytope of corners of D is expanded at its face nearest to the origin until that face is one of D (EPA: van den Bergen,
+GDC 2001).
 """
 
 import numpy as np
@@ -36,7 +37,7 @@ class _PenetrationWriter:
         r.copy(self.points, self.simplex, 12)
         r.copy(self.vertices, self.own, 8)
         a, b, c, d = (vector(self.points, 3 * k) for k in range(4))
-        with r.when(cross(b - a, c - a) @ (d - a) > 0.0):  # faces are to turn the other way
+        with r.when(cross(b - a, c - a) @ (d - a) > 0.0):  # two are swapped: faces are counterclockwise from outside
             put(self.points, [*b, *a])
             one = [self.vertices[k] for k in range(4)]
             put(self.vertices, one[2:] + one[:2])
@@ -72,7 +73,7 @@ class _PenetrationWriter:
             self.status[0] = self.left
 
     def _add(self, i: Value, j: Value, k: Value):
-        """Add a face; one without area is never the nearest, nor seen from anywhere."""
+        """Add a face; one without area is never the nearest, nor visible from any point."""
         r, place = self.r, self.face_count[0]
         a, b, c = (vector(self.points, corner * 3) for corner in (i, j, k))
         across = cross(b - a, c - a)
@@ -106,7 +107,7 @@ class _PenetrationWriter:
         return (a >= c) & (a <= c) & (b >= d) & (b <= d)
 
     def _open(self, w: np.ndarray):
-        """Take away the faces that are seen from a point, and list their edges; the last face takes the place of each."""
+        """Remove the faces visible from a point, and list their edges; the last face takes the place of each."""
         r = self.r
         self.edge_count[0] = 0
         place = r.variable(0, INTEGER)
@@ -129,7 +130,7 @@ class _PenetrationWriter:
             leave_if(self.status[0] > 0)
 
     def _close(self, new: Value):
-        """Faces from the edges of the hole, those of one face that was taken away, to the new point."""
+        """New faces from the edges of the hole, which belong to one removed face only, to the new point."""
         r = self.r
         with r.each(self.edge_count[0]) as e:
             both = r.variable(0, INTEGER)
@@ -158,8 +159,6 @@ def write_penetration(module: ir.Module, states: tuple[int, int, int], close: fl
 
     Parameters
     ----------
-    module : llvmlite.ir.Module
-        Where code is emitted.
     states : tuple of int
         Values of status: the depth agrees with a plane that supports D; so, but D touches it beside the face, where no place
         is known; nothing agrees.

@@ -20,8 +20,6 @@ class LoopCode:
     ----------
     writer : Writer
         Writer of its module.
-    name : str
-        Name of the function.
     pointers : sequence of str
         Arguments ``double*``; ``control`` among them.
     control : type

@@ -134,6 +134,6 @@ class CallingSteps(CompiledSteps):
         self.__setstate__(steps.__getstate__())
 
     def advance(self, ints: int, addresses: int, work: int, count: int, ends: int, rows: int):
-        """Take steps to some times, up to one in which Python raises: who repeats it hears why."""
+        """Take steps to some times, up to one in which Python raises; repeating that step raises the same error."""
         with suppress(GaussError):
             super().advance(ints, addresses, work, count, ends, rows)

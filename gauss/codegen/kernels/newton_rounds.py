@@ -66,8 +66,6 @@ def write_rounds(
         What a round consists of.
     name : str
         Name of the problem in the module.
-    rounds : tuple of Round
-        The rounds.
     n : Value
         Number of forces.
     target : callable

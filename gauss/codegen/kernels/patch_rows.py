@@ -19,15 +19,9 @@ NUMBER = 2 * MOVED + 1  # place of the number of the point in the input; the add
 
 @dataclass(frozen=True, eq=False)
 class PatchRows(NativeFunction):
-    """Row of one point, as of the rows of :class:`gauss.dynamics.contact.pair_kernels.PairKernels`.
+    """Row of one point, as of the rows of :class:`gauss.dynamics.contact.pair_kernels.PairKernels`."""
 
-    Parameters
-    ----------
-    row : Function
-        (distance, place, normal, centres of mass of both bodies) → the row.
-    """
-
-    row: Function
+    row: Function  # (distance, place, normal, centres of mass of both bodies) → the row
     name = "patch_rows"
 
     @property

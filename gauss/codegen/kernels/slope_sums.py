@@ -20,10 +20,6 @@ class SlopeSums:
 
     Parameters
     ----------
-    rows : RowCode
-        Emitter of the function.
-    weights : sequence of ndarray
-        Weights of the slopes in each sum.
     size : int
         Numbers of a slope.
     """

@@ -124,8 +124,6 @@ class StepMemory:
 
     Parameters
     ----------
-    r : Routine
-        Routine of the code.
     given : list of Array
         Sizes and places, addresses, and working memory.
     layout : MemoryLayout

@@ -21,12 +21,8 @@ def stepper_of_awake(whole: FreeBodyStepper, asleep: np.ndarray, state: State) -
 
     Parameters
     ----------
-    whole : FreeBodyStepper
-        Stepper of all bodies.
     asleep : ndarray of bool, shape (n,)
         Bodies that sleep.
-    state : State
-        State of all bodies.
     """
     made, awake = copy(whole), ~asleep
     made.asleep = np.flatnonzero(asleep)

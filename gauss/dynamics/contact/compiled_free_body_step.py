@@ -21,20 +21,11 @@ FIRST_BLOCKS = 6  # blocks of the matrix of the contact problem for which there 
 
 
 class KnownContacts(NamedTuple):
-    """Forces of the last step.
+    """Forces of the last step."""
 
-    Attributes
-    ----------
-    key : ndarray of int, shape (m,)
-        Contacts, in order.
-    force : ndarray, shape (m, 3)
-        Their forces [N].
-    expected : ndarray, shape (6, n)
-        Mean accelerations of the bodies by these, expected in the next step as well; zero after an impact.
-    """
-
-    key: np.ndarray
-    force: np.ndarray
+    key: np.ndarray  # (m,) contacts, in order
+    force: np.ndarray  # (m, 3) their forces [N]
+    # (6, n) mean accelerations of the bodies by these, expected in the next step as well; zero after an impact
     expected: np.ndarray
 
 
@@ -43,8 +34,6 @@ class FreeBodyMemory(CompiledStepMemory):
 
     Parameters
     ----------
-    stepper : FreeBodyStepper
-        The stepper.
     laws : BlockContactLaws
         Laws of contact and friction.
     constants : dict

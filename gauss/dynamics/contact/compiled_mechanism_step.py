@@ -22,24 +22,12 @@ from gauss.system import State
 
 
 class KnownForces(NamedTuple):
-    """Forces of the last step.
+    """Forces of the last step."""
 
-    Attributes
-    ----------
-    key : ndarray of int, shape (m,)
-        Contacts, in order.
-    force : ndarray, shape (m, 3)
-        Their forces [N].
-    others : ndarray, shape (g + s,)
-        Those of other unilateral constraints, and of set-valued elements.
-    share : float
-        Share of that step in which coordinates moved with the rates before it; zero with an impact.
-    """
-
-    key: np.ndarray
-    force: np.ndarray
-    others: np.ndarray
-    share: float
+    key: np.ndarray  # (m,) contacts, in order
+    force: np.ndarray  # (m, 3) their forces [N]
+    others: np.ndarray  # (g + s,) those of other unilateral constraints, and of set-valued elements
+    share: float  # share of that step in which coordinates moved with the rates before it; zero with an impact
 
 
 class MechanismMemory(CompiledStepMemory):

@@ -16,24 +16,12 @@ RECORDED = ("modes", "next_modes", "closed", "fresh", "counts")
 
 
 class LoopOfSteps(NamedTuple):
-    """Steps that machine code took one after the other.
+    """Steps that machine code took one after the other."""
 
-    Attributes
-    ----------
-    steps : int
-        Finished steps.
-    largest : float
-        Largest error of the laws of contact, in units of the scene.
-    changes : list of ModeChange
-        Changes of the contact mode.
-    doubtful : bool
-        Whether the last of them has sliding contacts that are to be examined for Painlevé's paradox.
-    """
-
-    steps: int
-    largest: float
-    changes: list[ModeChange]
-    doubtful: bool
+    steps: int  # finished steps
+    largest: float  # largest error of the laws of contact, in units of the scene
+    changes: list[ModeChange]  # changes of the contact mode
+    doubtful: bool  # whether the last of them has sliding contacts that are to be examined for Painlevé's paradox
 
 
 class CompiledStepMemory:

@@ -22,10 +22,7 @@ class ConeSolver(Protocol):
 def coulomb_by_cones(W: np.ndarray, q: np.ndarray, mu: np.ndarray, solver: ConeSolver) -> np.ndarray:
     """Impulses (3 m,) by Coulomb's law: the fixed point of programmes whose normal rates are raised by μ ‖u_T‖.
 
-    Raises
-    ------
-    SimulationError
-        If it is not found.
+    SimulationError if it is not found.
     """
     raised, size = np.zeros(mu.size), 1.0 + np.abs(q).max(initial=0.0)
     for _ in range(MOST_PROGRAMMES):

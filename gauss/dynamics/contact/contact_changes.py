@@ -16,47 +16,23 @@ COUNTS = 4  # closed elements, elements with forces in a step, changes, finished
 
 
 class ModeChange(NamedTuple):
-    """Change of one element in a step.
+    """Change of one element in a step."""
 
-    Attributes
-    ----------
-    step : int
-        Number of the step, from 0.
-    element : int
-        The element: contacts of the scene, then other gaps, then set-valued elements.
-    before, after : int
-        Its modes.
-    hit : bool
-        Whether it had an impact in the step.
-    lost : float
-        Energy lost in it during the step [J].
-    """
-
-    step: int
-    element: int
-    before: int
+    step: int  # number of the step, from 0
+    element: int  # the element: contacts of the scene, then other gaps, then set-valued elements
+    before: int  # before, after: its modes
     after: int
-    hit: bool
-    lost: float
+    hit: bool  # whether it had an impact in the step
+    lost: float  # energy lost in it during the step [J]
 
 
 class ModesOfStep(NamedTuple):
-    """Elements that bear a force in a step; one may occur several times.
+    """Elements that bear a force in a step; one may occur several times."""
 
-    Attributes
-    ----------
-    element, mode : ndarray of int, shape (k,)
-        Elements, and their modes.
-    hit : ndarray of bool, shape (k,)
-        Whether they had an impact.
-    lost : ndarray, shape (k,)
-        Energy lost in them [J].
-    """
-
-    element: np.ndarray
+    element: np.ndarray  # element, mode (k,): elements, and their modes
     mode: np.ndarray
-    hit: np.ndarray
-    lost: np.ndarray
+    hit: np.ndarray  # (k,) whether they had an impact
+    lost: np.ndarray  # (k,) energy lost in them [J]
 
 
 class ModeRecord:

@@ -42,30 +42,14 @@ LEAST_DIAGONAL = 1e-14  # relative to the largest diagonal entry of W: smaller r
 
 
 class ContactLaws(NamedTuple):
-    """Laws of the entries of the force vector.
+    """Laws of the entries of the force vector."""
 
-    Attributes
-    ----------
-    normal : ndarray of int, shape (m,)
-        Normal forces.
-    across : ndarray of int, shape (k, 2)
-        Friction forces, along two tangential directions.
-    under : ndarray of int, shape (k,)
-        Normal force of each of these.
-    friction : ndarray, shape (k,)
-        Coefficients of friction.
-    set_valued : ndarray of int, shape (g,)
-        Forces of set-valued elements.
-    limit : ndarray, shape (g,)
-        Their limits [N m, N].
-    """
-
-    normal: np.ndarray
-    across: np.ndarray
-    under: np.ndarray
-    friction: np.ndarray
-    set_valued: np.ndarray
-    limit: np.ndarray
+    normal: np.ndarray  # (m,) normal forces
+    across: np.ndarray  # (k, 2) friction forces, along two tangential directions
+    under: np.ndarray  # (k,) normal force of each of these
+    friction: np.ndarray  # (k,) coefficients of friction
+    set_valued: np.ndarray  # (g,) forces of set-valued elements
+    limit: np.ndarray  # (g,) their limits [N m, N]
 
 
 def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
@@ -87,27 +71,16 @@ def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Problem of one step.
+    """Problem of one step."""
 
-    Parameters
-    ----------
-    W, b : ndarray
-        Rates after the step, W f + b: (n, n) and (n,).
-    laws : ContactLaws
-        Laws of the forces.
-    """
-
-    W: np.ndarray
+    W: np.ndarray  # W, b: rates after the step, W f + b: (n, n) and (n,)
     b: np.ndarray
-    laws: ContactLaws
+    laws: ContactLaws  # laws of the forces
 
     def solve(self, start: np.ndarray) -> tuple[np.ndarray, float | None]:
         """Forces (n,) that obey the laws, and their error in the unit of b; None for those of the convex relaxation.
 
-        Raises
-        ------
-        SimulationError
-            If neither is found.
+        SimulationError if neither is found.
         """
         if not start.size:
             return start, 0.0

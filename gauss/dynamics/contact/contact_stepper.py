@@ -13,8 +13,6 @@ def contact_stepper(system: System, held: bool = False, removal: float = 0.0) ->
 
     Parameters
     ----------
-    system : System
-        The system.
     held : bool
         Whether the inputs of the scene are held in each step.
     removal : float

@@ -29,8 +29,6 @@ class ForceResponses:
 
     Parameters
     ----------
-    system : System
-        The system.
     backend : str
         Backend; "auto" for machine code where possible.
 

@@ -157,10 +157,7 @@ class FreeBodyStepper:
     def python_step(self, state: State, h: float) -> FreeBodyStep:
         """Step of length h; the forces of the last step are the initial guess.
 
-        Raises
-        ------
-        SimulationError
-            If shapes overlap unseen by their gap functions, or no forces are found.
+        SimulationError if shapes overlap unseen by their gap functions, or no forces are found.
         """
         for share in self.shares:
             begun = self.begin(state, h, share)
@@ -259,8 +256,6 @@ class FreeBodyStepper:
 
         Parameters
         ----------
-        near : NearContacts
-            The contacts.
         begun : BegunStep
             The bodies.
         known : ndarray, shape (m, 3, 2)

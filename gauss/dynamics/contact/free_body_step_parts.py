@@ -10,34 +10,16 @@ from gauss.dynamics.contact.paradox import Paradox
 
 
 class FreeBodyStep(NamedTuple):
-    """Result of one step.
+    """Result of one step."""
 
-    Attributes
-    ----------
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates and rates at its end.
-    contacts : NearContacts
-        Near contacts.
-    force : ndarray, shape (m, 3)
-        Mean forces with impulses along normals and tangents [N].
-    power : ndarray, shape (3,)
-        Mean power of drives, of forces on bodies, and of dissipation, which is that of contacts [W].
-    error : float or None
-        Error of the laws, relative; None for the convex relaxation.
-    paradoxes : list of Paradox
-        None: contacts of many free bodies are not examined for Painlevé's paradox.
-    modes : ModesOfStep or None
-        Elements that bear a force; None where their modes are those of the last step.
-    """
-
-    q: np.ndarray
+    q: np.ndarray  # q (n_q,), v (n_v,): coordinates and rates at its end
     v: np.ndarray
-    contacts: NearContacts
-    force: np.ndarray
-    power: np.ndarray
-    error: float | None
-    paradoxes: list[Paradox]
-    modes: ModesOfStep | None
+    contacts: NearContacts  # near contacts
+    force: np.ndarray  # (m, 3) mean forces with impulses along normals and tangents [N]
+    power: np.ndarray  # (3,) mean power of drives, of forces on bodies, and of dissipation, which is that of contacts [W]
+    error: float | None  # error of the laws, relative; None for the convex relaxation
+    paradoxes: list[Paradox]  # none: contacts of many free bodies are not examined for Painlevé's paradox
+    modes: ModesOfStep | None  # elements that bear a force; None where their modes are those of the last step
 
 
 class BegunStep(NamedTuple):

@@ -39,27 +39,13 @@ def resting(system: System, v):
 
 
 class Impact(NamedTuple):
-    """Result of an impact.
+    """Result of an impact."""
 
-    Attributes
-    ----------
-    state : State
-        State after it.
-    work : float
-        Work of prescribed motions [J].
-    loss : float
-        Kinetic energy lost, the work of prescribed motions included [J].
-    impulses : dict of str to tuple of float
-        Impulse −λ of every relation, one for each of its residuals [N s, N m s].
-    active : ndarray of int
-        Closed gaps that bear an impulse.
-    """
-
-    state: State
-    work: float
-    loss: float
-    impulses: dict[str, tuple[float, ...]]
-    active: np.ndarray
+    state: State  # state after it
+    work: float  # work of prescribed motions [J]
+    loss: float  # kinetic energy lost, the work of prescribed motions included [J]
+    impulses: dict[str, tuple[float, ...]]  # impulse −λ of every relation, one for each of its residuals [N s, N m s]
+    active: np.ndarray  # closed gaps that bear an impulse
 
 
 def impact(
@@ -73,14 +59,14 @@ def impact(
 ) -> Impact:
     """Impact in a state.
 
+    SimulationError if no velocities keep all gaps from closing, or the backend's answer is not certified.
+
     Parameters
     ----------
     system : System
         With unilateral constraints.
     state : State
         State before the impact, on the bilateral constraints.
-    touching : ndarray of int
-        Closed gaps.
     restitution : ndarray, shape (m,)
         Coefficient of every gap.
     backend : str
@@ -89,11 +75,6 @@ def impact(
         Time just before the impact [s], where prescribed speeds differ from those at the time of the state.
     driven : sequence of str
         Relations with these speeds.
-
-    Raises
-    ------
-    SimulationError
-        If no velocities keep all gaps from closing, or the backend's answer is not certified.
     """
     motion = kinematics(system, state)
     found, before = gaps(motion), motion.quasi_velocities()

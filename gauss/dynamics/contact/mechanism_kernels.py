@@ -223,15 +223,7 @@ class MechanismKernels:
 
 
 class CallingMechanismKernels:
-    """Machine code of one system that calls opaque laws.
-
-    Parameters
-    ----------
-    kernels : MechanismKernels
-        The machine code.
-    receiver : LoadReceiver
-        The loads with opaque laws.
-    """
+    """Machine code of one system that calls opaque laws."""
 
     def __init__(self, kernels: MechanismKernels, receiver: LoadReceiver):
         self.kernels, self.receiver = kernels, receiver

@@ -21,41 +21,21 @@ from gauss.system import System, sides
 
 
 class StepRows(NamedTuple):
-    """Rows of a step: normals of contacts, other gaps, tangents of rough contacts, set-valued elements.
+    """Rows of a step: normals of contacts, other gaps, tangents of rough contacts, set-valued elements."""
 
-    Attributes
-    ----------
-    gap, restitution : ndarray, shape (m,)
-        Gap functions, in their units, and their coefficients of restitution.
-    K : ndarray, shape (n, n_v)
-        Jacobian of all rows.
-    rate, bias, unit : ndarray, shape (n,)
-        Rates before the step, their derivatives with v̇ = 0, and units, by which forces are divided.
-    rough : ndarray of int, shape (k,)
-        Contacts with friction.
-    friction : ndarray, shape (k,)
-        Their coefficients.
-    """
-
-    gap: np.ndarray
+    gap: np.ndarray  # gap, restitution (m,): gap functions, in their units, and their coefficients of restitution
     restitution: np.ndarray
-    K: np.ndarray
+    K: np.ndarray  # (n, n_v) Jacobian of all rows
+    # rate, bias, unit (n,): rates before the step, their derivatives with v̇ = 0, and units, by which forces are divided
     rate: np.ndarray
     bias: np.ndarray
     unit: np.ndarray
-    rough: np.ndarray
-    friction: np.ndarray
+    rough: np.ndarray  # (k,) contacts with friction
+    friction: np.ndarray  # (k,) their coefficients
 
 
 class MechanismRows:
     """Rows of one system.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    table : ShapeTable
-        Its shapes.
 
     Attributes
     ----------
@@ -153,8 +133,6 @@ class MechanismRows:
 
         Parameters
         ----------
-        rows, near : StepRows, NearContacts
-            Rows of the step.
         force, lost : ndarray, shape (n,)
             Forces, and their work [J].
         change : ndarray, shape (n_v,)

@@ -111,10 +111,7 @@ class MechanismStepper:
     def check(self, state: State):
         """Check the accelerations without contacts by inverse dynamics of the bodies of the scene.
 
-        Raises
-        ------
-        SimulationError
-            If they do not agree.
+        SimulationError if they do not agree.
         """
         begun, system = self._begin(state, 0.0, 0.0), self.smooth
         motion, own = kinematics(system, state), 1.0 / system.scale.coordinates
@@ -191,10 +188,7 @@ class MechanismStepper:
     def python_step(self, state: State, h: float) -> MechanismStep:
         """Step of length h in Python; the forces of the last step are the initial guess.
 
-        Raises
-        ------
-        SimulationError
-            If shapes overlap unseen by their gap functions, or no forces are found.
+        SimulationError if shapes overlap unseen by their gap functions, or no forces are found.
         """
         rest = self.rest(state.v)
         share, begun, near, rows, speed = self._open(state, h, rest)

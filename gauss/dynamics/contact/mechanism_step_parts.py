@@ -12,37 +12,17 @@ from gauss.dynamics.contact.paradox import Paradox
 
 
 class MechanismStep(NamedTuple):
-    """Result of one step.
+    """Result of one step."""
 
-    Attributes
-    ----------
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates and rates at its end.
-    contacts : NearContacts or None
-        Near contacts; None of a step by machine code.
-    force : ndarray, shape (m, 3), or None
-        Mean forces with impulses along their normals and tangents [N].
-    others : ndarray, shape (g + s,), or None
-        Those of other unilateral constraints, and of set-valued elements [N, N m].
-    power : ndarray, shape (3,)
-        Mean power of drives, of forces on bodies, and of dissipation [W].
-    error : float or None
-        Error of the laws in units of the scene; None for the convex relaxation.
-    paradoxes : list of Paradox
-        Contacts with undetermined forces.
-    modes : ModesOfStep or None
-        Elements that bear a force; None of a step by machine code.
-    """
-
-    q: np.ndarray
+    q: np.ndarray  # q (n_q,), v (n_v,): coordinates and rates at its end
     v: np.ndarray
-    contacts: NearContacts | None
-    force: np.ndarray | None
-    others: np.ndarray | None
-    power: np.ndarray
-    error: float | None
-    paradoxes: list[Paradox]
-    modes: ModesOfStep | None
+    contacts: NearContacts | None  # near contacts; None of a step by machine code
+    force: np.ndarray | None  # mean forces with impulses along their normals and tangents [N]
+    others: np.ndarray | None  # those of other unilateral constraints, and of set-valued elements [N, N m]
+    power: np.ndarray  # (3,) mean power of drives, of forces on bodies, and of dissipation [W]
+    error: float | None  # error of the laws in units of the scene; None for the convex relaxation
+    paradoxes: list[Paradox]  # contacts with undetermined forces
+    modes: ModesOfStep | None  # elements that bear a force; None of a step by machine code
 
 
 class FreeStep(NamedTuple):
@@ -61,19 +41,10 @@ class FreeStep(NamedTuple):
 
 
 class OpenStep(NamedTuple):
-    """A step before its contact problem is solved.
+    """A step before its contact problem is solved."""
 
-    Attributes
-    ----------
-    begun : FreeStep
-        The bodies.
-    near, rows : NearContacts, StepRows
-        Near contacts, and rows of all gaps and set-valued elements.
-    after : ndarray, shape (n,)
-        Rates of the rows after the step without forces, less the least that gaps may have; in units of the rows.
-    """
-
-    begun: FreeStep
-    near: NearContacts
+    begun: FreeStep  # the bodies
+    near: NearContacts  # near, rows: near contacts, and rows of all gaps and set-valued elements
     rows: StepRows
+    # (n,) rates of the rows after the step without forces, less the least that gaps may have; in units of the rows
     after: np.ndarray

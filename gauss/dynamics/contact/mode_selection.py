@@ -26,30 +26,15 @@ MOST_PIVOTS = 100  # changes of elements, in one selection
 
 
 class ActiveMode(NamedTuple):
-    """Selected mode with its solution.
+    """Selected mode with its solution."""
 
-    Attributes
-    ----------
-    gaps : tuple of int
-        Gaps that stay closed.
-    mode : ContactMode
-        Mode of all other elements.
-    forces : dict of str to float
-        Forces of set-valued elements along their coordinates, and of links with losses on the driven ones [N m, N].
-    solution : Solution
-        Certified solution.
-    system : System
-        The phase without its gaps.
-    load : ndarray, shape (n_v,)
-        Generalised forces of the losses.
-    """
-
-    gaps: tuple[int, ...]
-    mode: ContactMode
+    gaps: tuple[int, ...]  # gaps that stay closed
+    mode: ContactMode  # mode of all other elements
+    # forces of set-valued elements along their coordinates, and of links with losses on the driven ones [N m, N]
     forces: dict[str, float]
-    solution: Solution
-    system: System
-    load: np.ndarray
+    solution: Solution  # certified solution
+    system: System  # the phase without its gaps
+    load: np.ndarray  # (n_v,) generalised forces of the losses
 
     @property
     def case(self) -> tuple:
@@ -70,23 +55,16 @@ class ModeSelector(ModeTrials):
     ) -> ActiveMode:
         """Mode in a state with the closed gaps ``touching``.
 
+        SimulationError if a solution is not certified, or no mode is consistent.
+
         Parameters
         ----------
-        state : State
-            The state.
-        touching : ndarray of int
-            Closed gaps.
         backend : str or Backend
             Backend of the trials.
         backlash_sides : dict, optional
             Sides of the backlash in contact; those of the state when not given.
         load : array_like, shape (n_v,), optional
             Generalised forces added to those of the scene [N m, N].
-
-        Raises
-        ------
-        SimulationError
-            If a solution is not certified, or no mode is consistent.
         """
         whole = kinematics(self.system, state)
         at = ModeProblem(state, whole, gaps(whole), touching, backend, checked_load(self.system, load))
@@ -180,10 +158,7 @@ class ModeSelector(ModeTrials):
 def active_mode(system: System, state: State, load=None, backend: str = "auto") -> ActiveMode:
     """Mode in a state of a system with set-valued elements or links with losses; ``load`` (n_v,) is added.
 
-    Raises
-    ------
-    SimulationError
-        As :meth:`ModeSelector.choose`.
+    SimulationError as :meth:`ModeSelector.choose`.
     """
     selector = mode_selector(system)
     return selector.choose(state, selector.touching(state), backend, load=load)

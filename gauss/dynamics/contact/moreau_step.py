@@ -52,33 +52,15 @@ MISSED_CLOSING_RATE = 1e-12  # units of the scene times 1 + the fastest rate: fa
 
 
 class MoreauStep(NamedTuple):
-    """Result of one step.
+    """Result of one step."""
 
-    Attributes
-    ----------
-    acceleration : ndarray, shape (n_v,)
-        Mean accelerations.
-    power : ndarray, shape (3,)
-        Mean power of drives, of forces on bodies, and of dissipation [W].
-    force : ndarray, shape (n,)
-        Mean forces with impulses: normal, tangential, of set-valued elements [N, N m].
-    error : float or None
-        Error of the contact laws in units of the scene; None for the convex relaxation.
-    paradoxes : list of Paradox
-        Contacts with undetermined forces.
-    share : float
-        Share of the step in which coordinates move with the rates before it.
-    modes : ndarray
-        Modes after it, see :meth:`gauss.dynamics.contact.step_modes.StepModes.after`.
-    """
-
-    acceleration: np.ndarray
-    power: np.ndarray
-    force: np.ndarray
-    error: float | None
-    paradoxes: list[Paradox]
-    share: float
-    modes: np.ndarray
+    acceleration: np.ndarray  # (n_v,) mean accelerations
+    power: np.ndarray  # (3,) mean power of drives, of forces on bodies, and of dissipation [W]
+    force: np.ndarray  # (n,) mean forces with impulses: normal, tangential, of set-valued elements [N, N m]
+    error: float | None  # error of the contact laws in units of the scene; None for the convex relaxation
+    paradoxes: list[Paradox]  # contacts with undetermined forces
+    share: float  # share of the step in which coordinates move with the rates before it
+    modes: np.ndarray  # modes after it, see :meth:`gauss.dynamics.contact.step_modes.StepModes.after`
 
 
 class MoreauStepper:
@@ -135,10 +117,7 @@ class MoreauStepper:
 
         Without them it is made twice, so that it expects its own forces.
 
-        Raises
-        ------
-        SimulationError
-            If shapes overlap unseen by their gap functions, or no forces are found.
+        SimulationError if shapes overlap unseen by their gap functions, or no forces are found.
         """
         if start is not None:
             return self._step(state, h, start, last, before)

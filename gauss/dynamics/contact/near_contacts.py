@@ -15,34 +15,16 @@ COLUMNS = np.concatenate([TURNED, POSE + CYCLIC, np.tile(np.arange(POSE + 3, COL
 
 
 class NearContacts(NamedTuple):
-    """Contacts of one instant, m of them.
+    """Contacts of one instant, m of them."""
 
-    Attributes
-    ----------
-    key : ndarray of int64, shape (m,)
-        Pair of parts and of their features: the same contact has the same key at all times.
-    law : ndarray of int, shape (m,)
-        Contact of the scene.
-    bodies : ndarray of int64, shape (m, 2)
-        Bodies; −1 is the ground.
-    gap : ndarray, shape (m,)
-        Contact distances [m].
-    place, axes : ndarray, shape (m, 3), (m, 3, 3)
-        Points [m]; normals and two tangents as rows, in world axes.
-    J : ndarray, shape (m, 2, 3, 8)
-        Rows for the twists (ω, u) of both bodies; the last two columns are zero.
-    bias : ndarray, shape (m, 3)
-        Accelerations along normal and tangents while the rates are constant [m/s²].
-    """
-
-    key: np.ndarray
-    law: np.ndarray
-    bodies: np.ndarray
-    gap: np.ndarray
-    place: np.ndarray
+    key: np.ndarray  # (m,) pair of parts and of their features: the same contact has the same key at all times
+    law: np.ndarray  # (m,) contact of the scene
+    bodies: np.ndarray  # (m, 2) bodies; −1 is the ground
+    gap: np.ndarray  # (m,) contact distances [m]
+    place: np.ndarray  # place (m, 3), axes (m, 3, 3): points [m]; normals and two tangents as rows, in world axes
     axes: np.ndarray
-    J: np.ndarray
-    bias: np.ndarray
+    J: np.ndarray  # (m, 2, 3, 8) rows for the twists (ω, u) of both bodies; the last two columns are zero
+    bias: np.ndarray  # (m, 3) accelerations along normal and tangents while the rates are constant [m/s²]
 
 
 class Overlap(NamedTuple):
@@ -55,10 +37,7 @@ class Overlap(NamedTuple):
 def confirmed(near: NearContacts, overlaps: list[Overlap], table: ShapeTable, t: float) -> NearContacts:
     """Contacts of a state, whose shapes are not too deep in each other, and meet where they have normals.
 
-    Raises
-    ------
-    SimulationError
-        If they are, or do not: it names the contact.
+    SimulationError if they are, or do not: it names the contact.
     """
     if overlaps:
         law, depth = overlaps[0]

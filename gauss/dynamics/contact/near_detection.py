@@ -31,8 +31,6 @@ class NearDetection:
 
     Parameters
     ----------
-    table : ShapeTable
-        Its shapes.
     bodies : int
         Number of bodies that its shapes belong to, with the ground.
     length : float

@@ -20,19 +20,13 @@ CLEARANCE = 0.25  # of the largest penetration at the start: overlaps are resolv
 def resolved(stepper, state: State) -> State:
     """Nearest state whose gaps are not negative, at the same rates.
 
+    StateError if none is found: the joints, or other shapes, keep some shapes in each other.
+    SimulationError if shapes are so deep in each other that no gap leads out.
+
     Parameters
     ----------
     stepper : MechanismStepper
         Steps of the system.
-    state : State
-        The state.
-
-    Raises
-    ------
-    StateError
-        If none is found: the joints, or other shapes, keep some shapes in each other.
-    SimulationError
-        If shapes are so deep in each other that no gap leads out.
     """
     for _ in range(REPETITIONS):
         gap, K, H, _ = stepper.gaps_at(state)

@@ -16,8 +16,6 @@ class UnseenOverlaps:
 
     Parameters
     ----------
-    system : System
-        The system.
     owners : list of str
         Contact, stop or rope of each gap.
     """

@@ -37,21 +37,11 @@ LAST = {Box: 7, Capsule: 1, Sphere: 0}  # corner on the positive sides
 
 
 class Feature(NamedTuple):
-    """Pair of features of two shapes.
+    """Pair of features of two shapes."""
 
-    Attributes
-    ----------
-    function : int
-        Which of the functions ``rows`` it has.
-    axes : tuple of int
-        Axes of both boxes that count as their first.
-    signs : tuple of float
-        Sides on which the features lie; cosine and sine of a place on a rim.
-    """
-
-    function: int
-    axes: tuple[int, int] = (0, 0)
-    signs: tuple[float, ...] = ()
+    function: int  # which of the functions ``rows`` it has
+    axes: tuple[int, int] = (0, 0)  # axes of both boxes that count as their first
+    signs: tuple[float, ...] = ()  # sides on which the features lie; cosine and sine of a place on a rim
 
 
 class PairOfShapes:

@@ -105,8 +105,6 @@ def undetermined_sliding(names: list[str], friction, rates, smooth, sideways, b)
 
     Parameters
     ----------
-    names : list of str
-        The contacts.
     friction, rates : ndarray, shape (k,), (k, 2)
         Coefficients, and sliding velocities.
     smooth, sideways : ndarray, shape (k, k), (k, k, 2)
@@ -124,8 +122,6 @@ def undetermined(names: list[str], K: np.ndarray, smooth: np.ndarray, b: np.ndar
 
     Parameters
     ----------
-    names : list of str
-        The contacts.
     K, smooth : ndarray, shape (k, k)
         Accelerations d̈ by unit forces, with and without friction.
     b : ndarray, shape (k,)

@@ -31,28 +31,14 @@ RANK = {kind: k for k, kind in enumerate(KINDS)}  # the order of kinds in a rule
 
 
 class ConvexPart(NamedTuple):
-    """Convex part of a shape.
+    """Convex part of a shape."""
 
-    Attributes
-    ----------
-    shape : str
-        Name of the shape.
-    kind : type
-        One of ``KINDS``.
-    body : int
-        Its body; −1 is the ground.
-    rotation, centre : ndarray
-        Its axes (3, 3) and centre (3,) in the principal central frame of the body.
-    sizes : ndarray, shape (4,)
-        Half edges of the box around it, or half length as the last one; radius beyond it [m].
-    """
-
-    shape: str
-    kind: type
-    body: int
-    rotation: np.ndarray
+    shape: str  # name of the shape
+    kind: type  # one of ``KINDS``
+    body: int  # its body; −1 is the ground
+    rotation: np.ndarray  # rotation, centre: its axes (3, 3) and centre (3,) in the principal central frame of the body
     centre: np.ndarray
-    sizes: np.ndarray
+    sizes: np.ndarray  # (4,) half edges of the box around it, or half length as the last one; radius beyond it [m]
 
 
 def convex_parts(system: System, shape: Collider) -> list[ConvexPart]:

@@ -16,8 +16,6 @@ def refuse_jam(t: float, rows: StepRows, H: np.ndarray, inertia: np.ndarray, for
     ----------
     t : float
         Time [s].
-    rows : StepRows
-        Rows of the step.
     H, inertia : ndarray, shape (n_v, n_v), (n_v,)
         Compliance, and the diagonal of the mass matrix.
     force, after : ndarray, shape (n,)
@@ -39,8 +37,6 @@ def paradoxes_of_step(rows: StepRows, H: np.ndarray, acceleration: np.ndarray, f
 
     Parameters
     ----------
-    rows : StepRows
-        Rows of the step.
     H, acceleration : ndarray, shape (n_v, n_v), (n_v,)
         Compliance, and accelerations without contact forces.
     force : ndarray, shape (n,)

@@ -28,11 +28,6 @@ DIGITS = 17  # of a code: 8^17 is the largest power of 8 below 2^53
 class StepModes:
     """Modes of the elements of one scene.
 
-    Parameters
-    ----------
-    stepper : MoreauStepper
-        Steps of the scene.
-
     Attributes
     ----------
     elements : list of str

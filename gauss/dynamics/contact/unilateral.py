@@ -32,24 +32,12 @@ LIMITS = ACCELERATION_TOLERANCE, ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FIN
 
 
 class UnilateralAccelerations(NamedTuple):
-    """Accelerations with an active set of contacts, and their errors.
+    """Accelerations with an active set of contacts, and their errors."""
 
-    Attributes
-    ----------
-    acceleration : ndarray, shape (n_v,)
-        Joint accelerations.
-    opening : ndarray, shape (m,)
-        Accelerations of the gap functions, in units of the scene.
-    scale : float
-        Largest acceleration, in the same.
-    errors : list
-        Error of the accelerations, of complementarity, residual of the bilateral constraints, sum of all results.
-    """
-
-    acceleration: np.ndarray
-    opening: np.ndarray
-    scale: float
-    errors: list
+    acceleration: np.ndarray  # (n_v,) joint accelerations
+    opening: np.ndarray  # (m,) accelerations of the gap functions, in units of the scene
+    scale: float  # largest acceleration, in the same
+    errors: list  # error of the accelerations, of complementarity, residual of the bilateral constraints, sum of all results
 
 
 def unilateral_dynamics(system: System, laws: Laws, certified: Callable, doc: str) -> Callable:
@@ -85,13 +73,7 @@ def unilateral_dynamics(system: System, laws: Laws, certified: Callable, doc: st
 
 
 class ActiveSetKernel:
-    """Active set of contacts at the level of accelerations, by machine code: at once, or above the compile threshold.
-
-    Parameters
-    ----------
-    system : System
-        With contacts.
-    """
+    """Active set of contacts at the level of accelerations, by machine code: at once, or above the compile threshold."""
 
     def __init__(self, system: System):
         self.system, self.gaps = system, len(system.contacts.placed)

@@ -40,31 +40,15 @@ NOT_CONVERGED = "the forces of the links with losses, of closed stops and of sti
 
 
 class CutRows(NamedTuple):
-    """Constraint rows of a phase whose forces are found apart: links with losses, held joints; and forces of sliding joints.
+    """Rows of a phase whose forces are found apart: links with losses, held joints; and forces of sliding joints."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the m links and held joints.
-    rows : ndarray of int, shape (m,)
-        Their rows.
-    R, W : ndarray, shape (m, n_v)
-        Jacobian of the rows, and generalised forces for Q = 1.
-    units : ndarray, shape (m,)
-        Forces of the scene along the driven joints [N m, N].
-    held : tuple of HeldJoint
-        The held joints among them.
-    braking : ndarray, shape (n_v,)
-        Generalised forces of sliding joints, which are not in the cut system either.
-    """
-
-    names: tuple[str, ...]
-    rows: np.ndarray
-    R: np.ndarray
+    names: tuple[str, ...]  # names of the m links and held joints
+    rows: np.ndarray  # (m,) their rows
+    R: np.ndarray  # R, W (m, n_v): Jacobian of the rows, and generalised forces for Q = 1
     W: np.ndarray
-    units: np.ndarray
-    held: tuple[HeldJoint, ...]
-    braking: np.ndarray
+    units: np.ndarray  # (m,) forces of the scene along the driven joints [N m, N]
+    held: tuple[HeldJoint, ...]  # the held joints among them
+    braking: np.ndarray  # (n_v,) generalised forces of sliding joints, which are not in the cut system either
 
     @property
     def ideal(self) -> bool:
@@ -102,6 +86,8 @@ def _matrix(system: System, rows: Sequence[Mapping[int, float]]) -> np.ndarray:
 def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.ndarray:
     """Root Q (m,) of the piecewise affine ``residual(Q)`` (m,) by Newton's method; the last call is at the root.
 
+    SimulationError if the iteration does not converge.
+
     Parameters
     ----------
     residual : callable
@@ -110,11 +96,6 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
         Initial forces.
     units : ndarray, shape (m,)
         Forces of the scene: smaller ones, as near a reversal, have round-off relative to these.
-
-    Raises
-    ------
-    SimulationError
-        If the iteration does not converge.
     """
     Q, left = guess, residual(guess)
     if not np.isfinite(left).all():
@@ -145,8 +126,6 @@ def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndar
     ----------
     compulsion : Compulsion
         Without the losses.
-    links : CutRows
-        The rows.
     answer : callable
         Compulsion → certified solution.
     """
@@ -175,12 +154,8 @@ class CutRowEngine(Engine):
         The phase, with all rows.
     cut : System
         The same without the cut rows.
-    links : CutRows
-        The cut rows.
     backend : str, Backend or class
         How accelerations are solved.
-    plan : Plan
-        Of the phase.
     """
 
     def __init__(self, system: System, cut: System, links: CutRows, backend: str | Backend | type, plan: Plan):
@@ -295,10 +270,7 @@ class CutRowEngine(Engine):
     def check(self, point: Point, last: bool = False):
         """Check compiled accelerations with the forces of the rows as loads.
 
-        Raises
-        ------
-        DistrustError
-            If the residual is too large; from then on all rows are solved by the certified engine.
+        DistrustError if the residual is too large; from then on all rows are solved by the certified engine.
         """
         if self.compiled is None:
             return

@@ -15,23 +15,12 @@ LEAST_FRICTIONS = 3  # elements with more modes (3^n) than are worth machine cod
 
 
 class HeldJoint(NamedTuple):
-    """Closed stop or sticking friction of a joint coordinate of one freedom: the row ± q̇ = 0.
+    """Closed stop or sticking friction of a joint coordinate of one freedom: the row ± q̇ = 0."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the gap, or of the friction.
-    v : int
-        Place of the coordinate in v.
-    sign : float
-        The gap is sign · (q − bound).
-    stop : tuple of (int, float) or None
-        Place of the coordinate in q, and bound [rad, m]; None for friction, which holds any position.
-    """
-
-    name: str
-    v: int
-    sign: float = 1.0
+    name: str  # name of the gap, or of the friction
+    v: int  # place of the coordinate in v
+    sign: float = 1.0  # the gap is sign · (q − bound)
+    # place of the coordinate in q, and bound [rad, m]; None for friction, which holds any position
     stop: tuple[int, float] | None = None
 
 

@@ -25,15 +25,7 @@ TRIED = 6  # states from which Newton's method starts
 
 @dataclass(frozen=True)
 class Unfolded(Relation):
-    """Relation whose branch cuts are conditions.
-
-    Parameters
-    ----------
-    name : str
-        Name of the relation.
-    whole : Relation
-        The relation.
-    """
+    """Relation whose branch cuts are conditions."""
 
     whole: Relation
 

@@ -38,20 +38,10 @@ Mode = tuple[float, ...]  # value of every condition: 0 or 1 of a comparison, th
 
 @dataclass(frozen=True)
 class OneMode(Relation):
-    """Relation whose conditions have the values of one mode.
-
-    Parameters
-    ----------
-    name : str
-        Name of the relation.
-    whole : Relation
-        The relation.
-    mode : tuple of float
-        Values of its conditions, in the order of :func:`conditions`.
-    """
+    """Relation whose conditions have the values of one mode."""
 
     whole: Relation
-    mode: Mode
+    mode: Mode  # values of its conditions, in the order of :func:`conditions`
 
     may_be_idle: ClassVar[bool] = True
 
@@ -89,11 +79,6 @@ class Step(NamedTuple):
 
 class ConstraintModes:
     """Modes of the constraints of a system.
-
-    Parameters
-    ----------
-    system : System
-        The system.
 
     Attributes
     ----------

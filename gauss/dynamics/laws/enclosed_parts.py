@@ -24,8 +24,6 @@ def enclosed_parts(
 
     Parameters
     ----------
-    system : System
-        The system.
     begin, end : State
         Ends of the step, numbers or expressions.
     first, last : ndarray, shape (n_v,)

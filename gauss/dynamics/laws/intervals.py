@@ -63,8 +63,6 @@ def enclose(outputs, given: dict[int, Interval]) -> list[Interval]:
 
     Parameters
     ----------
-    outputs : sequence of Expression or float
-        Expressions to be enclosed.
     given : dict
         Interval of every symbol, or of any expression, by its index.
 

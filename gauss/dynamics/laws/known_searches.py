@@ -22,24 +22,12 @@ Values = Callable[[np.ndarray], np.ndarray]  # times (k,) → values (k, n) of a
 
 
 class Search(NamedTuple):
-    """Result of a search.
+    """Result of a search."""
 
-    Attributes
-    ----------
-    key : hashable
-        Law, interval and start.
-    times : ndarray, shape (k,)
-        Times of comparison [s].
-    values : ndarray, shape (k, n)
-        Values of the law there.
-    found : Timetable
-        What was found.
-    """
-
-    key: Hashable
-    times: np.ndarray
-    values: np.ndarray
-    found: Timetable
+    key: Hashable  # law, interval and start
+    times: np.ndarray  # (k,) times of comparison [s]
+    values: np.ndarray  # (k, n) values of the law there
+    found: Timetable  # what was found
 
 
 class KnownSearch:

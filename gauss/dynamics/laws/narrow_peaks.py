@@ -33,12 +33,8 @@ class NarrowPeaks:
 
     Parameters
     ----------
-    system : System
-        The system.
     symbols, accelerations : list of Expression
         Symbols of (t, q, v), and of the accelerations.
-    products : Products
-        The products.
     exponents, phases : list of Expression
         Arguments of exponential functions, and of sines and cosines.
     slopes : callable
@@ -185,8 +181,6 @@ def missed(system: System, evaluate: Callable[[State], np.ndarray], begin: State
 
     Parameters
     ----------
-    system : System
-        The system.
     evaluate : callable
         Accelerations of a state.
     begin, end : State

@@ -23,26 +23,16 @@ from gauss.system import State, System, retract, sides
 RELATIVE = 1e-10  # of the largest coordinate, or velocity, in a row: a smaller change may be rounding in the law
 SMOOTH = 4.0  # ratio to the change over an equal time beside the switching time: a smaller one may be the slope of the law
 LOOKS = 33  # times at which magnitudes of laws are sampled, besides switching times
-CONTRADICTION = 1e-6  # velocity residual after a jump, relative to the scales of the rows: more is no rounding
+CONTRADICTION = 1e-6  # velocity residual after a jump, relative to the scales of the rows: a larger one is no rounding
 
 
 @dataclass(frozen=True)
 class Jumps:
-    """Possible jumps of the prescribed velocities of a system.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    times : ndarray, shape (k,)
-        Switching times of its relations with a possible jump [s].
-    sizes : ndarray, shape (2, r)
-        Range of the position, and largest velocity, that each row prescribes.
-    """
+    """Possible jumps of the prescribed velocities of a system."""
 
     system: System | None
-    times: np.ndarray
-    sizes: np.ndarray
+    times: np.ndarray  # (k,) switching times of its relations with a possible jump [s]
+    sizes: np.ndarray  # (2, r) range of the position, and largest velocity, that each row prescribes
 
     def __bool__(self):
         return bool(self.times.size)
@@ -54,10 +44,7 @@ class Jumps:
     def names(self, state: State, after: float) -> tuple[str, ...]:
         """Relations whose velocity jumps between the time of a state and one just after it [s].
 
-        Raises
-        ------
-        SimulationError
-            If a prescribed position jumps.
+        SimulationError if a prescribed position jumps.
         """
         if self.system is None or not self.within(state.t, after):
             return ()
@@ -69,11 +56,8 @@ class Jumps:
     def crossed(self, state: State, after: float) -> tuple[Impact, tuple[str, ...]] | None:
         """Impact, and the names of the relations whose velocity jumps; None if none does.
 
-        Raises
-        ------
-        SimulationError
-            If a prescribed position jumps, the velocity constraints are inconsistent, or a contact with friction bears an
-            impulse.
+        SimulationError if a prescribed position jumps, the velocity constraints are inconsistent, or a contact with friction
+        bears an impulse.
         """
         names, system = self.names(state, after), self.system
         if system is None or not names:
@@ -89,21 +73,16 @@ class Jumps:
 def driven_impact(system: System, state: State, names: tuple[str, ...], since: float | None = None) -> Impact:
     """Impact of relations whose prescribed velocities jump.
 
+    SimulationError if the velocity constraints are inconsistent, or a contact with friction bears an impulse.
+
     Parameters
     ----------
     system : System
         The system after the jump.
     state : State
         State before it.
-    names : tuple of str
-        The relations.
     since : float, optional
         Time just before the impact [s], where prescribed speeds differ from those at the time of the state.
-
-    Raises
-    ------
-    SimulationError
-        If the velocity constraints are inconsistent, or a contact with friction bears an impulse.
     """
     parts = sides(system.scene)
     touching = np.flatnonzero(gaps(kinematics(system, state)).width <= TOUCHING * gap_scales(system))
@@ -138,21 +117,16 @@ NO_JUMPS = Jumps(None, np.zeros(0), np.zeros((2, 0)))
 def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
     """Possible jumps of prescribed velocities at given switching times.
 
+    SimulationError if a prescribed position jumps at one of them.
+
     Parameters
     ----------
-    system : System
-        The system.
     start : State
         Initial state.
     end : float
         Final time [s].
     stops : sequence of (float, float)
         Times just before and just after each switching time of its relations [s].
-
-    Raises
-    ------
-    SimulationError
-        If a prescribed position jumps at one of them.
     """
     if not system.relations.asks_time:
         return NO_JUMPS
@@ -184,8 +158,6 @@ class _Sides:
 
     Parameters
     ----------
-    motion : Kinematics
-        Kinematics of the state.
     before, after : float
         Times [s].
     sizes : ndarray, shape (2, r)

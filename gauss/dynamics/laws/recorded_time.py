@@ -66,8 +66,6 @@ def reads_time(law: Callable, motion: Kinematics) -> tuple[bool, bool]:
     ----------
     law : callable
         Of (t, motion).
-    motion : Kinematics
-        Kinematics of the state.
     """
     own, of_motion = RecordedTime(motion.state.t), RecordedTime(motion.state.t)
     given = KinematicsAtTime(motion, of_motion)

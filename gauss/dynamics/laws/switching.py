@@ -25,30 +25,15 @@ LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements t
 
 
 class Switching(NamedTuple):
-    """Switching times, switching functions and velocity jumps that the steps of a motion resolve.
+    """Switching times, switching functions and velocity jumps that the steps of a motion resolve."""
 
-    Attributes
-    ----------
-    times : Timetable
-        Switching times of laws of time, and a mesh that resolves these laws.
-    watch : callable or None
-        :attr:`SwitchingFunctions.machine_code`; None where no law has a switching function of the state.
-    called : tuple of str
-        Loads with opaque callbacks of the state.
-    conditional : tuple of str
-        Loads whose laws have switching functions of the state.
-    jumps : Jumps
-        Possible jumps of prescribed velocities.
-    peaks : NarrowPeaks or None
-        Smooth peaks and oscillations of traced laws that fixed steps may not resolve.
-    """
-
-    times: Timetable = NO_TIMES
+    times: Timetable = NO_TIMES  # switching times of laws of time, and a mesh that resolves these laws
+    # :attr:`SwitchingFunctions.machine_code`; None where no law has a switching function of the state
     watch: Callable[[np.ndarray], np.ndarray] | None = None
-    called: tuple[str, ...] = ()
-    conditional: tuple[str, ...] = ()
-    jumps: Jumps = NO_JUMPS
-    peaks: NarrowPeaks | None = None
+    called: tuple[str, ...] = ()  # loads with opaque callbacks of the state
+    conditional: tuple[str, ...] = ()  # loads whose laws have switching functions of the state
+    jumps: Jumps = NO_JUMPS  # possible jumps of prescribed velocities
+    peaks: NarrowPeaks | None = None  # smooth peaks and oscillations of traced laws that fixed steps may not resolve
 
     def share(self, begin: Point, end: Point) -> tuple[float, float, float]:
         """Share of a step without undetected crossings; number and place of those detected in all of it.
@@ -102,10 +87,7 @@ def timed_switching(
 ) -> tuple[Timetable, Jumps]:
     """Switching times and mesh of traced loads and of prescribed motions up to a time [s]; jumps of prescribed velocities.
 
-    Raises
-    ------
-    SimulationError
-        If a prescribed position jumps.
+    SimulationError if a prescribed position jumps.
     """
     begin, prescribed = start.t, prescribed_times(system.relations, start.t, end, monotone)
     times = _given_times(system, breaks, begin, end).join(prescribed)

@@ -64,8 +64,6 @@ class SwitchingFunctions:
 
     Parameters
     ----------
-    system : System
-        The system.
     laws : TracedFunctions
         Its loads, or other functions of its motion.
 
@@ -149,8 +147,6 @@ class SwitchingFunctions:
 
         Parameters
         ----------
-        begin, end : State
-            Ends of the step.
         first, last : ndarray, shape (n_v,)
             Accelerations there.
         """

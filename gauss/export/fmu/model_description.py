@@ -12,21 +12,11 @@ from gauss.versions import VERSION
 
 
 class Variable(NamedTuple):
-    """A variable of a unit.
+    """A variable of a unit."""
 
-    Attributes
-    ----------
-    name : str
-        Its name.
-    reference : int
-        Its value reference.
-    attributes : dict of str to str
-        Attributes of its element.
-    """
-
-    name: str
-    reference: int
-    attributes: dict[str, str]
+    name: str  # its name
+    reference: int  # its value reference
+    attributes: dict[str, str]  # attributes of its element
 
     def __str__(self) -> str:
         pairs = {"name": self.name, "valueReference": str(self.reference), "variability": "continuous"} | self.attributes
@@ -42,10 +32,7 @@ class UnitNames:
     def own(self, name: str, kind: str) -> str:
         """Name that no other variable has: the given one, or one with the kind before it.
 
-        Raises
-        ------
-        ArgumentError
-            If it cannot be printed.
+        ArgumentError if it cannot be printed.
         """
         if not name.isprintable():
             raise ArgumentError(f"to_fmu: {name!r}: a unit cannot hold this name; use letters that can be printed.")
@@ -60,10 +47,7 @@ def variables(system: System, start: State, parameters: Mapping[str, float]) -> 
 
     Each has a name of its own: one that is taken, as that of an input named after its joint, gets its kind before it.
 
-    Raises
-    ------
-    ArgumentError
-        If a name cannot be printed, which the description cannot hold.
+    ArgumentError if a name cannot be printed, which the description cannot hold.
     """
     scene, states, named = system.scene, state_names(system), UnitNames()
     order = "time", "states", "derivatives", "inputs", "parameters", "outputs"

@@ -24,10 +24,7 @@ from gauss.system import State, coordinate_rates, refuse_changed
 def unit_functions(tuned: UnitParameters) -> list[ExportedFunction]:
     """Functions "rates", (q, v, u, t) → (rate, output), and "project", (q, v, u, t) → state.
 
-    Raises
-    ------
-    SimulationError
-        If an element, or an output of forces, has no smooth function, by its name.
+    SimulationError if an element, or an output of forces, has no smooth function, by its name.
     """
     system = tuned.pattern
     name = system.scene.name

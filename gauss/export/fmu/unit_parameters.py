@@ -26,10 +26,11 @@ CHECKS = 5  # samples beside those that determine the polynomials
 class UnitParameters:
     """Parameters of one system.
 
+    SceneError if a name is no number of the scene.
+    ArgumentError if the numbers of the equations are no polynomials of the parameters.
+
     Parameters
     ----------
-    system : System
-        The system.
     names : sequence of str
         Numbers of its scene.
 
@@ -41,13 +42,6 @@ class UnitParameters:
         The system; its numbers that depend on them are the parameters ``symbols`` of traced code.
     symbols : tuple of str
         Their names.
-
-    Raises
-    ------
-    SceneError
-        If a name is no number of the scene.
-    ArgumentError
-        If the numbers of the equations are no polynomials of the parameters.
     """
 
     def __init__(self, system: System, names: Sequence[str]):

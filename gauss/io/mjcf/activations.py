@@ -27,21 +27,12 @@ LEAST = mujoco.mjMINVAL  # s, m, N: least divisor
 
 @dataclass(frozen=True)
 class Activation:
-    """Law of an activation.
+    """Law of an activation."""
 
-    Parameters
-    ----------
-    kind : int
-        INTEGRATOR, FILTER, EXACT or MUSCLE.
-    times : tuple of float
-        Time constants [s]; of a muscle those of activation and deactivation, and the width between them [1].
-    low, high : float
-        Range of the activation.
-    """
-
-    kind: int
+    kind: int  # INTEGRATOR, FILTER, EXACT or MUSCLE
+    # time constants [s]; of a muscle those of activation and deactivation, and the width between them [1]
     times: tuple[float, ...]
-    low: float = -inf
+    low: float = -inf  # low, high: range of the activation
     high: float = inf
 
     def rate(self, u: Number, a: Number) -> Number:

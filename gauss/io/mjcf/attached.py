@@ -21,10 +21,10 @@ def count_attached(
 ) -> int:
     """Number of elements of the models that a file attaches, with those that they attach.
 
+    FileError if a model attaches itself, or there are too many.
+
     Parameters
     ----------
-    source : Source
-        The file.
     root_folder : Path, optional
         Folder that named files may lie in, beside that of the file.
     read : callable
@@ -33,11 +33,6 @@ def count_attached(
         Counts of files that were read.
     seen : tuple of Path
         Files within which this one is attached, and this one.
-
-    Raises
-    ------
-    FileError
-        If a model attaches itself, or there are too many.
     """
     total, home = 0, source.path.resolve().parent
     attached = Counter(element.get("model") for element in source.root.iter("attach"))

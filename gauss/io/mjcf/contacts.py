@@ -1,6 +1,6 @@
 """Contacts, stops, ropes and joint friction as MuJoCo's pairs of geoms, limits and friction losses.
 
-MuJoCo keeps all of them softly; they are written as stiff as the time step of the file bears. It has no restitution.
+MuJoCo models all of them as soft; they are written as stiff as the time step of the file permits. It has no restitution.
 """
 
 from functools import singledispatch
@@ -31,7 +31,7 @@ from gauss.scene import (
 from gauss.scene.curved_shapes import ConvexCollider
 from gauss.scene.values import unit
 
-FAR = 1e9  # rad or m: where a joint is stopped on the side that has no stop
+FAR = 1e9  # rad or m: limit of a joint on the side without a stop
 DAMPING = 10  # times critical: critically damped springs rebound with a tenth of the speed when they push one way only
 SHOWN = 1.0  # m, half the edge of the square that a viewer shows of a plane
 
@@ -39,10 +39,7 @@ SHOWN = 1.0  # m, half the edge of the square that a viewer shows of a plane
 def write_contacts(document):
     """Write unilateral constraints and joint friction.
 
-    Raises
-    ------
-    FileError
-        If MuJoCo has no counterpart of one; the message names it.
+    FileError if MuJoCo has no counterpart of one; the message names it.
     """
     scene = document.scene
     for element in scene.contacts.values():

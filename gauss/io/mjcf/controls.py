@@ -26,10 +26,7 @@ OWN = {"gyroscope": "gyro", "accelerometer": "accelerometer", "velocimeter": "ve
 def write_controls(document):
     """Write inputs and outputs; outputs that MuJoCo has no sensor of are named in a comment.
 
-    Raises
-    ------
-    FileError
-        If MuJoCo has no counterpart of an input; the message names it.
+    FileError if MuJoCo has no counterpart of an input; the message names it.
     """
     for given in document.scene.inputs.values():
         _write_input(document, given)

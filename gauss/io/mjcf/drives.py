@@ -21,28 +21,14 @@ from gauss.scene import Scene
 
 @dataclass(frozen=True)
 class ActuatorForce:
-    """Force of one actuator: number, or law, of its control.
+    """Force of one actuator: number, or law, of its control."""
 
-    Parameters
-    ----------
-    acted : ActuatorTransmission
-        What it acts on.
-    gain, bias : ndarray, shape (3,)
-        Numbers g and b.
-    control : float
-        Control that is given when nobody gives any.
-    ranges : tuple of tuple of float
-        Least and largest force, of each that limits it.
-    active, passive : MuscleCurves, optional
-        Of a muscle, in place of the numbers g and b.
-    """
-
-    acted: ActuatorTransmission
-    gain: np.ndarray
+    acted: ActuatorTransmission  # what it acts on
+    gain: np.ndarray  # gain, bias (3,): numbers g and b
     bias: np.ndarray
-    control: float
-    ranges: tuple[tuple[float, float], ...]
-    active: MuscleCurves | None = None
+    control: float  # control that is given when nobody gives any
+    ranges: tuple[tuple[float, float], ...]  # least and largest force, of each that limits it
+    active: MuscleCurves | None = None  # active, passive: of a muscle, in place of the numbers g and b
     passive: MuscleCurves | None = None
 
     @property

@@ -13,13 +13,7 @@ CANCELLED = 1e-9  # of the larger stiffness: what is left of two that cancel is 
 
 
 def write_elements(document):
-    """Write couplings, relations and loads.
-
-    Raises
-    ------
-    FileError
-        If MuJoCo has no counterpart of one; the message names it.
-    """
+    """Write couplings, relations and loads; FileError if MuJoCo has no counterpart of one; the message names it."""
     scene = document.scene
     constraints = scene.couplings | scene.relations
     for element in (*constraints.values(), *scene.loads.values()):

@@ -43,17 +43,12 @@ LARGEST_GRID = 1e8  # numbers: 10 000 × 10 000, of which each takes memory befo
 def guarded(path: Path, root_folder: Path | None = None) -> Source:
     """File that may be parsed, with the files that it includes in their places; those that it attaches are checked alike.
 
+    FileError if it cannot be read, or holds what is refused; the message says where.
+
     Parameters
     ----------
-    path : Path
-        The file.
     root_folder : Path, optional
         Folder that named files may lie in, beside that of the file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or holds what is refused; the message says where.
     """
     source = _checked(path, root_folder, ROOTS)
     count_attached(source, root_folder, _attached, {}, (path.resolve(),))

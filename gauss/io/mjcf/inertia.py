@@ -20,21 +20,16 @@ PARALLEL = 1e-12  # sine of the angle between axes that are parallel but for rou
 def inertial(system: System, limbs: list[Limb], limb: Limb, strict: bool = True) -> tuple[dict, str]:
     """Attributes of <inertial>, and a remark on what was changed.
 
+    FileError if the body's inertia is not physical, and its motion would show that; or less than MuJoCo takes.
+
     Parameters
     ----------
     system : System
         The scene, compiled.
     limbs : list of Limb
         Bodies of the tree.
-    limb : Limb
-        The body.
     strict : bool
         Whether what MuJoCo refuses is refused, where more in its place would show.
-
-    Raises
-    ------
-    FileError
-        If the body's inertia is not physical, and its motion would show that; or less than MuJoCo takes.
     """
     scene, scale = system.scene, system.scale
     body = scene.bodies[limb.body]
@@ -59,10 +54,7 @@ def inertial(system: System, limbs: list[Limb], limb: Limb, strict: bool = True)
 def _is_replaced(body: Body, value: float, whole: float, unit: str, strict: bool) -> bool:
     """Whether a mass or moment is zero, and :data:`LEAST` stands in its place, which does not show in the scene.
 
-    Raises
-    ------
-    FileError
-        If it would show, or a value that is not zero is less than MuJoCo takes.
+    FileError if it would show, or a value that is not zero is less than MuJoCo takes.
     """
     if not value and LEAST <= NEGLIGIBLE * whole:
         return True

@@ -25,18 +25,10 @@ COUNTS = {"body": "nbody", "joint": "njnt", "geom": "ngeom", "equality": "neq", 
 
 @dataclass(frozen=True)
 class Named:
-    """A compiled model beside its file.
+    """A compiled model beside its file."""
 
-    Parameters
-    ----------
-    model : mujoco.MjModel
-        What MuJoCo made of it.
-    source : Source
-        The file, with all that it includes.
-    """
-
-    model: mujoco.MjModel
-    source: Source
+    model: mujoco.MjModel  # what MuJoCo made of it
+    source: Source  # the file, with all that it includes
 
     @cached_property
     def bodies(self) -> dict[int, str]:

@@ -49,6 +49,8 @@ def read_mjcf(
     another frame (a ``framequat`` is a rotation matrix), of centres of mass and momenta of subtrees, accelerometers,
     velocimeters and gyroscopes; values do not depend on ``noise``.
 
+    FileError if it cannot be parsed, or holds what moves the mechanism and is not modelled; all of that is named.
+
     Parameters
     ----------
     path : str or Path
@@ -62,11 +64,6 @@ def read_mjcf(
         Folder in which meshes and included files may lie, beside that of the file.
     keyframe : str, optional
         Name of the key frame that the scene starts from, or its number from 0.
-
-    Raises
-    ------
-    FileError
-        If it cannot be parsed, or holds what moves the mechanism and is not modelled; all of that is named.
 
     Warns
     -----

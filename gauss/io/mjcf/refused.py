@@ -90,7 +90,7 @@ def _without_counterpart(named: Named, contacts: bool) -> Iterator[Finding]:
 
 
 def left_out(named: Named, stops: bool = False, contacts: bool = False, keyframe: str | int | None = None) -> list[str]:
-    """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
+    """Elements that are not read, for they act only where contacts, stops, a keyframe or controls are asked for."""
     parts = _untouched(named, contacts) + _unlimited(named, stops) + _inactive(named, keyframe) + _uncontrolled(named)
     return [f"{what} {listed(names)}" for what, names in parts if names]
 
@@ -144,7 +144,7 @@ def _uncontrolled(named: Named) -> list[tuple[str, list[str]]]:
 
 
 def _sticky(named: Named) -> list[str]:
-    """Geoms whose surface moves or adheres, which MuJoCo has from version 4 on."""
+    """Geoms with a surface velocity or adhesion, fields of MuJoCo from version 4 on."""
     fields = [getattr(named.model, field, None) for field in ("geom_surfacevel", "geom_adhesion")]
     return [named.name("geom", i) for i in range(named.model.ngeom) if any(f is not None and np.any(f[i]) for f in fields)]
 

@@ -14,10 +14,7 @@ START = "start"
 def key_of(named: Named, keyframe: str | int | None) -> int | None:
     """Number of the key frame of a name, or that is called "start"; None if none is asked for and there is none.
 
-    Raises
-    ------
-    FileError
-        If there is no key frame of this name or number.
+    FileError if there is no key frame of this name or number.
     """
     model = named.model
     names = [model.key(i).name for i in range(model.nkey)]

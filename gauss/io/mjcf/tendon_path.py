@@ -23,30 +23,14 @@ ON_JOINT, ON_SITE, ON_PULLEY, ON_CYLINDER = (int(getattr(mujoco.mjtWrap, f"mjWRA
 
 @dataclass(frozen=True)
 class TendonPath:
-    """Tendon of a model.
+    """Tendon of a model."""
 
-    Parameters
-    ----------
-    rest : float
-        Length in the pose of the file, L₀ [m or rad].
-    is_fixed : bool
-        Whether it is a sum of coordinates of hinges and slides.
-    terms : dict of str to float
-        Joints and coefficients of a fixed tendon.
-    spans : tuple of PathSpan
-        Pieces of a spatial tendon, but for straight ones within one body.
-    constant : float
-        Length of the pieces within one body [m].
-    is_line : bool
-        Whether it is one straight line between two bodies.
-    """
-
-    rest: float
-    is_fixed: bool
-    terms: dict[str, float]
-    spans: tuple[PathSpan, ...] = ()
-    constant: float = 0.0
-    is_line: bool = False
+    rest: float  # length in the pose of the file, L₀ [m or rad]
+    is_fixed: bool  # whether it is a sum of coordinates of hinges and slides
+    terms: dict[str, float]  # joints and coefficients of a fixed tendon
+    spans: tuple[PathSpan, ...] = ()  # pieces of a spatial tendon, but for straight ones within one body
+    constant: float = 0.0  # length of the pieces within one body [m]
+    is_line: bool = False  # whether it is one straight line between two bodies
 
     def length(self, at):
         """Length [m or rad] by a view of the mechanism."""

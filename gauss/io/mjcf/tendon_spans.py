@@ -29,29 +29,14 @@ class PathPoint:
 
 @dataclass(frozen=True)
 class WrapSurface:
-    """Sphere or cylinder that a tendon may touch.
+    """Sphere or cylinder that a tendon may touch."""
 
-    Parameters
-    ----------
-    body : str
-        Body that it belongs to.
-    at : tuple of float
-        Centre, in the body frame [m].
-    axes : ndarray, shape (3, 3)
-        Its axes in the body frame, columns; a cylinder lies along the third.
-    radius : float
-        Radius [m].
-    is_cylinder : bool
-        Whether it is a cylinder, without ends, or a sphere.
-    side : PathPoint, optional
-        Point on whose side the tendon passes; the tendon passes through the surface while this lies within.
-    """
-
-    body: str
-    at: tuple[float, ...]
-    axes: np.ndarray
-    radius: float
-    is_cylinder: bool
+    body: str  # body that it belongs to
+    at: tuple[float, ...]  # centre, in the body frame [m]
+    axes: np.ndarray  # (3, 3) its axes in the body frame, columns; a cylinder lies along the third
+    radius: float  # radius [m]
+    is_cylinder: bool  # whether it is a cylinder, without ends, or a sphere
+    # point on whose side the tendon passes; the tendon passes through the surface while this lies within
     side: PathPoint | None = None
 
     def path(self, p: np.ndarray, q: np.ndarray, side: np.ndarray | None) -> tuple:
@@ -86,22 +71,12 @@ class WrapSurface:
 
 @dataclass(frozen=True)
 class PathSpan:
-    """Piece of a tendon between two of its points, with the share 1/divisor of its branch.
+    """Piece of a tendon between two of its points, with the share 1/divisor of its branch."""
 
-    Parameters
-    ----------
-    first, second : PathPoint
-        Its ends.
-    share : float
-        Factor of its length.
-    over : WrapSurface, optional
-        What it may wrap around.
-    """
-
-    first: PathPoint
+    first: PathPoint  # first, second: its ends
     second: PathPoint
-    share: float
-    over: WrapSurface | None = None
+    share: float  # factor of its length
+    over: WrapSurface | None = None  # what it may wrap around
 
     def length(self, at):
         """Length [m] by a view of the mechanism."""

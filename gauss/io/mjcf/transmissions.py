@@ -21,24 +21,14 @@ JOINT, JOINT_IN_PARENT, TENDON, SITE = (int(getattr(mujoco.mjtTrn, f"mjTRN_{name
 
 @dataclass(frozen=True)
 class ActuatorTransmission:
-    """Joints and bodies that an actuator acts on.
+    """Joints and bodies that an actuator acts on."""
 
-    Parameters
-    ----------
-    acts_on : dict of str to float
-        Rates of joints, with the generalised force along each for a force of 1 of the actuator.
-    forces : tuple of Force
-        Forces and moments on bodies for a force of 1.
-    length, rate : callable, optional
-        Laws (view of the mechanism) of its length and rate; None where its force may not depend on them.
-    range : tuple of float, optional
-        Least and largest force that what is acted on bears from all its actuators.
-    """
-
-    acts_on: dict[str, float]
-    forces: tuple[Force, ...] = ()
+    acts_on: dict[str, float]  # rates of joints, with the generalised force along each for a force of 1 of the actuator
+    forces: tuple[Force, ...] = ()  # forces and moments on bodies for a force of 1
+    # length, rate: laws (view of the mechanism) of its length and rate; None where its force may not depend on them
     length: Law | None = None
     rate: Law | None = None
+    # least and largest force that what is acted on bears from all its actuators
     range: tuple[float, float] | None = field(default=None)
 
     def pull(self, scene: Scene, name: str, force: float | Law):

@@ -20,22 +20,12 @@ Number = Any  # number or symbol
 
 
 class PlanePath(NamedTuple):
-    """Path around a circle.
+    """Path around a circle."""
 
-    Parameters
-    ----------
-    touches : number
-        1 if it touches the circle; otherwise it is straight, and the rest means nothing.
-    first, second : tuple of numbers
-        Points at which it meets and leaves the circle [m].
-    arc : number
-        Length between them on the circle [m].
-    """
-
-    touches: Number
-    first: tuple[Number, Number]
+    touches: Number  # 1 if it touches the circle; otherwise it is straight, and the rest means nothing
+    first: tuple[Number, Number]  # first, second: points at which it meets and leaves the circle [m]
     second: tuple[Number, Number]
-    arc: Number
+    arc: Number  # length between them on the circle [m]
 
 
 def holds(condition) -> Number:

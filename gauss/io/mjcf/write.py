@@ -35,30 +35,14 @@ STIFF = {"solref": f"{2 * TIMESTEP:g} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 
 @dataclass
 class MjcfDocument:
-    """MJCF file while it is written.
+    """MJCF file while it is written."""
 
-    Parameters
-    ----------
-    scene : Scene
-        What is written.
-    system : System
-        The same, compiled.
-    limbs : list of Limb
-        Bodies of the tree.
-    root : Element
-        The file.
-    bodies : dict
-        Element of every body.
-    taken : set
-        Names in use, with the kind of element that they name.
-    """
-
-    scene: Scene
-    system: System
-    limbs: list[Limb]
+    scene: Scene  # what is written
+    system: System  # the same, compiled
+    limbs: list[Limb]  # bodies of the tree
     root: Element = field(default_factory=lambda: Element("mujoco"))
-    bodies: dict[str, Element] = field(default_factory=dict)
-    taken: set[tuple[str, str]] = field(default_factory=set)
+    bodies: dict[str, Element] = field(default_factory=dict)  # element of every body
+    taken: set[tuple[str, str]] = field(default_factory=set)  # names in use, with the kind of element that they name
 
     def add(self, parent: Element, tag: str, kind: str = "", **attributes) -> Element:
         """Add an element; its name must be unique among elements of the ``kind``."""
@@ -115,6 +99,8 @@ class MjcfDocument:
 def to_mjcf(scene: Scene) -> str:
     """Write a scene as MJCF, for MuJoCo.
 
+    FileError if MuJoCo has no counterpart of an element; the message names it.
+
     Parameters
     ----------
     scene : Scene
@@ -125,11 +111,6 @@ def to_mjcf(scene: Scene) -> str:
     -------
     str
         The file. Its key frame "start" is the start of the scene, if the scene gives one.
-
-    Raises
-    ------
-    FileError
-        If MuJoCo has no counterpart of an element; the message names it.
 
     Notes
     -----

@@ -21,8 +21,6 @@ def shape_of(source: Source, collision: Element, name: str, carrier: str, place:
     ----------
     source : Source
         The file.
-    collision : Element
-        The collision.
     name, carrier : str
         Of the shape, and of the body or frame that carries it.
     place : tuple of ndarray

@@ -59,13 +59,7 @@ def check(source: Source, element: Element, left: set[str]):
 
 
 def check_link(source: Source, element: Element):
-    """Refuse what moves a link beside its joints and gravity.
-
-    Raises
-    ------
-    FileError
-        With file and line.
-    """
+    """Refuse what moves a link beside its joints and gravity; FileError with file and line."""
     moved = []
     if text(element, "kinematic") not in ("false", "0", ""):
         moved.append(element.find("kinematic"))

@@ -52,10 +52,7 @@ class Includes:
     def expand(self, element: Element, path: Path, seen: tuple[Path, ...] = ()):
         """Put the models that an element includes, and that these include, in the places of the includes.
 
-        Raises
-        ------
-        FileError
-            If a model is not found, includes itself, or there are too many.
+        FileError if a model is not found, includes itself, or there are too many.
         """
         for child in list(element):
             if child.tag == "include":
@@ -134,10 +131,7 @@ class Includes:
 def merged(source: Source, include: Element, model: Element) -> list[Element]:
     """Parts of a model that become parts of the model that includes it, and the frame that they are relative to.
 
-    Raises
-    ------
-    FileError
-        If the model has a placement frame, which is not read here.
+    FileError if the model has a placement frame, which is not read here.
     """
     if model.get("placement_frame"):
         place = source.place(include)

@@ -33,19 +33,12 @@ class MassProperties(NamedTuple):
 def of_link(source: Source, link: Element, placed) -> MassProperties:
     """Mass properties of a link.
 
+    FileError if the inertia is automatic and a collision has a shape whose volume is not known.
+
     Parameters
     ----------
-    source : Source
-        The file.
-    link : Element
-        The link.
     placed : callable
         (element of a collision) → its pose (R, p) in the link.
-
-    Raises
-    ------
-    FileError
-        If the inertia is automatic and a collision has a shape whose volume is not known.
     """
     inertial = link.find("inertial")
     if inertial is not None and inertial.get("auto") in TRUE:

@@ -19,10 +19,7 @@ TRUE = ("true", "1")
 def pose(source: Source, element: Element | None) -> Pose:
     """Pose (R, p) that a <pose> holds: a point [m], and roll, pitch, yaw about fixed axes [rad], or a quaternion.
 
-    Raises
-    ------
-    FileError
-        If it does not hold that.
+    FileError if it does not hold that.
     """
     if element is None or not (element.text or "").strip():
         return IDENTITY

@@ -40,10 +40,10 @@ def read_sdf(
     called "model::name". A model that no joint binds to the world is free, as SDFormat has it. Static models are a part of
     the ground, their links named frames of it.
 
+    FileError if it is no SDFormat, or holds what moves the model and is not modelled; the message tells the line.
+
     Parameters
     ----------
-    path : str or Path
-        The file.
     root : str, optional
         "fixed": the first link is welded to the ground; "free": it floats. As the file says when not given.
     limits : str
@@ -56,11 +56,6 @@ def read_sdf(
     collisions : bool
         Whether collisions become shapes, called "link.collision": boxes, spheres, capsules, cylinders, cones, ellipsoids,
         planes and hulls of meshes; contacts are added with ``scene.contacts_all`` or ``scene.contact``.
-
-    Raises
-    ------
-    FileError
-        If it is no SDFormat, or holds what moves the model and is not modelled; the message tells the line.
 
     Warns
     -----

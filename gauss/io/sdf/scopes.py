@@ -70,10 +70,7 @@ class Scope:
     def of(self, name: str, asked: Element | None = None) -> Pose:
         """Pose (R, p) of a link, joint, frame or model in the frame of the scope.
 
-        Raises
-        ------
-        FileError
-            If it does not exist, or refers to itself.
+        FileError if it does not exist, or refers to itself.
         """
         if name in self._found:
             known = self._found[name]
@@ -93,13 +90,7 @@ class Scope:
         return found
 
     def element(self, name: str, asked: Element | None = None) -> Element:
-        """Element of a name of this scope.
-
-        Raises
-        ------
-        FileError
-            If there is none.
-        """
+        """Element of a name of this scope; FileError if there is none."""
         if name not in self.elements:
             place = self.source.place(asked)
             raise FileError(f"{place}: no link, joint or frame {name!r}. {did_you_mean(name, self.elements)}")
@@ -110,10 +101,7 @@ class Scope:
 
         A joint's frame is carried by its child, a model's by its canonical link.
 
-        Raises
-        ------
-        FileError
-            If there is no such name, or a frame is attached to itself.
+        FileError if there is no such name, or a frame is attached to itself.
         """
         followed: list[str] = []
         while True:
@@ -144,10 +132,7 @@ class Scope:
     def canonical(self) -> str:
         """Link that carries the frame of a model: that which the model names, or the first, of nested models last.
 
-        Raises
-        ------
-        FileError
-            If the model names none of its links, or has none.
+        FileError if the model names none of its links, or has none.
         """
         named = self.root.get("canonical_link")
         links = [name for name, element in self.elements.items() if element.tag == "link"]

@@ -18,47 +18,26 @@ from gauss.system.frames import IDENTITY, Pose, compose, on_body
 
 @dataclass(frozen=True)
 class FrameOnLink:
-    """Frame on a link.
+    """Frame on a link."""
 
-    Parameters
-    ----------
-    link : str
-        The link, also one that fixed joints weld to another.
-    pose : Pose
-        Rotation (3, 3) and position (3,) [m] in the frame of the link.
-    """
-
-    link: str
-    pose: Pose = IDENTITY
+    link: str  # the link, also one that fixed joints weld to another
+    pose: Pose = IDENTITY  # rotation (3, 3) and position (3,) [m] in the frame of the link
 
 
 @dataclass(frozen=True)
 class LoopClosure:
-    """Joint that closes a loop.
+    """Joint that closes a loop."""
 
-    Parameters
-    ----------
-    name, kind : str
-        Its name, and the kind of :class:`gauss.Joint`.
-    predecessor, successor : FrameOnLink
-        Frames that coincide where the coordinates of the joint are zero.
-    axis : tuple, optional
-        Axis of the joint in both frames.
-    """
-
-    name: str
+    name: str  # name, kind: its name, and the kind of :class:`gauss.Joint`
     kind: str
-    predecessor: FrameOnLink
+    predecessor: FrameOnLink  # predecessor, successor: frames that coincide where the coordinates of the joint are zero
     successor: FrameOnLink
-    axis: tuple[float, ...] | None = None
+    axis: tuple[float, ...] | None = None  # axis of the joint in both frames
 
     def add_to(self, scene: Scene):
         """Add the joint, and the frames that it needs.
 
-        Raises
-        ------
-        SceneError
-            If there is no such link, or both frames are on one body.
+        SceneError if there is no such link, or both frames are on one body.
         """
         what = f"loop {self.name!r}"
         ends = [_carrier(scene, end, f"{what}: {side}") for side, end in self._ends]
@@ -88,23 +67,16 @@ class LoopClosure:
 def add_coupling(scene: Scene, source: Source, name: str, predecessor: str, successor: str, ratio: float):
     """Add the coupling r Σ q (to the predecessor) = Σ q (to the successor), from the nearest common ancestor.
 
+    SceneError if there is no such link, or a chain holds no joint of one freedom.
+
     Parameters
     ----------
     scene : Scene
         Scene of the tree of the file.
     source : Source
         The file, whose joints give the chains.
-    name : str
-        Name of the coupling.
-    predecessor, successor : str
-        Links.
     ratio : float
         r: the successor turns so many times as fast as the predecessor.
-
-    Raises
-    ------
-    SceneError
-        If there is no such link, or a chain holds no joint of one freedom.
     """
     what = f"coupling {name!r}"
     if not ratio:

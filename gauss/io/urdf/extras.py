@@ -28,12 +28,12 @@ def with_extras(
 ):
     """Scene of a URDF file with its limits, resistance, collision shapes and motors, as requested.
 
+    FileError if an option is unknown, or a number is none.
+
     Parameters
     ----------
     scene : Scene
         Its bodies and joints; elements are added to it.
-    path : Path
-        The file.
     limits : str, optional
         "start": the limits of joints are kept where a start is assembled; "stops": joints run against them, too. Robots
         are started at zero, which many files exclude: so limits are not read when this is not given.
@@ -46,11 +46,6 @@ def with_extras(
     motors : bool
         Whether each simple ``<transmission>`` becomes an input, named like its actuator: the torque [N m] or force [N] of
         the motor, which acts on the joint times the reduction, limited by the effort of the joint.
-
-    Raises
-    ------
-    FileError
-        If an option is unknown, or a number is none.
 
     Warns
     -----

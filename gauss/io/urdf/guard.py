@@ -14,10 +14,7 @@ SCHEMES = ("package://", "model://")  # looked for in the folders above the file
 def guarded(path) -> Source:
     """File that may be parsed: by Pinocchio not as it stands, but as what was read here is written down anew.
 
-    Raises
-    ------
-    FileError
-        If it cannot be read, or holds what is refused; the message says where.
+    FileError if it cannot be read, or holds what is refused; the message says where.
     """
     return read_xml(path, ("robot",), limits=("limit",), loose_comments=True)
 
@@ -34,10 +31,7 @@ def place_of(source: Source, message: str) -> str:
 def placed(source: Source, element: Element):
     """Context in which errors of a scene are raised with the file and line of an element.
 
-    Raises
-    ------
-    FileError
-        In place of an error of the scene.
+    FileError in place of an error of the scene.
     """
     try:
         yield

@@ -27,29 +27,17 @@ KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 
 @dataclass(frozen=True)
 class JointFile:
-    """Contents of the file.
+    """Contents of the file."""
 
-    Parameters
-    ----------
-    closures : tuple
-        Loop joints, each with its place.
-    kinds : dict
-        Type that replaces that of a joint of the URDF, with its place, by the name of the joint.
-    motors : tuple of Marked
-        Actuated joints.
-    """
-
-    closures: tuple[tuple[LoopClosure, str], ...] = ()
+    closures: tuple[tuple[LoopClosure, str], ...] = ()  # loop joints, each with its place
+    # type that replaces that of a joint of the URDF, with its place, by the name of the joint
     kinds: dict[str, Marked] | None = None
-    motors: tuple[Marked, ...] = ()
+    motors: tuple[Marked, ...] = ()  # actuated joints
 
     def replaced(self, source: Source) -> Source:
         """URDF file with the types of its joints replaced; ball joints are hinges in it, see :attr:`balls`.
 
-        Raises
-        ------
-        FileError
-            If there is no such joint, or it does not move.
+        FileError if there is no such joint, or it does not move.
         """
         if not self.kinds:
             return source
@@ -84,10 +72,7 @@ class JointFile:
 
         A frame that is no link may be a joint: the frame of the link that it moves.
 
-        Raises
-        ------
-        FileError
-            If a frame or joint does not exist; the message says where.
+        FileError if a frame or joint does not exist; the message says where.
         """
         for closure, place in self.closures:
             try:
@@ -104,10 +89,7 @@ class JointFile:
 def joint_file(path: Path) -> JointFile:
     """Loops, joint types and motors of the YAML file beside a URDF file; nothing if there is none that names any.
 
-    Raises
-    ------
-    FileError
-        If it is not understood; the message says where.
+    FileError if it is not understood; the message says where.
     """
     beside = next((path.with_suffix(ending) for ending in ENDINGS if path.with_suffix(ending).is_file()), None)
     if beside is None:
@@ -140,10 +122,7 @@ def _closure(pair: Marked, kind: Marked) -> LoopClosure:
 def _link_of(source: Source, name: str) -> str:
     """Link that a frame belongs to: of its own name, or moved by the joint of this name.
 
-    Raises
-    ------
-    SceneError
-        If a link has this name, and a joint that moves another link.
+    SceneError if a link has this name, and a joint that moves another link.
     """
     moved = {joint.get("name"): joint.find("child") for joint in source.root.findall("joint")}
     child = moved.get(name)

@@ -15,10 +15,7 @@ Tree = dict[str, tuple[str, Element]]  # link → the link that it hangs on, and
 def require_tree(source: Source):
     """Refuse names that stand twice, joints without a kind or a link, and links that do not hang on one root.
 
-    Raises
-    ------
-    FileError
-        With the line of the element, its name and what is wrong.
+    FileError with the line of the element, its name and what is wrong.
     """
     links = _by_name(source, "link")
     parents: Tree = {}

@@ -48,11 +48,8 @@ LIMITED = ("revolute", "prismatic")  # joints that the parser wants limits of
 def for_parser(source: Source) -> str:
     """Text of a file with its numbers in the one form that every parser reads, as Pinocchio's is given it.
 
-    Raises
-    ------
-    FileError
-        If something else stands where a number belongs, or a number that is needed is missing; the message tells file, line,
-        element and attribute.
+    FileError if something else stands where a number belongs, or a number that is needed is missing; the message tells file,
+    line, element and attribute.
     """
     root = deepcopy(source.root)
     for given, written in zip(source.root, root, strict=True):

@@ -66,17 +66,12 @@ def description(name: str) -> Path:
 def urdf_of_xacro(path: Path, arguments: Mapping[str, object] | bool | None) -> Iterator[Path]:
     """URDF file that a xacro file expands to, for a ``with`` statement.
 
+    FileError if it may not be evaluated, or cannot be.
+
     Parameters
     ----------
-    path : Path
-        The file.
     arguments : mapping or bool, optional
         Arguments of the file, or True for none; None if the caller did not say that the file may be evaluated.
-
-    Raises
-    ------
-    FileError
-        If it may not be evaluated, or cannot be.
     """
     if arguments is None or arguments is False:
         raise FileError(

@@ -31,10 +31,7 @@ ORIGIN = (0.0, 0.0, 0.0)
 def add_loops_and_couplings(scene: Scene, source: Source):
     """Add the loops and couplings of a URDF+ file to the scene of its tree.
 
-    Raises
-    ------
-    FileError
-        If one is incomplete, of an unknown type, or names a link that does not exist; the message says where.
+    FileError if one is incomplete, of an unknown type, or names a link that does not exist; the message says where.
     """
     for joint in source.root.findall("joint"):
         independent = joint.get("independent")

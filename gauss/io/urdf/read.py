@@ -36,10 +36,10 @@ SPECK = 1e-8
 def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "physical") -> Scene:
     """Scene of a URDF file.
 
+    FileError if it cannot be parsed, or holds something that gauss does not model; the message names it.
+
     Parameters
     ----------
-    path : str or Path
-        The file.
     root : str
         "fixed": the base is part of the ground; "free": it floats on a free joint. A robot whose base weighs nothing and
         carries a joint of type ``floating`` floats already; to let it float twice is refused.
@@ -48,11 +48,6 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True, inertia: str = "phy
     inertia : str
         "physical": inertia without mass, and moments that violate the triangle inequality, are refused; "as given": they
         are taken, with a warning.
-
-    Raises
-    ------
-    FileError
-        If it cannot be parsed, or holds something that gauss does not model; the message names it.
 
     Warns
     -----
@@ -171,7 +166,7 @@ def _floats(model, index: int) -> bool:
 
 
 def _link_name(name: str) -> str:
-    """Name of a link; one that is called like the world itself gets another."""
+    """Name of a link; a link named like the world gets another name."""
     return f"{GROUND} link" if name == GROUND else name
 
 
@@ -207,7 +202,7 @@ def _axis(joint) -> np.ndarray:
 
 
 def _couple(scene: Scene, source: Source):
-    """Mimic tags as couplings; a mimicked joint that does not move is held as a fixed offset cannot be."""
+    """Mimic tags as couplings; joints that mimic one that does not move, or each other in a circle, are refused."""
     leads: dict[str, str] = {}
     for joint in source.root.findall("joint"):
         tag = joint.find("mimic")

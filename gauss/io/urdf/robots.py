@@ -26,10 +26,7 @@ ALIASES = {
 def robot(name: str) -> Path:
     """URDF file of a robot of example-robot-data, by the name of the file, or "folder/…/file" where that is not unique.
 
-    Raises
-    ------
-    FileError
-        If the package is not installed or has no such robot.
+    FileError if the package is not installed or has no such robot.
     """
     try:
         package = importlib.metadata.distribution(PACKAGE)
@@ -52,8 +49,6 @@ def read_robot(path: Path, options: dict, extras: dict) -> Scene:
 
     Parameters
     ----------
-    path : Path
-        The file.
     options : dict
         Of :func:`gauss.io.urdf.read.read_urdf`.
     extras : dict

@@ -28,10 +28,7 @@ def with_side(scene: Scene, path: Path) -> Scene:
 
     Links may be named that fixed joints weld to others.
 
-    Raises
-    ------
-    FileError
-        If a table of it is not understood; the message names the file and the table.
+    FileError if a table of it is not understood; the message names the file and the table.
     """
     beside = side_file(path)
     if not beside.is_file():

@@ -21,10 +21,7 @@ def add_motors(scene: Scene, source: Source) -> list[str]:
 
     The input is the torque [N m] or force [N] of the motor, limited by the effort of its joint over the reduction.
 
-    Raises
-    ------
-    FileError
-        If a transmission names no actuator, no joint of the robot, or a reduction that is no number or zero.
+    FileError if a transmission names no actuator, no joint of the robot, or a reduction that is no number or zero.
     """
     joints = {joint.get("name", ""): joint for joint in source.root.findall("joint")}
     return [

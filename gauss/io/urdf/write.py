@@ -36,32 +36,16 @@ TYPES = {"hinge": "continuous", "slide": "prismatic"}
 
 @dataclass
 class UrdfDocument:
-    """URDF file while it is written, and what goes beside it.
-
-    Parameters
-    ----------
-    scene : Scene
-        What is written.
-    system : System
-        Its system.
-    limbs : list of Limb
-        Bodies of the tree.
-    root : Element
-        The file.
-    rest : Scene
-        What the file cannot say.
-    shifts : dict
-        Where the frame of each body is moved to, in its old frame (3,) [m].
-    mimics : dict
-        Element of each joint of the file of one freedom, by name, that mimics no other yet.
-    """
+    """URDF file while it is written, and what goes beside it."""
 
     scene: Scene
     system: System
-    limbs: list[Limb]
+    limbs: list[Limb]  # bodies of the tree
     root: Element
-    rest: Scene
+    rest: Scene  # what the file cannot say
+    # where the frame of each body is moved to, in its old frame (3,) [m]
     shifts: dict[str, np.ndarray] = field(default_factory=dict)
+    # element of each joint of the file of one freedom, by name, that mimics no other yet
     mimics: dict[str, Element] = field(default_factory=dict)
 
 
@@ -78,6 +62,8 @@ def write_urdf(scene: Scene, path: Path) -> Path:
 def to_urdf(scene: Scene) -> tuple[str, str]:
     """Write a scene as URDF.
 
+    FileError if a name or a law cannot be written; the message names it.
+
     Parameters
     ----------
     scene : Scene
@@ -87,11 +73,6 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
     -------
     tuple of str
         The file, which lists in a comment what it cannot say, and the contents of the file beside it, empty if not needed.
-
-    Raises
-    ------
-    FileError
-        If a name or a law cannot be written; the message names it.
     """
     system = compile_scene(scene)
     tree, cut = spanning_tree(scene)
@@ -259,10 +240,7 @@ def _keep_rest(document: UrdfDocument):
 def _measured(document: UrdfDocument, output: Output) -> Output:
     """Output in the file, at the same point of its body.
 
-    Raises
-    ------
-    FileError
-        If it measures a joint that becomes a chain in the file, or from a body whose frame is another there.
+    FileError if it measures a joint that becomes a chain in the file, or from a body whose frame is another there.
     """
     if SENSORS[output.kind][0] == "joint":
         rates = document.scene.joints[output.of].pair.rates

@@ -19,10 +19,7 @@ OWN_PLACE = re.compile(r"Error in '.*' at line \d+ in file .* : ")
 def opened_stage(path: Path, root_folder=None) -> Usd.Stage:
     """Composed stage of a file, all of whose layers lie in its folder, or in one that the user names.
 
-    Raises
-    ------
-    FileError
-        If a layer lies elsewhere, is missing or too large, or USD refuses it.
+    FileError if a layer lies elsewhere, is missing or too large, or USD refuses it.
     """
     if not path.is_file():
         raise FileError(f"{path}: there is no such file.")

@@ -29,39 +29,19 @@ PAIRS_OF: dict[tuple[str, ...], tuple[str, Axis]] = {  # kind and axis by the fr
 
 @dataclass(frozen=True)
 class UsdJoint:
-    """Joint between two bodies.
+    """Joint between two bodies."""
 
-    Parameters
-    ----------
-    prim : Usd.Prim
-        Where the file has it.
-    name, kind : str
-        Name and kind, as of :class:`gauss.scene.Joint`; "free" holds nothing.
-    parent, child : str
-        Bodies.
-    parent_frame, child_frame : FramePose
-        Frame of the joint in each.
-    axis : tuple of float
-        Axis in these frames.
-    limits : tuple of float, optional
-        Least and largest coordinate [rad, m].
-    is_loop : bool
-        Whether the file leaves it out of the tree.
-    drive : str
-        Name of its drive in the file; empty where it can have none.
-    """
-
-    prim: Usd.Prim
-    name: str
+    prim: Usd.Prim  # where the file has it
+    name: str  # name, kind: name and kind, as of :class:`gauss.scene.Joint`; "free" holds nothing
     kind: str
     parent: str
     child: str
     parent_frame: FramePose
     child_frame: FramePose
-    axis: Axis
-    limits: tuple[float, float] | None
-    is_loop: bool
-    drive: str = ""
+    axis: Axis  # axis in these frames
+    limits: tuple[float, float] | None  # least and largest coordinate [rad, m]
+    is_loop: bool  # whether the file leaves it out of the tree
+    drive: str = ""  # name of its drive in the file; empty where it can have none
 
 
 def joints_of(stage: Usd.Stage, bodies: dict[str, Usd.Prim], units: StageUnits) -> list[UsdJoint]:
@@ -142,10 +122,7 @@ def _by_freedoms(prim: Usd.Prim, units: StageUnits) -> tuple:
 def freedom_range(prim: Usd.Prim, freedom: str) -> tuple[float, float]:
     """Lower and upper limit of a freedom of a joint, in units of the file; infinite without.
 
-    Raises
-    ------
-    FileError
-        If one is not a number.
+    FileError if one is not a number.
     """
     if not prim.HasAPI(UsdPhysics.LimitAPI, freedom):
         return -inf, inf

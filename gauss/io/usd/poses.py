@@ -62,10 +62,7 @@ class StageUnits:
     def _transform(self, prim: Usd.Prim) -> Gf.Matrix4d:
         """Place of a prim in the world.
 
-        Raises
-        ------
-        FileError
-            If it has no axes of its own, as where it is mirrored or sheared, or changes with time.
+        FileError if it has no axes of its own, as where it is mirrored or sheared, or changes with time.
         """
         if prim.GetPath() not in self._checked:
             above = prim
@@ -106,10 +103,7 @@ def _check_axes(prim: Usd.Prim, rows: np.ndarray):
 def number(prim: Usd.Prim, attribute: Usd.Attribute, largest: float = LARGEST_MAGNITUDE) -> float:
     """Number of an attribute; zero where it has none.
 
-    Raises
-    ------
-    FileError
-        If it is not a number, or beyond the largest.
+    FileError if it is not a number, or beyond the largest.
     """
     value = float(attribute.Get() or 0.0)
     if not abs(value) <= largest:

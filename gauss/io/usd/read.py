@@ -34,6 +34,8 @@ WEIGHT = 9.80665  # m/s², of a stage that says nothing
 def read_usd(path, limits: str = "start", root_folder=None) -> Scene:
     """Scene of a USD file.
 
+    FileError if it cannot be read, or holds what moves the mechanism and is not modelled; the message names it.
+
     Parameters
     ----------
     path : str or Path
@@ -42,11 +44,6 @@ def read_usd(path, limits: str = "start", root_folder=None) -> Scene:
         "start": limits of joints are kept where a start is assembled; "stops": joints run against them, too.
     root_folder : str or Path, optional
         Folder in which layers may lie, beside that of the file.
-
-    Raises
-    ------
-    FileError
-        If it cannot be read, or holds what moves the mechanism and is not modelled; the message names it.
 
     Warns
     -----
@@ -148,13 +145,7 @@ def _add_joint(scene: Scene, joint: UsdJoint, in_tree: bool):
 
 
 def _start(scene: Scene, joint: UsdJoint, bodies: dict, units: StageUnits):
-    """Coordinate of a joint where the file has its bodies.
-
-    Raises
-    ------
-    FileError
-        If its bodies do not stand where it holds them.
-    """
+    """Coordinate of a joint where the file has its bodies; FileError if its bodies do not stand where it holds them."""
     ends = [units.pose(bodies[body]) if body != GROUND else GROUND_POSE for body in (joint.parent, joint.child)]
     between = (ends[0] @ joint.parent_frame).inverse @ (ends[1] @ joint.child_frame)
     axis, left = np.array(joint.axis), np.concatenate([between.p, 0.5 * _vector(between.R)])

@@ -22,24 +22,12 @@ DOT = 0.02  # m: radius of points that enclose nothing
 
 @dataclass(frozen=True)
 class BodyMesh:
-    """Mesh on a body.
+    """Mesh on a body."""
 
-    Parameters
-    ----------
-    body : str
-        The body, or "ground".
-    role : str
-        "link", "joint" or "contact".
-    mesh : trimesh.Trimesh
-        In the frame of the body [m].
-    colour : tuple of float, optional
-        Red, green, blue, from 0 to 1; the colour of the body when not given.
-    """
-
-    body: str
-    role: str
-    mesh: trimesh.Trimesh
-    colour: tuple[float, float, float] | None = None
+    body: str  # the body, or "ground"
+    role: str  # "link", "joint" or "contact"
+    mesh: trimesh.Trimesh  # in the frame of the body [m]
+    colour: tuple[float, float, float] | None = None  # red, green, blue, from 0 to 1; the colour of the body when not given
 
 
 def size(system: System) -> float:

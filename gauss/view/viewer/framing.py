@@ -18,27 +18,15 @@ BELOW = 0.05  # floor under the lowest point that is reached, of the size of the
 
 
 class Framing(NamedTuple):
-    """View of a motion.
+    """View of a motion."""
 
-    Attributes
-    ----------
-    middle, eye : ndarray, shape (3,)
-        What is looked at, and from where [m].
-    right, away, up : ndarray, shape (3,)
-        Axes of the room: up is against gravity.
-    floor : ndarray, shape (3,)
-        Point of the floor under the middle [m].
-    reach : float
-        Diagonal of all that is seen [m].
-    """
-
-    middle: np.ndarray
+    middle: np.ndarray  # middle, eye (3,): what is looked at, and from where [m]
     eye: np.ndarray
-    right: np.ndarray
+    right: np.ndarray  # right, away, up (3,): axes of the room: up is against gravity
     away: np.ndarray
     up: np.ndarray
-    floor: np.ndarray
-    reach: float
+    floor: np.ndarray  # (3,) point of the floor under the middle [m]
+    reach: float  # diagonal of all that is seen [m]
 
 
 def framing(trajectory: Trajectory) -> Framing:

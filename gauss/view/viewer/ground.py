@@ -6,26 +6,14 @@ import numpy as np
 
 
 class Ground(NamedTuple):
-    """Colours behind and under a mechanism.
+    """Colours behind and under a mechanism."""
 
-    Attributes
-    ----------
-    top, bottom : tuple of int
-        Red, green, blue of the sky from 0 to 255, at its top and its bottom.
-    cell, section : tuple of int
-        Lines of the floor.
-    shadow : float
-        Opacity of shadows on the floor.
-    dark : bool
-        Whether controls are light on dark.
-    """
-
-    top: tuple[int, int, int]
+    top: tuple[int, int, int]  # top, bottom: red, green, blue of the sky from 0 to 255, at its top and its bottom
     bottom: tuple[int, int, int]
-    cell: tuple[int, int, int]
+    cell: tuple[int, int, int]  # cell, section: lines of the floor
     section: tuple[int, int, int]
-    shadow: float
-    dark: bool
+    shadow: float  # opacity of shadows on the floor
+    dark: bool  # whether controls are light on dark
 
 
 LIGHT = Ground((168, 184, 204), (222, 227, 233), (198, 205, 214), (164, 174, 188), 0.3, False)  # white bodies are brighter

@@ -70,10 +70,7 @@ class Poser:
     def pose(self, name: str, value: float):
         """Set one coordinate, at rest; the others follow where joints close loops.
 
-        Raises
-        ------
-        GaussError
-            If the loops do not close there.
+        GaussError if the loops do not close there.
         """
         q = self.state.q.copy()
         q[list(coordinate_units(self.system)).index(name)] = value

@@ -27,8 +27,6 @@ class BodyPull:
     ----------
     simulator : Simulator
         Its inputs are a force at the centre of mass and a moment on the body, see :func:`pull_simulator`.
-    body : str
-        The body.
     point : ndarray, shape (3,)
         Where it is held, in the world [m].
 

@@ -18,34 +18,20 @@ NOT_SIMULATED = Stats(0, 0, 0, 0, 0.0, 0.0, "not simulated")
 
 @dataclass(frozen=True)
 class Shown:
-    """Content of a view.
+    """Content of a view."""
 
-    Parameters
-    ----------
-    motion, pictures : Trajectory
-        The motion, and the same at equally spaced times; of one sample for a scene that does not move.
-    visuals : tuple
-        Given meshes.
-    joints : tuple of str
-        Joints whose reactions are drawn as arrows.
-    traces : tuple of str
-        Bodies, whose centres of mass leave a trace, and frames, whose origins do.
-    """
-
+    # motion, pictures: the motion, and the same at equally spaced times; of one sample for a scene that does not move
     motion: Trajectory
     pictures: Trajectory
-    visuals: tuple = ()
-    joints: tuple[str, ...] = ()
-    traces: tuple[str, ...] = ()
+    visuals: tuple = ()  # given meshes
+    joints: tuple[str, ...] = ()  # joints whose reactions are drawn as arrows
+    traces: tuple[str, ...] = ()  # bodies, whose centres of mass leave a trace, and frames, whose origins do
 
 
 def shown(thing: Scene | Trajectory, frames: int, visuals=(), joints=(), traces=None) -> Shown:
     """View of a scene at its start, or of a motion; traces of the bodies that carry no others if none are named.
 
-    Raises
-    ------
-    StateError
-        If the name of a trace is that of no body or frame.
+    StateError if the name of a trace is that of no body or frame.
     """
     require(thing, (Scene, Trajectory), "show")
     if isinstance(thing, Scene):

@@ -36,8 +36,6 @@ class ViewerStage:
 
     Parameters
     ----------
-    server : viser.ViserServer
-        Where it is drawn.
     shown : Shown
         What is drawn.
     dark : bool
@@ -187,8 +185,6 @@ class ContactMarks:
     ----------
     server : viser.ViserServer
         Where they are drawn.
-    places : list of TouchingPoint
-        The places.
     size : float
         Size of the mechanism [m].
     root : str

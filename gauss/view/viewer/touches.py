@@ -14,19 +14,11 @@ NEAR = 1e-3  # of the size of a mechanism: what is no farther apart is drawn as 
 
 
 class TouchingPoint(NamedTuple):
-    """One place where bodies may touch, in every picture.
+    """One place where bodies may touch, in every picture."""
 
-    Attributes
-    ----------
-    points, forces : ndarray, shape (k, 3)
-        Where [m], and the force on the first body [N]; world axes.
-    closed : ndarray, shape (k,)
-        Whether it is closed.
-    """
-
-    points: np.ndarray
+    points: np.ndarray  # points, forces (k, 3): where [m], and the force on the first body [N]; world axes
     forces: np.ndarray
-    closed: np.ndarray
+    closed: np.ndarray  # (k,) whether it is closed
 
 
 def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[TouchingPoint]:

@@ -23,34 +23,18 @@ GRID = (
 
 
 class Plant(NamedTuple):
-    """Linear model of a mechanism in discrete time, weights and bounds.
+    """Linear model of a mechanism in discrete time, weights and bounds."""
 
-    Attributes
-    ----------
-    A, B : ndarray, shape (n_x, n_x), (n_x, n_u)
-        x⁺ = A x + B u.
-    Q, R : ndarray, shape (n_x,), (n_u,)
-        Diagonals of the weights.
-    x_max, u_max : ndarray, shape (n_x,), (n_u,)
-        Bounds on the sizes; inf where there is none.
-    start : ndarray, shape (n_x,)
-        State at the beginning.
-    states, inputs : tuple of (str, str)
-        Names and units.
-    story : str
-        What it is.
-    """
-
-    A: np.ndarray
+    A: np.ndarray  # A (n_x, n_x), B (n_x, n_u): x⁺ = A x + B u
     B: np.ndarray
-    Q: np.ndarray
+    Q: np.ndarray  # Q (n_x,), R (n_u,): diagonals of the weights
     R: np.ndarray
-    x_max: np.ndarray
+    x_max: np.ndarray  # x_max (n_x,), u_max (n_u,): bounds on the sizes; inf where there is none
     u_max: np.ndarray
-    start: np.ndarray
-    states: tuple
+    start: np.ndarray  # (n_x,) state at the beginning
+    states: tuple  # states, inputs: names and units
     inputs: tuple
-    story: str
+    story: str  # what it is
 
 
 def recipes() -> Iterator:

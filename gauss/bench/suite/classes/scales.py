@@ -1,4 +1,4 @@
-"""One mechanism in many units, and with masses orders apart: what a solver that asks for absolute residuals does not see."""
+"""One mechanism in many units, and with masses orders apart: errors that absolute residuals do not show."""
 
 from collections.abc import Iterator
 from functools import partial
