@@ -13,8 +13,11 @@ from typing import Any
 import numpy as np
 
 from gauss.arguments import real_array
-from gauss.codegen import Expression, graph_of
+from gauss.codegen import Column, Expression, graph_of, looked_up
 from gauss.errors import SceneError
+
+MOST_WRITTEN = 32  # pieces of a table that are written as operations; of more of them, coefficients are data
+CONTINUOUS = 1e-9  # jump of a piecewise polynomial that is rounding, relative to its terms
 
 pi = np.pi
 sin: Callable[..., Any]
@@ -240,6 +243,9 @@ def interp(x, xp, fp):
         raise SceneError(f"interp: expected increasing arguments and as many values, got shapes {xp.shape} and {fp.shape}.")
     if not _traced(x):
         return np.interp(x, xp, fp)
+    if xp.size > MOST_WRITTEN:
+        slopes = np.diff(fp) / np.diff(xp)
+        return _looked_up(Column(xp[1:-1]), x, clip(x, xp[0], xp[-1]), xp[:-1], (slopes, fp[:-1]))
     value = fp[0]
     for start, length, rise in zip(xp, np.diff(xp), np.diff(fp), strict=False):
         value = value + clip((x - start) / length, 0.0, 1.0) * rise
@@ -270,15 +276,35 @@ def _piecewise(polynomial, pieces, x):
     breaks = polynomial.x
     if polynomial.extrapolate == "periodic":
         x = breaks[0] + (x - breaks[0]) % (breaks[-1] - breaks[0])
+    if pieces.shape[1] > MOST_WRITTEN and _traced(x):
+        return _looked_up(Column(breaks[1:-1], _jumps(breaks, pieces)), x, x, breaks[:-1], pieces)
     start, coefficients = float(breaks[0]), [float(c) for c in pieces[:, 0]]
     for k in range(1, pieces.shape[1]):
         inside = x > float(breaks[k])
         start = where(inside, float(breaks[k]), start)
         coefficients = [where(inside, float(new), old) for new, old in zip(pieces[:, k], coefficients, strict=True)]
-    value, s = 0.0, x - start
+    return _horner(coefficients, x - start)
+
+
+def _looked_up(breaks: Column, x, within, starts, pieces):
+    """Value of a piecewise polynomial whose pieces are data: that of the row of x, at a number within the table."""
+    row = looked_up("row", breaks, x)
+    return _horner([looked_up("entry", Column(c), row) for c in pieces], within - looked_up("entry", Column(starts), row))
+
+
+def _horner(coefficients, s):
+    """Value of a polynomial of these coefficients, that of the highest power first."""
+    value = 0.0
     for coefficient in coefficients:
         value = value * s + coefficient
     return value
+
+
+def _jumps(breaks: np.ndarray, pieces: np.ndarray) -> bool:
+    """Whether a piecewise polynomial jumps at a break."""
+    lengths = np.diff(breaks)[:-1]
+    ends, sizes = (_horner(list(part[:, :-1]), lengths) for part in (pieces, np.abs(pieces)))
+    return bool((np.abs(ends - pieces[-1, 1:]) > CONTINUOUS * sizes).any())
 
 
 def _traced(*values) -> bool:

@@ -16,6 +16,7 @@ from gauss.codegen.ir_blocks import BODY, POINTER, Buffers, constant_array, coun
 from gauss.codegen.kernel import CallingKernel, Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
+from gauss.codegen.lookup import LOOKUPS, Column, looked_up
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.optimiser import one_tier
 from gauss.codegen.outlining import fresh_symbols, outlined
@@ -30,6 +31,9 @@ from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
     "CallingKernel",
+    "Column",
+    "LOOKUPS",
+    "looked_up",
     "DeviceModule",
     "vector_width",
     "BODY",

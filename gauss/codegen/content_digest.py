@@ -25,6 +25,7 @@ import numpy as np
 from gauss.codegen.content_key import PACKAGE, IdentityKey, named_globals
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
+from gauss.codegen.lookup import Column
 
 BY_NAME = (PACKAGE, "numpy", "math", "cmath", "operator", "builtins")  # packages whose functions the key of the cache holds
 # built-in functions by which code may depend on more than its constants, globals and arguments
@@ -315,6 +316,7 @@ def _traced(encoder: _Encoder, function: Function) -> Sequence:
 _WRITERS: tuple[tuple[tuple[type, ...], Writer, bool], ...] = (
     ((IdentityKey,), lambda _, key: (key.thing,), True),
     ((Function,), _traced, True),
+    ((Column,), lambda _, column: (column.digest,), True),
     ((Enum,), _member, False),
     ((np.ndarray,), _array, True),
     ((np.generic,), _number, False),

@@ -29,9 +29,18 @@ _PARTIALS: dict[str, Callable[..., tuple]] = {
     "less": lambda y, one, zero, a, b: (zero, zero),
     "less_equal": lambda y, one, zero, a, b: (zero, zero),
     "floor": lambda y, one, zero, x: (zero,),
+    "row": lambda y, one, zero, x: (zero,),
+    "entry": lambda y, one, zero, x: (zero,),
 }
 
-_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # leading operands: locally constant in these
+_DECIDES = {
+    "select": 1,
+    "less": 2,
+    "less_equal": 2,
+    "floor": 1,
+    "row": 1,
+    "entry": 1,
+}  # leading operands: locally constant in these
 
 
 def varying(outputs) -> list[Expression]:

@@ -11,6 +11,7 @@ from numbers import Real
 import numpy as np
 
 from gauss.codegen.expression import INDEX_OF, NUMBERS, Expression, as_number, reachable
+from gauss.codegen.lookup import LOOKUPS, Column
 from gauss.codegen.simplification import SIMPLER
 
 # Evaluation of operations of constants: these are folded.
@@ -147,6 +148,10 @@ class Graph:
             return x if condition.value else y
         return x if x is y else self._make("select", (condition, x, y))
 
+    def lookup(self, op: str, column: Column, x: Expression) -> Expression:
+        """Return an operation of a column of a table, folded; see :mod:`gauss.codegen.lookup`."""
+        return self.constant(float(LOOKUPS[op](column, x.value))) if x.is_constant else self._make(op, (x,), column)
+
     def call(self, function, arguments) -> np.ndarray:
         """Outputs of a :class:`gauss.codegen.Function` for these arguments, an object array; constant ones are numbers."""
         call = self._make("call", _passed([self.lift(argument) for argument in arguments]), function)
@@ -171,6 +176,8 @@ class Graph:
             return self.unary(node.op, *operands)
         if node.op == "select":
             return self.select(*operands)
+        if node.op in LOOKUPS:
+            return self.lookup(node.op, node.value, *operands)
         return self._make(node.op, tuple(operands), node.value)
 
     def forget(self):

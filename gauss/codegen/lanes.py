@@ -6,6 +6,8 @@ from gauss.codegen.device_module import DeviceModule, vector_width
 from gauss.codegen.elementary import elementary
 from gauss.codegen.expression import Expression
 from gauss.codegen.intrinsics import external, intrinsic
+from gauss.codegen.lookup import LOOKUPS
+from gauss.codegen.lookup_code import lookup_code
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.sincos import SinCos
 from gauss.codegen.text_builder import BIT, TextValue, written
@@ -99,7 +101,11 @@ class Lanes:
         x = [value if value.type is self.kind else self.number(value) for value in x]
         if op in ("sin", "cos"):
             return self._sincos(node, x[0])
-        return self._arithmetic(op, x)
+        return self._looked_up(node, x[0]) if op in LOOKUPS else self._arithmetic(op, x)
+
+    def _looked_up(self, node: Expression, x):
+        """Operation of a table, in double precision."""
+        return self.b.call(lookup_code(self.module, node.op, node.value, self.width), [x])
 
     def _written_constant(self, value: float) -> TextValue:
         if value not in self._constants:

@@ -18,7 +18,7 @@ from gauss.codegen.graph import Graph
 from gauss.codegen.multiply_add import fused
 
 # latencies, in units of an addition
-LATENCY = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100}
+LATENCY = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100, "row": 40, "entry": 8}
 CHAIN = frozenset({"add", "sub", "neg"})
 
 

@@ -45,6 +45,9 @@ class SingleLanes(Lanes):
             return super()._arithmetic(op, x)
         return self.b.fptrunc(super()._arithmetic(op, [self.b.fpext(value, DOUBLE) for value in x]), SINGLE)
 
+    def _looked_up(self, node: Expression, x):
+        return self.b.fptrunc(super()._looked_up(node, self.b.fpext(x, DOUBLE)), SINGLE)
+
     def _sincos(self, node: Expression, x):
         key = node.operands[0].index
         if key not in self.sincos_values:

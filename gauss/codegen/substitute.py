@@ -1,12 +1,14 @@
 """Substitution of values for symbols in expressions; what becomes constant folds."""
 
 from collections.abc import Callable
+from functools import partial
 from operator import itemgetter
 
 import numpy as np
 
 from gauss.codegen.expression import Expression, reachable
 from gauss.codegen.graph import BINARY, UNARY
+from gauss.codegen.lookup import LOOKUPS
 
 
 def substitute(outputs, symbols, values) -> np.ndarray:
@@ -57,7 +59,7 @@ def numbers_of(outputs, symbols) -> Callable[[list[float]], np.ndarray]:
         if node.op == "constant":
             fixed[node.index] = node.value
         elif operands:
-            steps.append((node.index, _function_of(node.op), itemgetter(*operands), len(operands) == 1))
+            steps.append((node.index, _function_of(node), itemgetter(*operands), len(operands) == 1))
 
     def numbers(values: list[float]) -> np.ndarray:
         known = {**fixed, **dict(zip(given, values, strict=True))}
@@ -68,10 +70,13 @@ def numbers_of(outputs, symbols) -> Callable[[list[float]], np.ndarray]:
     return numbers
 
 
-def _function_of(op: str) -> Callable[..., float]:
-    """Evaluation of an operation of numbers."""
+def _function_of(node: Expression) -> Callable[..., float]:
+    """Evaluation of the operation of a node over numbers."""
+    op = node.op
     if op == "select":
         return lambda condition, x, y: x if condition else y
+    if op in LOOKUPS:
+        return partial(LOOKUPS[op], node.value)
     if op not in BINARY and op not in UNARY:
         raise TypeError(f"cannot substitute in a {op!r}.")
     return BINARY[op] if op in BINARY else UNARY[op]
@@ -83,6 +88,8 @@ def _rebuilt(node: Expression, operands) -> Expression:
         return node
     if node.op == "select":
         return node.graph.select(*operands)
+    if node.op in LOOKUPS:
+        return node.graph.lookup(node.op, node.value, *operands)
     if node.op not in BINARY and node.op not in UNARY:
         raise TypeError(f"cannot substitute in a {node.op!r}.")
     return node.graph.binary(node.op, *operands) if node.op in BINARY else node.graph.unary(node.op, *operands)

@@ -8,7 +8,7 @@ without a branch before the end: compilers vectorise them over the angles of a m
 from collections.abc import Iterator
 from math import isinf, isnan
 
-from gauss.codegen import Expression, schedule
+from gauss.codegen import LOOKUPS, Column, Expression, schedule
 from gauss.codegen.sincos import COS, LARGEST_REDUCED_ANGLE, P1, P2, P2_TAIL, SIN, TWO_OVER_PI
 from gauss.export.exported_function import ExportedFunction
 
@@ -34,6 +34,7 @@ OPERATIONS = {
     "fnma": "GAUSS_FMA(-{}, {}, {})",
 }
 CONDITIONS = ("less", "less_equal")
+NAME_LENGTH = 16  # hexadecimal digits of the digest of a column
 LETTERS = {"sin": "s", "cos": "c"}  # of the arrays of sines and cosines
 
 
@@ -58,6 +59,18 @@ PRELUDE = f"""#ifdef FP_FAST_FMA
 #else
 #define GAUSS_FMA(x, y, z) ((x) * (y) + (z))
 #endif
+
+/* numbers of an ascending array that lie below x, by bisection */
+static inline int gauss_row(int n, const double *breaks, double x)
+{{
+    int row = 0;
+    while (n > 0) {{
+        const int half = n / 2, below = breaks[row + half] < x;
+        row += below ? half + 1 : 0;
+        n = below ? n - half - 1 : half;
+    }}
+    return row;
+}}
 
 /* sines and cosines of n angles [rad]: argument reduction of Cody and Waite, polynomials of FDLIBM */
 static inline void gauss_sincos(int n, const double *x, double *s, double *c)
@@ -97,6 +110,7 @@ class CBody:
         for symbol, place in zip(self.schedule.inputs, places, strict=True):
             self.names[symbol.index] = place
         self.angles: dict[int, str] = {}  # places of their sines and cosines
+        self.columns: set[Column] = set()  # whose arrays are written
         self.stores: dict[int, list[str]] = {}
         self.constant_stores: list[str] = []
         for place, output in zip(_places(exported.outputs), self.schedule.outputs, strict=True):
@@ -123,9 +137,23 @@ class CBody:
                 yield from self._sines([angle])
             self.names[node.index] = f"{LETTERS[node.op]}{self.angles[angle.index]}"
             return
+        if node.op in LOOKUPS:
+            yield from self._lookup(node)
+            return
         kind = "int" if node.op in CONDITIONS else "double"
         self.names[node.index] = f"x{node.index}"
         yield f"const {kind} x{node.index} = {OPERATIONS[node.op].format(*map(self._value, node.operands))};"
+
+    def _lookup(self, node: Expression) -> Iterator[str]:
+        """Statements that look up a row or an entry in a table."""
+        column, x = node.value, self._value(node.operands[0])
+        name, size = f"column_{column.digest[:NAME_LENGTH]}", column.numbers.size
+        if column not in self.columns:
+            self.columns.add(column)
+            yield f"static const double {name}[{size}] = {{{', '.join(map(c_number, column.numbers))}}};"
+        found = f"gauss_row({size}, {name}, {x})" if node.op == "row" else f"{name}[{x}]"
+        self.names[node.index] = f"x{node.index}"
+        yield f"const {'int' if node.op == 'row' else 'double'} x{node.index} = {found};"
 
     def _sines(self, angles: list[Expression]) -> Iterator[str]:
         """Sines and cosines of several angles in one call."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gauss.codegen import Expression
+from gauss.codegen import Column, Expression
 from gauss.errors import extra
 from gauss.export.exported_function import ExportedFunction, exported_functions
 from gauss.scene import Scene
@@ -94,9 +94,26 @@ def _evaluated(casadi, exported: ExportedFunction, given: list) -> list:
     for node in function.nodes:
         if node.is_constant:
             values[node.index] = casadi.SX(node.value)
+        elif node.op == "row":
+            values[node.index] = values[node.operands[0].index], node.value
+        elif node.op == "entry":
+            values[node.index] = _entry(casadi, node.value, *values[node.operands[0].index])
         elif node.op != "symbol":
             values[node.index] = operations[node.op](*(values[x.index] for x in node.operands))
     return [values[x.index] if isinstance(x, Expression) else casadi.SX(float(x)) for x in function.outputs]
+
+
+def _entry(casadi, column: Column, x, breaks: Column):
+    """Number of a column in the row of x, by a tree of selections: graphs of CasADi hold no arrays."""
+
+    def among(first: int, last: int):
+        """Number of the row, which is one from ``first`` to ``last``."""
+        if first == last:
+            return casadi.SX(float(column.numbers[first]))
+        middle = (first + last) // 2
+        return casadi.if_else(x <= float(breaks.numbers[middle]), among(first, middle), among(middle + 1, last))
+
+    return among(0, breaks.numbers.size)
 
 
 def _shaped(casadi, part: np.ndarray):

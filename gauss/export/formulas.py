@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gauss.arguments import name_list
-from gauss.codegen import Expression
+from gauss.codegen import Column, Expression
 from gauss.dynamics import compile_scene
 from gauss.errors import SimulationError, extra, require
 from gauss.export.exported_function import ExportedFunction, exported_functions
@@ -183,9 +183,20 @@ def _evaluated(sympy, exported: ExportedFunction, given: list) -> list:
     for node in function.nodes:
         if node.is_constant:
             values[node.index] = _number(sympy, node.value)
+        elif node.op == "row":
+            values[node.index] = values[node.operands[0].index], node.value
+        elif node.op == "entry":
+            values[node.index] = _entry(sympy, node.value, *values[node.operands[0].index])
         elif node.op != "symbol":
             values[node.index] = operations[node.op](*(values[x.index] for x in node.operands))
     return [values[x.index] if isinstance(x, Expression) else _number(sympy, float(x)) for x in function.outputs]
+
+
+def _entry(sympy, column: Column, x, breaks: Column):
+    """Number of a column in the row of x."""
+    numbers = [_number(sympy, float(number)) for number in column.numbers]
+    below = [x <= _number(sympy, float(one)) for one in breaks.numbers]
+    return sympy.Piecewise(*zip(numbers, [*below, True], strict=True))
 
 
 def _number(sympy, value: float):

@@ -6,7 +6,7 @@ One statement for each operation of the graph, on numbers: XLA compiles them to 
 from collections.abc import Callable, Iterator, Sequence
 from math import isfinite, isnan, prod
 
-from gauss.codegen import Expression, Function
+from gauss.codegen import LOOKUPS, Column, Expression, Function
 from gauss.errors import extra
 from gauss.export.exported_function import ExportedFunction, exported_functions
 from gauss.scene import Scene
@@ -24,6 +24,8 @@ OPERATIONS = {
     "atan2": "jnp.arctan2({}, {})",
     "min": "jnp.minimum({}, {})",
     "max": "jnp.maximum({}, {})",
+    "row": "jnp.searchsorted({1}, {0})",
+    "entry": "{1}[{0}]",
     "select": "jnp.where({} != 0, {}, {})",
 } | {op: f"jnp.{op}({{}})" for op in ("sqrt", "sin", "cos", "exp", "log", "floor")}
 
@@ -127,17 +129,22 @@ def _summary(exported: ExportedFunction) -> str:
 def _statements(function: Function) -> Iterator[str]:
     """One statement for each operation; x holds the arguments, y the outputs."""
     values = {symbol.index: f"x[{k}]" for k, symbol in enumerate(function.inputs)}
+    columns: dict[Column, str] = {}
     for node in function.nodes:
         if node.is_constant:
             values[node.index] = _number(node.value)
         elif node.op != "symbol":
             values[node.index] = f"v{node.index}"
-            yield f"v{node.index} = {OPERATIONS[node.op].format(*(values[x.index] for x in node.operands))}"
+            operands = [values[x.index] for x in node.operands]
+            if node.op in LOOKUPS and node.value not in columns:
+                columns[node.value] = f"c{len(columns)}"
+                yield f"{columns[node.value]} = jnp.array([{', '.join(map(_number, node.value.numbers))}], dtype=x.dtype)"
+            yield f"v{node.index} = {OPERATIONS[node.op].format(*operands, columns.get(node.value))}"
     found = [values[x.index] if isinstance(x, Expression) else _number(float(x)) for x in function.outputs]
     yield f"y = jnp.array([{', '.join(found)}], dtype=x.dtype)"
 
 
 def _number(value: float) -> str:
     """Literal of a number; negative ones in parentheses."""
-    found = f"{abs(value)!r}" if isfinite(value) else f"jnp.{'nan' if isnan(value) else 'inf'}"
+    found = f"{abs(float(value))!r}" if isfinite(value) else f"jnp.{'nan' if isnan(value) else 'inf'}"
     return f"(-{found})" if value < 0.0 else found

@@ -14,12 +14,12 @@ from scipy.optimize import brentq
 
 from gauss.codegen import Expression, forward, reachable
 from gauss.dynamics.laws.intervals import Interval, enclose
-from gauss.dynamics.laws.switching_times import CONDITIONS, GRADUAL, SIGN_ROUNDING, SMALL, of_time
+from gauss.dynamics.laws.levels import LEVELED, levels_of
+from gauss.dynamics.laws.switching_times import CONDITIONS, GRADUAL, SIGN_ROUNDING, SMALL, jumps, of_time
 from gauss.rotors.bernstein import NODES, PARTS, hulls
 from gauss.rotors.traced_laws import TracedLaws
 
 CURVED = ("exp", "div", "sqrt", "log", "atan2")  # operations that may be flat in one region and steep in another
-KINKS = ("min", "max")  # conditions at which a law is continuous
 POINTS = 16  # random points at which sizes of expressions are taken
 STRIDE = (len(NODES) - 1) // PARTS  # nodes of a subinterval
 
@@ -46,11 +46,11 @@ class Surfaces:
         own = laws.own | {node.index for node in of_time(outputs, laws.t)}
         comparisons, floors = _conditions(outputs, own)
         nodes = [*comparisons, *floors]
-        self.n_comparisons = len(comparisons)
+        self.n_comparisons, self.levels = len(comparisons), [levels_of(node) for node in floors]
         self.functions = [x - y for x, y in (node.operands for node in comparisons)] + [node.operands[0] for node in floors]
         self.curved = _curved(outputs, own)
         self.known = np.full(len(self.curved), np.inf), np.full(len(self.curved), -np.inf)  # range of values so far
-        self.jumps = np.array([node.op not in KINKS for node in nodes], dtype=bool)
+        self.jumps = np.array([jumps(node) for node in nodes], dtype=bool)
         self.noise = np.where(self.jumps, SIGN_ROUNDING, np.maximum(rtol, SIGN_ROUNDING))
         self.names = _discontinuous(laws, nodes)
         self.symbols = [laws.t, *laws.theta, *laws.w]
@@ -93,7 +93,7 @@ class Surfaces:
         changes = level[:, :-1] != level[:, 1:]
         straddles = (values[:, 0] < -noise) & (values[:, 1] > noise)
         floors = self.n_comparisons
-        straddles[floors:] = np.floor(values[floors:, 0]) < np.floor(values[floors:, 1])
+        straddles[floors:] = self._levels(values[floors:, 0]) < self._levels(values[floors:, 1])
         turns = ~((rates[:, 0] > 0.0) | (rates[:, 1] < 0.0))
         unclear = np.flatnonzero((straddles & turns & ~changes).any(axis=0) | hidden)
         share = (unclear[0] + 0.5) / PARTS if unclear.size else 1.0
@@ -159,7 +159,11 @@ class Surfaces:
     def _level(self, values: np.ndarray) -> np.ndarray:
         """Side of each surface: the sign of g, or its integer part."""
         below, n = self.n_comparisons, len(self.functions)
-        return np.concatenate([values[:below] < 0.0, np.floor(values[below:n])])
+        return np.concatenate([values[:below] < 0.0, self._levels(values[below:n])])
+
+    def _levels(self, values: np.ndarray) -> np.ndarray:
+        """Levels of the arguments of floors and rows, in the shape of their values."""
+        return np.array([own.at(x) for own, x in zip(self.levels, values, strict=True)]).reshape(values.shape)
 
     def _points(self, t, y) -> dict:
         given = {self.symbols[0].index: Interval.point(np.asarray(t))}
@@ -188,14 +192,14 @@ def _curved(outputs, own: set[int]) -> list[Expression]:
 
 
 def _conditions(outputs: list[Expression], own: set[int]) -> tuple[list[Expression], list[Expression]]:
-    """Comparisons, and floors, that are neither of the time alone nor of the network itself."""
+    """Comparisons, and conditions of many levels, that are neither of the time alone nor of the network itself."""
     nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in own]
-    return [node for node in nodes if node.op != "floor"], [node for node in nodes if node.op == "floor"]
+    return [node for node in nodes if node.op not in LEVELED], [node for node in nodes if node.op in LEVELED]
 
 
 def _discontinuous(laws: TracedLaws, conditions: list[Expression]) -> tuple[str, ...]:
     """Elements with laws that are discontinuous at one of the conditions."""
-    jumping = {node.index for node in conditions if node.op not in KINKS}
+    jumping = {node.index for node in conditions if jumps(node)}
     return tuple(n for n, law in laws.outputs.items() if any(node.index in jumping for node in reachable([law])))
 
 

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 from scipy.linalg import qr
 
-from gauss.codegen import Expression
+from gauss.codegen import LOOKUPS, Expression
 from gauss.export.exported_function import exported_functions
 from gauss.system import System, whole
 
@@ -39,6 +39,8 @@ class InManyDigits:
             for node in function.nodes:
                 if node.is_constant:
                     values[node.index] = mpmath.mpf(node.value)
+                elif node.op in LOOKUPS:
+                    values[node.index] = mpmath.mpf(LOOKUPS[node.op](node.value, float(values[node.operands[0].index])))
                 elif node.op != "symbol":
                     values[node.index] = OPERATIONS[node.op](*(values[x.index] for x in node.operands))
             found = [values[x.index] if isinstance(x, Expression) else mpmath.mpf(x) for x in function.outputs]

@@ -7,8 +7,7 @@ import numpy as np
 from gauss.codegen import Expression, reachable
 from gauss.dynamics.laws.constraint_functions import watched_functions
 from gauss.dynamics.laws.intervals import Interval, enclose
-from gauss.dynamics.laws.switching_functions import JUMPS
-from gauss.dynamics.laws.switching_times import of_time
+from gauss.dynamics.laws.switching_times import jumps, of_time
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SwitchingWarning, user_level
 from gauss.system import System
@@ -57,4 +56,4 @@ def _crossings(system: System, t: np.ndarray, x: np.ndarray) -> list[tuple[float
 def _conditions(outputs: list[Expression], clock: Expression) -> list[Expression]:
     """Conditions at which laws may jump, other than those of time."""
     timed = {node.index for node in of_time(outputs, clock)}
-    return [node for node in reachable(outputs) if node.op in JUMPS and node.index not in timed]
+    return [node for node in reachable(outputs) if jumps(node) and node.index not in timed]

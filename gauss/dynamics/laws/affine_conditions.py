@@ -43,25 +43,38 @@ def affine_changes(
         Conditions that are not piecewise affine.
     """
     asked = [condition for condition in conditions if isinstance(condition, Expression)]
-    pieces, times, others = _pieces(asked, clock, begin), list[float](), list[Expression]()
+    pieces, times, others = _pieces(asked, clock, begin), list[np.ndarray](), list[Expression]()
     for condition in asked:
         roots = _roots(condition, pieces)
         if roots is None:
             others.append(condition)
             continue
-        inside = [begin + root for root in roots if 0.0 <= root <= end - begin]
+        inside = begin + roots[(roots >= 0.0) & (roots <= end - begin)]
         certain = all(len(pieces[x.index]) == 1 for x in condition.operands)
-        times += inside if certain else [t for t in inside if _differs(condition, clock, t, apart)]
-    return np.array(times), others
+        times.append(inside if certain else inside[_differs(condition, clock, inside, apart)])
+    return np.concatenate([np.zeros(0), *times]), others
 
 
-def _roots(condition: Expression, pieces: dict[int, Pieces]) -> list[float] | None:
-    """Times since the begin at which a piece of one side meets one of the other [s]; None where they are not known."""
+def _roots(condition: Expression, pieces: dict[int, Pieces]) -> np.ndarray | None:
+    """Times since the begin at which a condition may change [s]; None where they are not known."""
     sides = [pieces.get(x.index) for x in condition.operands]
-    if condition.op not in COMPARISONS or not all(sides):
+    if not all(sides):
         return None
+    if condition.op == "row":
+        return _crossings(condition.value.numbers, sides[0])  # type: ignore[arg-type]  # it is not None
+    found = _intersections(sides) if condition.op in COMPARISONS else None
+    return None if found is None else np.array(found)
+
+
+def _crossings(breaks: np.ndarray, x: Pieces) -> np.ndarray:
+    """Times since the begin at which a piece meets a break [s]."""
+    return np.concatenate([np.zeros(0), *((breaks - value) / slope for value, slope in x if slope)])
+
+
+def _intersections(sides: list) -> list[float] | None:
+    """Times since the begin at which a piece of one side meets one of the other [s]; None where they are not known."""
     found = []
-    for (x, x_slope), (y, y_slope) in product(*sides):  # type: ignore[arg-type]  # none of them is None
+    for (x, x_slope), (y, y_slope) in product(*sides):
         slope, size = x_slope - y_slope, max(abs(x_slope), abs(y_slope))
         if abs(slope) > SAME_SLOPE * size:
             found.append((y - x) / slope)
@@ -70,7 +83,15 @@ def _roots(condition: Expression, pieces: dict[int, Pieces]) -> list[float] | No
     return found
 
 
-def _differs(condition: Expression, clock: Expression, t: float, apart: float) -> bool:
+def _differs(condition: Expression, clock: Expression, times: np.ndarray, apart: float) -> np.ndarray:
+    """Whether a condition differs just before and just after each of some times (k,) [s]."""
+    if condition.op == "row":
+        before, after = (enclose([condition], {clock.index: Interval.point(times + x)})[0].low for x in (-apart, apart))
+        return np.broadcast_to(before != after, times.shape)
+    return np.array([_differs_at(condition, clock, float(t), apart) for t in times], dtype=bool)
+
+
+def _differs_at(condition: Expression, clock: Expression, t: float, apart: float) -> bool:
     """Whether a condition differs just before and just after a time [s]."""
     try:
         value = numbers_of([condition], [clock])

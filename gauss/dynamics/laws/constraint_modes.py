@@ -18,6 +18,7 @@ from gauss.codegen import Expression, Function, Graph, reachable, substitute
 from gauss.dynamics.gap_functions import stacked_rows
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.branch_cuts import ON_CUT, TRIED, inlined, met_from, residuals, symbols_of, unfolded_system
+from gauss.dynamics.laws.levels import LEVELED, Levels, levels_of
 from gauss.dynamics.laws.switching_times import CONDITIONS, of_time
 from gauss.dynamics.projection import scalar_coordinates
 from gauss.dynamics.store import cached
@@ -61,6 +62,38 @@ class OneMode(Relation):
         return inlined(self.whole, at, smooth)
 
 
+class Condition(NamedTuple):
+    """A condition, by the difference of its two sides, or the argument of a floor or of a row."""
+
+    op: str
+    levels: Levels | None
+
+    @classmethod
+    def of(cls, node: Expression) -> "Condition":
+        """Condition of a node."""
+        return cls(node.op, levels_of(node) if node.op in LEVELED else None)
+
+    def holds(self, side: float) -> float:
+        """Value: for min and max, whether it is the first operand."""
+        if self.levels is not None:
+            return float(self.levels.at(side))
+        return float({"less": side < 0.0, "min": side < 0.0, "less_equal": side <= 0.0, "max": side > 0.0}[self.op])
+
+    def margin(self, side: float, value: float) -> float:
+        """Distance from where a value changes, negative beyond it."""
+        if self.levels is not None:
+            low, high = self.levels.borders(value)
+            return float(min(side - low, high - side))
+        return float(side if (self.op == "max") == bool(value) else -side)
+
+    def beyond(self, side: float, value: float) -> float:
+        """Value on the other side of the nearest place where it changes."""
+        if self.levels is None:
+            return 1.0 - value
+        low, high = self.levels.borders(value)
+        return value + (1.0 if high - side < side - low else -1.0)
+
+
 class Step(NamedTuple):
     """What residuals do across a surface between two modes.
 
@@ -87,14 +120,14 @@ class ConstraintModes:
     """
 
     def __init__(self, system: System):
-        self.system, self.counts, self.ops, self.about = system, dict[str, int](), list[str](), list[str]()
+        self.system, self.counts, self.ops, self.about = system, dict[str, int](), list[Condition](), list[str]()
         for name, relation in system.scene.relations.items():
             own = Symbols(system, Graph())
             nodes = _conditions(residuals(relation, own), own)
             if not nodes or relation.loses:
                 continue
             self.counts[name] = len(nodes)
-            self.ops += [node.op for node in nodes]
+            self.ops += map(Condition.of, nodes)
             self.about += [_about(system, own, node) for node in nodes]
         self.names = tuple(self.counts)
 
@@ -112,7 +145,7 @@ class ConstraintModes:
         for name, values in self._parts(mode).items():
             own = Symbols(self.system, Graph())
             nodes = _conditions(residuals(self.system.scene.relations[name], own), own)
-            found = [node.operands[0] if node.op == "floor" else node.operands[0] - node.operands[1] for node in nodes]
+            found = [node.operands[0] if node.op in LEVELED else node.operands[0] - node.operands[1] for node in nodes]
             if mode is not None:
                 found = list(substitute(found, nodes, _values(nodes, values)))
             sides += list(Function("sides", symbols_of(own), found).inlined(np.array(_same(own, view), dtype=object)))
@@ -130,23 +163,22 @@ class ConstraintModes:
 
     def mode(self, state: State) -> Mode:
         """Mode of a state."""
-        return tuple(_holds(op, side) for op, side in zip(self.ops, self.sides(state), strict=True))
+        return tuple(op.holds(side) for op, side in zip(self.ops, self.sides(state), strict=True))
 
     def margins(self, state: State, mode: Mode) -> np.ndarray:
         """Distance of every condition from its change, on the motion of a mode, negative beyond it, (k,)."""
         pairs = zip(self.ops, self.sides(state, mode), mode, strict=True)
-        return np.array([_margin(op, side, value) for op, side, value in pairs])
+        return np.array([op.margin(side, value) for op, side, value in pairs])
 
     def beyond(self, state: State, mode: Mode, which: tuple[int, ...]) -> Mode:
         """Mode on the other side of the surfaces of some conditions, near a state."""
         other, sides = list(mode), self.sides(state, mode)
         for k in which:
-            floor = mode[k] + (1.0 if sides[k] > mode[k] + 0.5 else -1.0)
-            other[k] = floor if self.ops[k] == "floor" else 1.0 - mode[k]
+            other[k] = self.ops[k].beyond(sides[k], mode[k])
         for k in range(len(other)):  # conditions on what has jumped follow, as that of |x − floor(x)|
             after = self.sides(state, tuple(other))
             if k not in which and abs(after[k] - sides[k]) > CONTINUOUS * self.sizes[k]:
-                other[k] = _holds(self.ops[k], after[k])
+                other[k] = self.ops[k].holds(after[k])
         return tuple(other)
 
     def system_of(self, mode: Mode) -> System:
@@ -310,19 +342,6 @@ def _chosen(node: Expression, value: float, nodes: list[Expression], values: lis
     if node.op not in ("min", "max"):
         return value
     return substitute([node.operands[0 if value else 1]], nodes, values)[0]
-
-
-def _holds(op: str, side: float) -> float:
-    """Value of a condition: for min and max, whether it is the first operand."""
-    if op == "floor":
-        return float(np.floor(side))
-    return float({"less": side < 0.0, "min": side < 0.0, "less_equal": side <= 0.0, "max": side > 0.0}[op])
-
-
-def _margin(op: str, side: float, value: float) -> float:
-    if op == "floor":
-        return float(min(side - value, value + 1.0 - side))
-    return float(side if (op == "max") == bool(value) else -side)
 
 
 def _terms(motion: Kinematics) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Scalar
 from gauss.dynamics.laws.intervals import Interval
+from gauss.dynamics.laws.levels import Levels
 from gauss.system import State, System, coordinate_rates
 
 PARTS = 8  # subintervals of a step
@@ -79,16 +80,14 @@ def may_turn(rate: Interval | None) -> Scalar:
     return 1.0 if rate is None else math.where(rate.low > 0.0, 0.0, math.where(rate.high < 0.0, 0.0, 1.0))
 
 
-def sign_changes(value: Interval, before: Scalar, after: Scalar, noise: Scalar | None) -> tuple[Scalar, Scalar]:
+def sign_changes(value: Interval, before: Scalar, after: Scalar, noise: Scalar | Levels) -> tuple[Scalar, Scalar]:
     """Number of changes between the ends of a subinterval, and whether the enclosure straddles a switching value.
 
-    Without ``noise``, the round-off of a sign, every whole number is one.
+    In place of ``noise``, the round-off of a sign, levels have many such values.
     """
-    if noise is None:
-        level = math.floor(before)
-        return math.minimum(math.abs(math.floor(after) - level), 2.0), math.where(
-            math.floor(value.low) < math.floor(value.high), 1.0, 0.0
-        )
+    if isinstance(noise, Levels):
+        changes = math.minimum(math.abs(noise.at(after) - noise.at(before)), 2.0)
+        return changes, math.where(noise.at(value.low) < noise.at(value.high), 1.0, 0.0)
     changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
     return changes, math.where(value.low < -noise, math.where(value.high > noise, 1.0, 0.0), 0.0)
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Expression, reachable
+from gauss.codegen import LOOKUPS, Column, Expression, looked_up, reachable
 
 UNBOUNDED = 1e150  # in place of infinity: its square is finite, and its product with zero is zero
 
@@ -90,7 +90,23 @@ def _operation(node: Expression, x: list):
         return enclose(node.value.outputs, own)
     if node.op == "item":
         return x[0][node.value]
+    if node.op in LOOKUPS:
+        return (_row if node.op == "row" else _entry)(node.value, *x)
     return Interval.point(node.value) if node.op == "constant" else OPERATIONS[node.op](*x)
+
+
+def _row(breaks: Column, x: Interval) -> Interval:
+    return Interval(*(looked_up("row", breaks, end) for end in x))
+
+
+def _entry(column: Column, row: Interval) -> Interval:
+    """Range of a column from one row to another; in code, that of all of them where they are more than two."""
+    if not any(isinstance(end, Expression) for end in row):
+        return Interval(*(end[()] for end in column.extent(*row)))
+    ends = [looked_up("entry", column, end) for end in row]
+    apart = row.high - row.low < 1.5
+    low = math.where(apart, math.minimum(*ends), float(column.numbers.min()))
+    return Interval(low, math.where(apart, math.maximum(*ends), float(column.numbers.max())))
 
 
 def _monotone(function):

@@ -7,12 +7,11 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.prescribed_jumps import RELATIVE, SMOOTH, generic_state
 from gauss.dynamics.laws.sampled_laws import law_of_time
-from gauss.dynamics.laws.switching_times import APART
+from gauss.dynamics.laws.switching_times import APART, jumps
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.scene.values import ConstantLaw
 from gauss.system import State, System
 
-JUMPS = ("less", "less_equal", "floor")  # all other operations are continuous where a law switches
 BESIDE = np.array([-2.0, -1.0, 1.0, 2.0])  # places of samples beside a switching time, in distances of ends of steps
 TOGETHER = 32  # switching times: all operations of a law are kept for each
 
@@ -27,7 +26,7 @@ def first_jump(system: System, laws: Laws, start: State, end: float, times: np.n
 
 
 def _traced(system: System, laws: Laws, start: State, times: np.ndarray, apart: float) -> float:
-    if laws.motion is None or not any(node.op in JUMPS for node in reachable(laws.outputs)):
+    if laws.motion is None or not any(map(jumps, reachable(laws.outputs))):
         return np.inf
     states = start, generic_state(system, start)
     for first in range(0, times.size, TOGETHER):

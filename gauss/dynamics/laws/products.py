@@ -13,6 +13,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Expression, Scalar, reachable
 from gauss.dynamics.laws.intervals import UNBOUNDED, Interval, enclose
+from gauss.dynamics.laws.switching_times import jumps
 
 PEAK = 2.5  # rise of ln |f| within a subinterval that stages may not resolve
 HIGH = 6.0  # power of a base from which on its product is flat near zeros of the base and narrow at its top
@@ -158,7 +159,7 @@ def _steep(powers: Counter, known: set[int]) -> dict[tuple[Expression, bool], fl
 
 def _is_smooth(base: Expression) -> bool:
     """Whether the rate of a base bounds its changes, for it does not jump."""
-    return not any(node.op in ("less", "less_equal", "floor") for node in reachable([base]))
+    return not any(map(jumps, reachable([base])))
 
 
 def _base(x: Expression, known: set[int]) -> Counter:

@@ -29,15 +29,15 @@ from gauss.dynamics.laws.enclosed_parts import (
 )
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.kink_error import kink_error, kink_factor
+from gauss.dynamics.laws.levels import LEVELED, leveled
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
 from gauss.dynamics.laws.products import Products
-from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, timed_nodes
+from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, jumps, timed_nodes
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import cached
 from gauss.integrators import Point, Tolerance
 from gauss.system import State, System, coordinate_rates, coordinate_units
 
-JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
 POINTS = 5  # random points at which switching functions are compared
 SHORT, ONWARD = 6.0, 1e6  # smallest steps that may cross a surface undivided, and growth of the step after such a one
 TRIES = 40.0  # consecutive rejections, after which the crossing is shorter than the resolution of time
@@ -80,7 +80,7 @@ class SwitchingFunctions:
         nodes = [node for node in every if node.op in CONDITIONS and node.index not in timed]
         self.pairs = self._distinct(_compared(nodes))
         self.noise = self._rounding()
-        self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
+        self.steps, self.levels = leveled(nodes)
         self.jumps = [_jumps(x) for x in (*starmap(sub, self.pairs), *self.steps)]
         self.peaks, self.phases = (_arguments(every, timed, *ops) for ops in (("exp",), ("sin", "cos")))
         self.products = Products(outputs, timed)
@@ -138,7 +138,8 @@ class SwitchingFunctions:
             apart = [abs(one.low - other.low) for one, other in zip(sides[::2], sides[1::2], strict=True)]
             steps = [float(value.low) for value in enclose(self.steps, given)]
         met = (np.array(apart) <= SIGN_ROUNDING * np.array(size) + self.noise).any()
-        return bool(met) or any(abs(x - round(x)) <= SIGN_ROUNDING * abs(x) for x in steps if np.isfinite(x))
+        found = [(x, own) for x, own in zip(steps, self.levels, strict=True) if np.isfinite(x)]
+        return bool(met) or any(abs(x - own.nearest(x)) <= SIGN_ROUNDING * abs(x) for x, own in found)
 
     def share(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> tuple[Scalar, Scalar, Scalar]:
         """Share of a step without undetected crossings, 1 for all of it; number and place of detected crossings.
@@ -169,7 +170,7 @@ class SwitchingFunctions:
             middle = (j + 0.5) / PARTS
             hidden = hidden_peaks((ends[j][conditions:], ends[j + 1][conditions:]), tops[j], highest, hidden, middle)
             for k, value in enumerate(values[:conditions]):
-                noise = SIGN_ROUNDING * size[k] + self.noise[k] if k < len(self.pairs) else None
+                noise = SIGN_ROUNDING * size[k] + self.noise[k] if k < len(self.pairs) else self.levels[k - len(self.pairs)]
                 changes, straddles = sign_changes(value, ends[j][k], ends[j + 1][k], noise)
                 turns = may_turn(rates[k] if rates else None)
                 for jump in islice(jumping, len(self.jumps[k])):
@@ -317,7 +318,7 @@ class SwitchingFunctions:
 
 def _compared(nodes: list[Expression]) -> list:
     """Sides of every comparison, each pair once."""
-    return list(dict.fromkeys(node.operands for node in nodes if node.op != "floor"))
+    return list(dict.fromkeys(node.operands for node in nodes if node.op not in LEVELED))
 
 
 def _names(laws: TracedFunctions, nodes: set[int]) -> tuple[str, ...]:
@@ -327,8 +328,8 @@ def _names(laws: TracedFunctions, nodes: set[int]) -> tuple[str, ...]:
 
 
 def _jumps(x: Expression) -> list[Expression]:
-    """Discontinuous nodes of an expression."""
-    return [node for node in reachable([x]) if node.op in JUMPS]
+    """Discontinuous nodes of an expression, on whose value its rate bounds nothing."""
+    return [node for node in reachable([x]) if jumps(node)]
 
 
 def _intervals(ends) -> list[Interval]:

@@ -15,7 +15,8 @@ from gauss.dynamics.laws.affine_conditions import affine_changes
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.step_sampling import LawOfTime, coarse_steps, laws_of_time
 
-CONDITIONS = ("less", "less_equal", "min", "max", "floor")
+CONDITIONS = ("less", "less_equal", "min", "max", "floor", "row")
+JUMPS = ("less", "less_equal", "floor")  # conditions at which values jump; all other operations are continuous
 SIGN_ROUNDING = 1e-13  # relative to the terms of a switching function: smaller values have no sign
 CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # operations with features that samples may miss
 CELLS, PARTS = 64, 8  # initial cells of the bisection, and parts into which it divides one
@@ -167,8 +168,13 @@ def _degrees(nodes, clock: Expression) -> dict[int, float]:
         elif node.op in ("mul", "div"):
             found[node.index] = sum(x) if node.op == "mul" or x[1] == 0.0 else np.inf
         else:
-            found[node.index] = 0.0 if node.op in CONDITIONS else np.inf
+            found[node.index] = 0.0 if node.op in (*CONDITIONS, "entry") else np.inf
     return found
+
+
+def jumps(node: Expression) -> bool:
+    """Whether values may jump where a condition changes."""
+    return node.op in JUMPS or (node.op == "row" and node.value.jumps)
 
 
 def _condition(node: Expression) -> Expression:
