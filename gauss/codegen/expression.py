@@ -43,7 +43,11 @@ class Expression:
     __slots__ = ("graph", "index", "is_constant", "op", "operands", "value")
 
     def __init__(self, graph: "Graph", op: str, operands: tuple, value, index: int):
-        self.graph, self.op, self.operands, self.value, self.index = graph, op, operands, value, index
+        self.graph = graph  # one by one: no tuple in between, for this is much of tracing
+        self.op = op
+        self.operands = operands
+        self.value = value
+        self.index = index
         self.is_constant = op == "constant"
 
     def __repr__(self):

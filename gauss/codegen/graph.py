@@ -11,7 +11,7 @@ from numbers import Real
 import numpy as np
 
 from gauss.codegen.expression import INDEX_OF, NUMBERS, Expression, as_number, reachable
-from gauss.codegen.simplification import SIMPLER
+from gauss.codegen.simplification import SIMPLER, SIMPLIFIED
 
 # Evaluation of operations of constants: these are folded.
 UNARY: dict[str, Callable[[float], float]] = {
@@ -130,12 +130,13 @@ class Graph:
 
     def binary(self, op: str, x: Expression, y: Expression) -> Expression:
         """Return op(x, y), folded."""
-        if x.is_constant and y.is_constant:
-            value = BINARY[op](x.value, y.value)  # most often zero with zero
-            return x if value == x.value else y if value == y.value else self.constant(value)
-        simplified = SIMPLER.get(op)
-        if simplified is not None and (simpler := simplified(self, x, y)) is not None:
-            return simpler
+        if x.op in SIMPLIFIED or y.op in SIMPLIFIED or x is y:  # no rule looks at other operands
+            if x.is_constant and y.is_constant:
+                value = BINARY[op](x.value, y.value)  # most often zero with zero
+                return x if value == x.value else y if value == y.value else self.constant(value)
+            simplified = SIMPLER.get(op)
+            if simplified is not None and (simpler := simplified(self, x, y)) is not None:
+                return simpler
         if x.index > y.index and op in COMMUTATIVE:
             x, y = y, x
         return self._make(op, (x, y))
@@ -181,10 +182,16 @@ class Graph:
         self.nodes, self._known, self._constants = [None] * len(self.nodes), {}, {}  # type: ignore[list-item]
 
     def _make(self, op: str, operands: tuple, value=None) -> Expression:
-        key = (op, value, *map(INDEX_OF, operands))
+        if len(operands) == 2:  # the key without its overhead
+            x, y = operands
+            key: tuple = (op, value, x.index, y.index)
+        else:
+            key = (op, value, *map(INDEX_OF, operands))
         node = self._known.get(key)
         if node is None:
-            node = self._known[key] = self._new(op, operands, value)
+            nodes = self.nodes
+            node = self._known[key] = Expression(self, op, operands, value, len(nodes))
+            nodes.append(node)
         return node
 
     def _new(self, op: str, operands: tuple, value) -> Expression:

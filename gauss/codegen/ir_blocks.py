@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 
 import numpy as np
 from llvmlite import ir
@@ -107,8 +108,11 @@ def output_writer(lanes: Lanes, target, stride):
     return lambda k, value: lanes.store(value, target, _offset(lanes, stride, k))
 
 
+_integer = lru_cache(maxsize=4096)(INTEGER)  # constants, made once
+
+
 def _offset(lanes: Lanes, stride, k: int):
-    return INTEGER(stride.constant * k) if isinstance(stride, ir.Constant) else lanes.b.mul(stride, INTEGER(k))
+    return _integer(stride.constant * k) if isinstance(stride, ir.Constant) else lanes.b.mul(stride, _integer(k))
 
 
 def strip_mined_loop(b: ir.IRBuilder, start, count, width: int, body):

@@ -9,13 +9,16 @@ from typing import NamedTuple
 
 from llvmlite import ir
 
-BIT, INTEGER = ir.IntType(1), ir.IntType(64)
+BIT, INTEGER, DOUBLE = ir.IntType(1), ir.IntType(64), ir.DoubleType()
 ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "one"}
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
 
 
+NEW = tuple.__new__  # of a named tuple, without the overhead of its own
+
+
 class TextValue(NamedTuple):
-    """Result of an instruction: what llvmlite asks of an operand, and its type and name as they stand in the text."""
+    """Result of an instruction: what llvmlite asks of an operand, and its name without and with its type in the text."""
 
     type: ir.Type
     reference: str
@@ -33,11 +36,17 @@ class TextBuilder(ir.IRBuilder):
         super().__init__(block)
         self._numbers = block.function.__dict__.setdefault("numbers_of_values", count())  # one sequence for all builders
         self._called: dict[str, str] = {}  # beginning of the calls of each function
+        self._arguments = {id(x): f"{x.type} {x.get_reference()}" for x in block.function.args}  # of the function
 
     def _value(self, kind: ir.Type, text: str) -> TextValue:
+        return self.written(kind, "double " if kind is DOUBLE else f"{kind} ", text)
+
+    def written(self, kind: ir.Type, kind_text: str, text: str) -> TextValue:
+        """Result of an instruction that is written already, for callers that know its type as text."""
         name = f"%t{next(self._numbers)}"
-        self._line(f"{name} = {text}")
-        return TextValue(kind, name, f"{kind} {name}")
+        self._block.instructions.insert(self._anchor, f"{name} = {text}")
+        self._anchor += 1
+        return NEW(TextValue, (kind, name, kind_text + name))
 
     def _line(self, text: str):
         self._block.instructions.insert(self._anchor, text)
@@ -97,6 +106,8 @@ class TextBuilder(ir.IRBuilder):
     def load(self, ptr, name="", align=None, typ=None) -> TextValue:
         """Value in memory."""
         kind = typ or ptr.type.pointee
+        if kind is DOUBLE and align is None:  # most of them
+            return self.written(kind, "double ", f"load double, {_typed(ptr)}")
         return self._value(kind, f"load {kind}, {_typed(ptr)}{_aligned(align)}")
 
     def store(self, value, ptr, align=None):
@@ -107,7 +118,9 @@ class TextBuilder(ir.IRBuilder):
         """Address of an element of an array of numbers."""
         if source_etype is not None or inbounds or len(indices) != 1:
             return super().gep(ptr, indices, inbounds, name, source_etype)
-        return self._value(ptr.type, f"getelementptr {ptr.type.pointee}, {_typed(ptr)}, {_index(indices[0])}")
+        typed = self._arguments.get(id(ptr)) or _typed(ptr)
+        begin = typed[: typed.rindex(" ") + 1]  # its type
+        return self.written(ptr.type, begin, f"getelementptr {ptr.type.pointee}, {typed}, {_index(indices[0])}")
 
     def call(self, fn, args, name="", **how):
         """Call a function."""
@@ -134,7 +147,7 @@ def _typed(value) -> str:
 
 
 def _index(value) -> str:
-    return f"{INTEGER} {value.constant}" if type(value) is ir.Constant and value.type is INTEGER else _typed(value)
+    return f"i64 {value.constant}" if type(value) is ir.Constant and value.type is INTEGER else _typed(value)
 
 
 def _aligned(align: int | None) -> str:
