@@ -21,13 +21,13 @@ LARGEST_ON_STACK = 8192  # entries of a buffer; stacks of threads may be as smal
 
 
 def begin_function(module: ir.Module, name: str, width: int, kind: ir.FunctionType = BODY) -> tuple[ir.Function, Lanes]:
-    """Begin a function of :data:`BODY` for one vector width; its arrays do not overlap."""
+    """Begin a function of :data:`BODY`, of one block, for one vector width; its arrays do not overlap."""
     body = ir.Function(module, kind, name=name)
     body.linkage = "internal"
     for argument in body.args:
         if argument.type == POINTER:
             argument.add_attribute("noalias")
-    b = TextBuilder(body.append_basic_block("entry"))
+    b = TextBuilder(body.append_basic_block("entry"), is_only_block=True)
     if width > 1:
         _at_a_page(b)
     return body, SingleLanes(module, b) if isinstance(module, SingleDeviceModule) else Lanes(module, width, b)
