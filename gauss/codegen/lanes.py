@@ -91,22 +91,27 @@ class Lanes:
 
     def operation(self, node: Expression, values):
         """Result of a node from the values of its operands."""
-        b, op, kind = self.b, node.op, self.kind
+        op, kind = node.op, self.kind
         if op in ARITHMETIC:  # the most frequent ones are written without detours
             one, other = node.operands
             one, other = values[one.index], values[other.index]
             if type(one) is TextValue is type(other) and one.type is kind is other.type:
                 text = self._kind_text
-                return b.written(kind, text, f"{ARITHMETIC[op]} {text}{one.reference}, {other.reference}")
+                return self.b.written(kind, text, f"{ARITHMETIC[op]} {text}{one.reference}, {other.reference}")
         elif op == "constant":
             return self._written_constant(float(node.value))
         x = [values[operand.index] for operand in node.operands]
         if op in FUSED and all([type(value) is TextValue and value.type is kind for value in x]):
             return self._written_fused(op, *x)
+        return self._general(node, x)
+
+    def _general(self, node: Expression, x: list):
+        """Result of any operation on operands of any kind."""
+        b, op = self.b, node.op
         if op == "select":
             condition = x[0] if _is_condition(x[0]) else b.fcmp_unordered("!=", x[0], self.constant(0.0))
             return b.select(condition, self.number(x[1]), self.number(x[2]))
-        x = [value if value.type is kind else self.number(value) for value in x]
+        x = [value if value.type is self.kind else self.number(value) for value in x]
         if op in ("sin", "cos"):
             return self._sincos(node, x[0])
         return self._arithmetic(op, x)

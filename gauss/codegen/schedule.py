@@ -53,6 +53,11 @@ class _Reassociation:
         once = _used_once(nodes, function.outputs)
         self.products = {x.index for x in once if x.op == "mul"}
         sums, absorbed = _sums(nodes, self.products, {x.index for x in once if x.op in CHAIN})
+        self._rewrite(nodes, sums, absorbed)
+        self.outputs = [self.new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
+
+    def _rewrite(self, nodes, sums: dict, absorbed: set):
+        """Write the nodes into the new graph, the sums by their terms."""
         new, copy, binary = self.new, self.graph.copy, self.graph.binary
         for node in nodes:
             index, operands = node.index, node.operands
@@ -65,7 +70,6 @@ class _Reassociation:
                 new[index] = binary(node.op, new[x.index], new[y.index])
             else:
                 new[index] = copy(node, [new[x.index] for x in operands])
-        self.outputs = [new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
 
     def depth_first(self) -> list[Expression]:
         """Nodes on which the outputs depend, each right after its operands."""

@@ -11,6 +11,7 @@ from llvmlite import ir
 
 BIT, INTEGER, DOUBLE = ir.IntType(1), ir.IntType(64), ir.DoubleType()
 ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "one"}
+SIGNED = {"<": "slt", "<=": "sle", ">": "sgt", ">=": "sge", "==": "eq", "!=": "ne"}
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
 
 
@@ -89,17 +90,37 @@ class TextBuilder(ir.IRBuilder):
         """Product of integers."""
         return self._binary("mul", lhs, rhs, flags)
 
+    def add(self, lhs, rhs, name="", flags=()) -> TextValue:
+        """Sum of integers."""
+        return self._binary("add", lhs, rhs, flags)
+
+    def sub(self, lhs, rhs, name="", flags=()) -> TextValue:
+        """Difference of integers."""
+        return self._binary("sub", lhs, rhs, flags)
+
+    def icmp_signed(self, cmpop, lhs, rhs, name="") -> TextValue:
+        """Comparison of signed integers."""
+        return self._compared("icmp", SIGNED[cmpop], lhs, rhs, ())
+
+    def extract_element(self, vector, idx, name="") -> TextValue:
+        """Element of a vector."""
+        return self._value(vector.type.element, f"extractelement {_typed(vector)}, {_typed(idx)}")
+
+    def insert_element(self, vector, value, idx, name="") -> TextValue:
+        """Vector with another element."""
+        return self._value(vector.type, f"insertelement {_typed(vector)}, {_typed(value)}, {_typed(idx)}")
+
     def fcmp_ordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is false where an operand is not a number."""
-        return self._compared(ORDERED[cmpop], lhs, rhs, flags)
+        return self._compared("fcmp", ORDERED[cmpop], lhs, rhs, flags)
 
     def fcmp_unordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is true where an operand is not a number."""
-        return self._compared(UNORDERED[cmpop], lhs, rhs, flags)
+        return self._compared("fcmp", UNORDERED[cmpop], lhs, rhs, flags)
 
-    def _compared(self, operation: str, x, y, flags) -> TextValue:
+    def _compared(self, compare: str, operation: str, x, y, flags) -> TextValue:
         kind = ir.VectorType(BIT, x.type.count) if isinstance(x.type, ir.VectorType) else BIT
-        return self._value(kind, f"{_flagged('fcmp', flags)} {operation} {_typed(x)}, {y.get_reference()}")
+        return self._value(kind, f"{_flagged(compare, flags)} {operation} {_typed(x)}, {y.get_reference()}")
 
     def select(self, cond, lhs, rhs, name="", flags=()) -> TextValue:
         """One of two values."""
