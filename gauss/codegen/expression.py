@@ -22,16 +22,21 @@ INDEX_OF, OPERANDS_OF = attrgetter("index"), attrgetter("operands")  # of a node
 def _operation(op: str, swapped: bool = False) -> Callable:
     """Method for an operation of two operands: one call less than by a common method, for it is most of tracing."""
 
+    keeps_zero = op in ("add", "sub", "mul")
+
     def operate(self, other):
         first, graph = self, self.graph
         if type(other) is float:
-            other = graph.constant(other)
+            known = graph.constants.get(other)
+            other = graph.constant(other) if known is None else known
         elif type(other) is not Expression or other.graph is not graph:
             if not isinstance(other, OPERANDS):
                 return NotImplemented
             if isinstance(other, Expression) and graph.precedes(other.graph):
                 graph, first = other.graph, other.graph.lift(self)
             other = graph.lift(other)
+        if first is other and keeps_zero and first is graph.zero:  # half of all operations of a mechanism
+            return first
         return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
 
     return operate

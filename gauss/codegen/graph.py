@@ -35,6 +35,13 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "less_equal": lambda x, y: float(x <= y),
 }
 COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
+# Operations on zero and another expression: what folding and the rules of simplification give, sooner; or None. The product
+# of zero and a constant is not a number where that is infinite.
+WITH_ZERO: dict[str, Callable[[Expression, Expression, Expression], Expression | None]] = {
+    "add": lambda zero, x, y: y if x is zero else x,
+    "sub": lambda zero, x, y: x if y is zero else None,
+    "mul": lambda zero, x, y: None if x.is_constant and y.is_constant else zero,
+}
 
 
 class Graph:
@@ -49,6 +56,13 @@ class Graph:
     shared : bool
         Whether its symbols are parameters: its expressions may enter any other graph, where a symbol becomes the value set
         by :meth:`bind`, or a further input.
+
+    Attributes
+    ----------
+    constants : dict
+        Node of each number so far.
+    zero : Expression or None
+        Node of zero, once there is one.
     """
 
     def __init__(self, early: "Graph | None" = None, shared: bool = False):
@@ -58,7 +72,8 @@ class Graph:
         self._entered: dict[Expression, Expression] = {}
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
-        self._constants: dict[float | Real, Expression] = {}
+        self.constants: dict[float | Real, Expression] = {}
+        self.zero: Expression | None = None  # the constant, once it is made
 
     def symbol(self, name: str) -> Expression:
         """Return the input of this name."""
@@ -70,10 +85,12 @@ class Graph:
 
     def constant(self, value: float | Real) -> Expression:
         """Return the node of a number."""
-        node = self._constants.get(value)
+        node = self.constants.get(value)
         if node is None:
             value = float(value) + 0.0  # −0 and 0 are one
-            node = self._constants[value] = self._new("constant", (), value)
+            node = self.constants[value] = self._new("constant", (), value)
+            if value == 0.0:
+                self.zero = node
         return node
 
     def lift(self, value) -> Expression:
@@ -130,6 +147,10 @@ class Graph:
 
     def binary(self, op: str, x: Expression, y: Expression) -> Expression:
         """Return op(x, y), folded."""
+        zero = self.zero  # two of three operations of a mechanism have an operand that is zero
+        if (x is zero or y is zero) and (simple := WITH_ZERO.get(op)) is not None:
+            if (folded := simple(zero, x, y)) is not None:
+                return folded
         if x.op in SIMPLIFIED or y.op in SIMPLIFIED or x is y:  # no rule looks at other operands
             if x.is_constant and y.is_constant:
                 value = BINARY[op](x.value, y.value)  # most often zero with zero
@@ -179,7 +200,8 @@ class Graph:
 
         A node that is made again later is another one.
         """
-        self.nodes, self._known, self._constants = [None] * len(self.nodes), {}, {}  # type: ignore[list-item]
+        self.nodes, self._known, self.constants = [None] * len(self.nodes), {}, {}  # type: ignore[list-item]
+        self.zero = None
 
     def _make(self, op: str, operands: tuple, value=None) -> Expression:
         if len(operands) == 2:  # the key without its overhead
