@@ -160,7 +160,8 @@ def _content_of(paths: list[str]) -> bytes:
     total = hashlib.sha256()
     for path in paths:
         content = _bytes_of(f"{FOLDER}/{path}")
-        total.update(b"%s\0%d\0%s" % (path.encode(), len(content), content))
+        total.update(b"%s\0%d\0" % (path.encode(), len(content)))
+        total.update(content)
     return total.digest()
 
 

@@ -22,16 +22,21 @@ INDEX_OF, OPERANDS_OF = attrgetter("index"), attrgetter("operands")  # of a node
 def _operation(op: str, swapped: bool = False) -> Callable:
     """Method for an operation of two operands: one call less than by a common method, for it is most of tracing."""
 
+    keeps_zero = op in ("add", "sub", "mul")
+
     def operate(self, other):
         first, graph = self, self.graph
         if type(other) is float:
-            other = graph.constant(other)
+            known = graph.constants.get(other)
+            other = graph.constant(other) if known is None else known
         elif type(other) is not Expression or other.graph is not graph:
             if not isinstance(other, OPERANDS):
                 return NotImplemented
             if isinstance(other, Expression) and graph.precedes(other.graph):
                 graph, first = other.graph, other.graph.lift(self)
             other = graph.lift(other)
+        if first is other and keeps_zero and first is graph.zero:  # half of all operations of a mechanism
+            return first
         return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
 
     return operate
@@ -43,7 +48,11 @@ class Expression:
     __slots__ = ("graph", "index", "is_constant", "op", "operands", "value")
 
     def __init__(self, graph: "Graph", op: str, operands: tuple, value, index: int):
-        self.graph, self.op, self.operands, self.value, self.index = graph, op, operands, value, index
+        self.graph = graph  # one by one: no tuple in between, for this is much of tracing
+        self.op = op
+        self.operands = operands
+        self.value = value
+        self.index = index
         self.is_constant = op == "constant"
 
     def __repr__(self):

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen.expression import INDEX_OF, NUMBERS, Expression, as_number, reachable
 from gauss.codegen.lookup import LOOKUPS, Column
-from gauss.codegen.simplification import SIMPLER
+from gauss.codegen.simplification import SIMPLER, SIMPLIFIED
 
 # Evaluation of operations of constants: these are folded.
 UNARY: dict[str, Callable[[float], float]] = {
@@ -36,6 +36,13 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "less_equal": lambda x, y: float(x <= y),
 }
 COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
+# Operations on zero and another expression: what folding and the rules of simplification give, sooner; or None. The product
+# of zero and a constant is not a number where that is infinite.
+WITH_ZERO: dict[str, Callable[[Expression, Expression, Expression], Expression | None]] = {
+    "add": lambda zero, x, y: y if x is zero else x,
+    "sub": lambda zero, x, y: x if y is zero else None,
+    "mul": lambda zero, x, y: None if x.is_constant and y.is_constant else zero,
+}
 
 
 class Graph:
@@ -50,6 +57,13 @@ class Graph:
     shared : bool
         Whether its symbols are parameters: its expressions may enter any other graph, where a symbol becomes the value set
         by :meth:`bind`, or a further input.
+
+    Attributes
+    ----------
+    constants : dict
+        Node of each number so far.
+    zero : Expression or None
+        Node of zero, once there is one.
     """
 
     def __init__(self, early: "Graph | None" = None, shared: bool = False):
@@ -59,7 +73,8 @@ class Graph:
         self._entered: dict[Expression, Expression] = {}
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
-        self._constants: dict[float | Real, Expression] = {}
+        self.constants: dict[float | Real, Expression] = {}
+        self.zero: Expression | None = None  # the constant, once it is made
 
     def symbol(self, name: str) -> Expression:
         """Return the input of this name."""
@@ -71,10 +86,12 @@ class Graph:
 
     def constant(self, value: float | Real) -> Expression:
         """Return the node of a number."""
-        node = self._constants.get(value)
+        node = self.constants.get(value)
         if node is None:
             value = float(value) + 0.0  # −0 and 0 are one
-            node = self._constants[value] = self._new("constant", (), value)
+            node = self.constants[value] = self._new("constant", (), value)
+            if value == 0.0:
+                self.zero = node
         return node
 
     def lift(self, value) -> Expression:
@@ -131,12 +148,17 @@ class Graph:
 
     def binary(self, op: str, x: Expression, y: Expression) -> Expression:
         """Return op(x, y), folded."""
-        if x.is_constant and y.is_constant:
-            value = BINARY[op](x.value, y.value)  # most often zero with zero
-            return x if value == x.value else y if value == y.value else self.constant(value)
-        simplified = SIMPLER.get(op)
-        if simplified is not None and (simpler := simplified(self, x, y)) is not None:
-            return simpler
+        zero = self.zero  # two of three operations of a mechanism have an operand that is zero
+        if (x is zero or y is zero) and (simple := WITH_ZERO.get(op)) is not None:
+            if (folded := simple(zero, x, y)) is not None:
+                return folded
+        if x.op in SIMPLIFIED or y.op in SIMPLIFIED or x is y:  # no rule looks at other operands
+            if x.is_constant and y.is_constant:
+                value = BINARY[op](x.value, y.value)  # most often zero with zero
+                return x if value == x.value else y if value == y.value else self.constant(value)
+            simplified = SIMPLER.get(op)
+            if simplified is not None and (simpler := simplified(self, x, y)) is not None:
+                return simpler
         if x.index > y.index and op in COMMUTATIVE:
             x, y = y, x
         return self._make(op, (x, y))
@@ -185,13 +207,20 @@ class Graph:
 
         A node that is made again later is another object.
         """
-        self.nodes, self._known, self._constants = [None] * len(self.nodes), {}, {}  # type: ignore[list-item]
+        self.nodes, self._known, self.constants = [None] * len(self.nodes), {}, {}  # type: ignore[list-item]
+        self.zero = None
 
     def _make(self, op: str, operands: tuple, value=None) -> Expression:
-        key = (op, value, *map(INDEX_OF, operands))
+        if len(operands) == 2:  # the key without its overhead
+            x, y = operands
+            key: tuple = (op, value, x.index, y.index)
+        else:
+            key = (op, value, *map(INDEX_OF, operands))
         node = self._known.get(key)
         if node is None:
-            node = self._known[key] = self._new(op, operands, value)
+            nodes = self.nodes
+            node = self._known[key] = Expression(self, op, operands, value, len(nodes))
+            nodes.append(node)
         return node
 
     def _new(self, op: str, operands: tuple, value) -> Expression:

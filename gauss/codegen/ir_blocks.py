@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 
 import numpy as np
 from llvmlite import ir
@@ -20,13 +21,13 @@ LARGEST_ON_STACK = 8192  # entries of a buffer; stacks of threads may be as smal
 
 
 def begin_function(module: ir.Module, name: str, width: int, kind: ir.FunctionType = BODY) -> tuple[ir.Function, Lanes]:
-    """Begin a function of :data:`BODY` for one vector width; its arrays do not overlap."""
+    """Begin a function of :data:`BODY`, of one block, for one vector width; its arrays do not overlap."""
     body = ir.Function(module, kind, name=name)
     body.linkage = "internal"
     for argument in body.args:
         if argument.type == POINTER:
             argument.add_attribute("noalias")
-    b = TextBuilder(body.append_basic_block("entry"))
+    b = TextBuilder(body.append_basic_block("entry"), is_only_block=True)
     if width > 1:
         _at_a_page(b)
     return body, SingleLanes(module, b) if isinstance(module, SingleDeviceModule) else Lanes(module, width, b)
@@ -107,8 +108,11 @@ def output_writer(lanes: Lanes, target, stride):
     return lambda k, value: lanes.store(value, target, _offset(lanes, stride, k))
 
 
+_integer = lru_cache(maxsize=4096)(INTEGER)  # constants, made once
+
+
 def _offset(lanes: Lanes, stride, k: int):
-    return INTEGER(stride.constant * k) if isinstance(stride, ir.Constant) else lanes.b.mul(stride, INTEGER(k))
+    return _integer(stride.constant * k) if isinstance(stride, ir.Constant) else lanes.b.mul(stride, _integer(k))
 
 
 def strip_mined_loop(b: ir.IRBuilder, start, count, width: int, body):

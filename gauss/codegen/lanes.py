@@ -39,7 +39,9 @@ class Lanes:
     def __init__(self, module: ir.Module, width: int, builder: ir.IRBuilder):
         self.module, self.width, self.b = module, width, builder
         self.kind = kind(width)
-        self._constants: dict[float, TextValue] = {}
+        self._kind_text = f"{self.kind} "
+        self._multiply_add: str | None = None  # the call as text, before its operands
+        self._constants: dict[float, TextValue] = module.__dict__.setdefault(f"constants of {width}", {})
         self._intrinsics: dict[str, ir.Function] = {}
         self._opposites: dict[int, tuple[ir.Value, ir.Value]] = {}  # −x and x, by the identity of −x
         self.sincos_values: dict[int, tuple[ir.Value, ir.Value]] = {}
@@ -91,10 +93,23 @@ class Lanes:
 
     def operation(self, node: Expression, values):
         """Result of a node from the values of its operands."""
-        b, op = self.b, node.op
-        if op == "constant":
+        op, kind = node.op, self.kind
+        if op in ARITHMETIC:  # the most frequent ones are written without detours
+            one, other = node.operands
+            one, other = values[one.index], values[other.index]
+            if type(one) is TextValue is type(other) and one.type is kind is other.type:
+                text = self._kind_text
+                return self.b.written(kind, text, f"{ARITHMETIC[op]} {text}{one.reference}, {other.reference}")
+        elif op == "constant":
             return self._written_constant(float(node.value))
         x = [values[operand.index] for operand in node.operands]
+        if op in FUSED and all([type(value) is TextValue and value.type is kind for value in x]):
+            return self._written_fused(op, *x)
+        return self._general(node, x)
+
+    def _general(self, node: Expression, x: list):
+        """Result of any operation on operands of any kind."""
+        b, op = self.b, node.op
         if op == "select":
             condition = x[0] if _is_condition(x[0]) else b.fcmp_unordered("!=", x[0], self.constant(0.0))
             return b.select(condition, self.number(x[1]), self.number(x[2]))
@@ -106,6 +121,18 @@ class Lanes:
     def _looked_up(self, node: Expression, x):
         """Operation of a table, in double precision."""
         return self.b.call(lookup_code(self.module, node.op, node.value, self.width), [x])
+
+    def _written_fused(self, op: str, x: TextValue, y: TextValue, z: TextValue) -> TextValue:
+        """As :meth:`fused`, of numbers that are text."""
+        write, kind, text = self.b.written, self.kind, self._kind_text
+        product, total = FUSED[op]
+        if product < 0:
+            x = write(kind, text, f"fneg {x.typed}")
+        if total < 0:
+            z = write(kind, text, f"fneg {z.typed}")
+        if self._multiply_add is None:
+            self._multiply_add = f"call {text}{self._intrinsic('llvm.fmuladd', 3).get_reference()}("
+        return write(kind, text, f"{self._multiply_add}{x.typed}, {y.typed}, {z.typed})")
 
     def _written_constant(self, value: float) -> TextValue:
         if value not in self._constants:

@@ -25,9 +25,12 @@ def fused(nodes: Sequence[Expression], outputs) -> list[Expression]:
         found[node.index] = node
         if node.op in ("add", "sub"):
             x, y = node.operands
-            for product, other, kind in ((y, x, CONTRACTED[node.op][1]), (x, y, CONTRACTED[node.op][0])):
-                if product.op == "mul" and uses[product.index] == 1:
-                    operands = (*found.pop(product.index).operands, other)
-                    found[node.index] = Expression(node.graph, kind, operands, None, node.index)
-                    break
+            if y.op == "mul" and uses[y.index] == 1:
+                product, other, kind = y, x, CONTRACTED[node.op][1]
+            elif x.op == "mul" and uses[x.index] == 1:
+                product, other, kind = x, y, CONTRACTED[node.op][0]
+            else:
+                continue
+            operands = (*found.pop(product.index).operands, other)
+            found[node.index] = Expression(node.graph, kind, operands, None, node.index)
     return list(found.values())

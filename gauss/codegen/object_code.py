@@ -20,12 +20,14 @@ import llvmlite.binding as llvm
 from gauss.codegen.library_symbols import register_symbols_of
 from gauss.codegen.processor import features
 from gauss.codegen.terminal_line import units_in_progress
+from gauss.codegen.whole_selection import selected_whole
 
 OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
 PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
 RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one object for that of another
 UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
 LINKS_PER_COLLECTION = 32  # modules linked between two collections, which take 30 ms
+SELECTED_WHOLE = "x86_64"  # processor on which some functions are (gauss.codegen.whole_selection)
 CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
 FUNCTION = re.compile(r"^define [^\n]*\n\{\n.*?^\}\n", re.MULTILINE | re.DOTALL)
 GLOBAL = re.compile(r'^(@"[^"]*") = .*\n', re.MULTILINE)
@@ -56,7 +58,12 @@ def quick_objects(ir_text: str) -> list[bytes]:
         ModuleUnits(ir_text).apart(lambda function: CONTRACTED in function) if CONTRACTED in ir_text else (ir_text, "")
     )
     units = units_in_progress([unit for unit in (quick, chosen) if unit])
-    return [_optimised(unit) if unit is chosen else target(0).emit_object(_parsed(unit)) for unit in units]
+    return [_optimised(unit) if unit is chosen else _quick(unit) for unit in units]
+
+
+def _quick(unit: str) -> bytes:
+    machine = target(0)
+    return machine.emit_object(_parsed(selected_whole(unit) if machine.triple.startswith(SELECTED_WHOLE) else unit))
 
 
 def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:

@@ -7,19 +7,20 @@ Poletto and Sarkar, ACM TOPLAS 21, 1999).
 from collections import defaultdict
 from contextlib import contextmanager
 from heapq import heappop, heappush
-from itertools import accumulate, pairwise
+from itertools import accumulate
 from math import inf
 from typing import NamedTuple
 
 from llvmlite import ir
 
 from gauss.codegen.device_module import DeviceModule
-from gauss.codegen.expression import Expression
+from gauss.codegen.expression import INDEX_OF, Expression
 from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.schedule import Schedule
 from gauss.codegen.straight_line import Results, calling, passed_on, straight_line
 
+TURNS = frozenset({"sin", "cos"})
 LONGEST_UNCUT = 2_000  # operations above which a function is outlined into pieces
 PIECE_LENGTH = (
     800  # operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones
@@ -180,14 +181,17 @@ def _together(nodes) -> list[Expression]:
     """The same order, but sines and cosines of inputs come first, and the results of a call follow it."""
     turns, rest, parts = [], [], defaultdict(list)
     for node in nodes:
-        if node.op == "item":
+        op = node.op
+        if op == "item":
             parts[node.operands[0].index].append(node)
-        elif node.op in ("sin", "cos") and node.operands[0].op == "symbol":
+        elif op in TURNS and node.operands[0].op == "symbol":
             turns.append(node)
         else:
             rest.append(node)
     turns.sort(key=lambda node: node.operands[0].index)
-    return [*turns, *(part for node in rest for part in (node, *parts[node.index]))]
+    if parts:
+        rest = [part for node in rest for part in (node, *parts.get(node.index, ()))]
+    return turns + rest
 
 
 def _runs(nodes, length: int) -> list[list[Expression]]:
@@ -195,7 +199,8 @@ def _runs(nodes, length: int) -> list[list[Expression]]:
     crossing, runs, start = _crossing(nodes), [], 0
     while len(nodes) - start > 3 * length // 2:
         end = start + (length + 1) // 2
-        end = min(range(end, end + length), key=lambda k: crossing[k] if k < len(nodes) else inf)
+        window = crossing[end : end + length]
+        end += window.index(min(window))
         while end < len(nodes) and crossing[end] == inf:
             end += 1
         runs.append(nodes[start:end])
@@ -205,20 +210,25 @@ def _runs(nodes, length: int) -> list[list[Expression]]:
 
 def _crossing(nodes) -> list[float]:
     """Number of live values before each node; infinite where the node must not be separated from the one before."""
-    where = {node.index: k for k, node in enumerate(nodes)}
-    last = {x.index: k for k, node in enumerate(nodes) for x in node.operands}
+    last = [0] * (1 + max(map(INDEX_OF, nodes), default=0))  # number of the last user of each node: operands precede it
+    for k, node in enumerate(nodes):
+        for x in node.operands:
+            last[x.index] = k
     change = [0] * (len(nodes) + 1)
-    for index, k in where.items():
-        if last.get(index, k) > k:
+    for k, node in enumerate(nodes):
+        end = last[node.index]
+        if end > k:
             change[k + 1] += 1
-            change[min(last[index] + 1, len(nodes))] -= 1
-    turns = ("sin", "cos")
+            change[end + 1] -= 1
     found: list[float] = list(accumulate(change[:-1]))
-    for k, (one, other) in enumerate(pairwise(nodes), 1):
-        same_angle = one.op in turns and other.op in turns and one.operands == other.operands
-        if other.op == "item" or same_angle:
+    for k, node in enumerate(nodes):
+        if node.op == "item" or (node.op in TURNS and k and _same_angle(nodes[k - 1], node)):
             found[k] = inf
     return found
+
+
+def _same_angle(one: Expression, other: Expression) -> bool:
+    return one.op in TURNS and one.operands == other.operands
 
 
 def _piece(run, k: int, piece_of, last, wanted) -> Schedule:

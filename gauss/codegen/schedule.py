@@ -12,9 +12,9 @@ so that few are spilled (Sethi and Ullman, J. ACM 17, 1970).
 from collections import Counter
 from typing import NamedTuple
 
-from gauss.codegen.expression import Expression, operand_indices
+from gauss.codegen.expression import INDEX_OF, Expression, operand_indices
 from gauss.codegen.function import Function
-from gauss.codegen.graph import Graph
+from gauss.codegen.graph import BINARY, Graph
 from gauss.codegen.multiply_add import fused
 
 # latencies, in units of an addition
@@ -53,13 +53,23 @@ class _Reassociation:
         once = _used_once(nodes, function.outputs)
         self.products = {x.index for x in once if x.op == "mul"}
         sums, absorbed = _sums(nodes, self.products, {x.index for x in once if x.op in CHAIN})
-        new, copy = self.new, self.graph.copy
+        self._rewrite(nodes, sums, absorbed)
+        self.outputs = [self.new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
+
+    def _rewrite(self, nodes, sums: dict, absorbed: set):
+        """Write the nodes into the new graph, the sums by their terms."""
+        new, copy, binary = self.new, self.graph.copy, self.graph.binary
         for node in nodes:
-            if node.index in sums:
-                new[node.index] = self._sum(sums[node.index])
-            elif node.index not in absorbed:
-                new[node.index] = copy(node, [new[x.index] for x in node.operands])
-        self.outputs = [new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
+            index, operands = node.index, node.operands
+            if index in sums:
+                new[index] = self._sum(sums[index])
+            elif index in absorbed:
+                continue
+            elif node.op in BINARY:  # most of them, without the overhead of a copy
+                x, y = operands
+                new[index] = binary(node.op, new[x.index], new[y.index])
+            else:
+                new[index] = copy(node, [new[x.index] for x in operands])
 
     def depth_first(self) -> list[Expression]:
         """Nodes on which the outputs depend, each right after its operands."""
@@ -128,13 +138,13 @@ def _sums(nodes, products, once) -> tuple[dict, set]:
     ``once`` are the sums with one use.
     """
     chains = [node for node in nodes if node.op in CHAIN]
-    within = once & {x.index for node in chains for x in node.operands}
+    within = once.intersection(operand_indices(chains))
     within -= _plain_sums(chains, products, within)
     sums, absorbed = {}, set()
     for node in chains:
-        if node.index not in within and any(x.index in within for x in node.operands):
+        if node.index not in within and not within.isdisjoint(map(INDEX_OF, node.operands)):
             terms, inside = _terms(node, within)
-            if any(term.index in products for _, term in terms):
+            if not products.isdisjoint([term.index for _, term in terms]):
                 sums[node.index] = terms
                 absorbed |= inside
     return sums, absorbed
@@ -143,10 +153,10 @@ def _sums(nodes, products, once) -> tuple[dict, set]:
 def _plain_sums(chains, products, within) -> set:
     """Sums of two or more terms without products among them."""
     plain, mixed = set(), set(products)
-    inner = within | products
     for node in chains:
-        if any(x.index in mixed and x.index in inner for x in node.operands):
-            mixed.add(node.index)
+        if not mixed.isdisjoint(map(INDEX_OF, node.operands)):
+            if node.index in within:
+                mixed.add(node.index)
         elif node.op != "neg":
             plain.add(node.index)
     return plain
@@ -157,13 +167,16 @@ def _terms(root: Expression, within) -> tuple[list, set]:
     terms, inside, waiting = [], set(), [(1, root)]
     while waiting:
         sign, node = waiting.pop()
-        if node is not root and node.index not in within:
-            terms.append((sign, node))
-            continue
         if node is not root:
+            if node.index not in within:
+                terms.append((sign, node))
+                continue
             inside.add(node.index)
-        signs = (-sign,) if node.op == "neg" else (sign, sign if node.op == "add" else -sign)
-        waiting += reversed(list(zip(signs, node.operands, strict=True)))
+        if node.op == "neg":
+            waiting.append((-sign, node.operands[0]))
+        else:
+            x, y = node.operands
+            waiting += (sign if node.op == "add" else -sign, y), (sign, x)
     return terms, inside
 
 

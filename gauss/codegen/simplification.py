@@ -56,6 +56,7 @@ def _div(graph: "Graph", x: "Expression", y: "Expression") -> "Expression | None
     return None
 
 
+SIMPLIFIED = frozenset({"constant", "neg"})  # operands at which the rules look, beside two that are the same
 # rule of each operation: the simpler expression, or None
 SIMPLER: dict[str, Callable] = {
     "add": _add,

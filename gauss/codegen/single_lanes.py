@@ -26,7 +26,7 @@ class SingleLanes(Lanes):
 
     def __init__(self, module: ir.Module, builder: ir.IRBuilder):
         super().__init__(module, 1, builder)
-        self.kind = SINGLE
+        self.kind, self._kind_text, self._constants = SINGLE, f"{SINGLE} ", {}
 
     def constant(self, value: float) -> ir.Constant:
         """Constant, rounded."""

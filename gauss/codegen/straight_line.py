@@ -53,13 +53,16 @@ def straight_line(
 def _emit(lanes: Lanes, nodes: list[Expression], values: "_Values", calls: dict, results: dict):
     """Emit operations one after the other; the value of a call is the function that loads its results."""
     lanes.sincos_together({angle: values[angle.index] for angle in _angles(nodes)})
+    operation, positions = lanes.operation, values.positions
     for node in nodes:
         if node.op == "call":
             values[node.index] = calls[node.value]([values[x.index] for x in node.operands], results.get(node.index))
         elif node.op == "item":
             values.record(node, values[node.operands[0].index](node.value))
         elif node.op != "symbol":
-            values.record(node, lanes.operation(node, values))
+            values[node.index] = value = operation(node, values)
+            if node.index in positions:
+                values.record(node, value)
 
 
 class _Values(dict):

@@ -9,13 +9,17 @@ from typing import NamedTuple
 
 from llvmlite import ir
 
-BIT, INTEGER = ir.IntType(1), ir.IntType(64)
+BIT, INTEGER, DOUBLE = ir.IntType(1), ir.IntType(64), ir.DoubleType()
 ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "one"}
+SIGNED = {"<": "slt", "<=": "sle", ">": "sgt", ">=": "sge", "==": "eq", "!=": "ne"}
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
 
 
+NEW = tuple.__new__  # of a named tuple, without the overhead of its own
+
+
 class TextValue(NamedTuple):
-    """Result of an instruction: what llvmlite asks of an operand, and its type and name as they stand in the text."""
+    """Result of an instruction: what llvmlite asks of an operand, and its name without and with its type in the text."""
 
     type: ir.Type
     reference: str
@@ -27,17 +31,33 @@ class TextValue(NamedTuple):
 
 
 class TextBuilder(ir.IRBuilder):
-    """Builder that writes the frequent instructions as text, and leaves the others to llvmlite."""
+    """Builder that writes the frequent instructions as text, and leaves the others to llvmlite.
 
-    def __init__(self, block: ir.Block):
+    Parameters
+    ----------
+    block : llvmlite.ir.Block
+        Insertion point.
+    is_only_block : bool
+        Whether the function has no other block, and no other builder. Its values are then numbers instead of names, which
+        LLVM reads in two thirds of the time; they must stand in order.
+    """
+
+    def __init__(self, block: ir.Block, is_only_block: bool = False):
         super().__init__(block)
+        self._mark = "%" if is_only_block else "%t"
         self._numbers = block.function.__dict__.setdefault("numbers_of_values", count())  # one sequence for all builders
         self._called: dict[str, str] = {}  # beginning of the calls of each function
+        self._arguments = {id(x): f"{x.type} {x.get_reference()}" for x in block.function.args}  # of the function
 
     def _value(self, kind: ir.Type, text: str) -> TextValue:
-        name = f"%t{next(self._numbers)}"
-        self._line(f"{name} = {text}")
-        return TextValue(kind, name, f"{kind} {name}")
+        return self.written(kind, "double " if kind is DOUBLE else f"{kind} ", text)
+
+    def written(self, kind: ir.Type, kind_text: str, text: str) -> TextValue:
+        """Result of an instruction that is written already, for callers that know its type as text."""
+        name = f"{self._mark}{next(self._numbers)}"
+        self._block.instructions.insert(self._anchor, f"{name} = {text}")
+        self._anchor += 1
+        return NEW(TextValue, (kind, name, kind_text + name))
 
     def _line(self, text: str):
         self._block.instructions.insert(self._anchor, text)
@@ -70,17 +90,37 @@ class TextBuilder(ir.IRBuilder):
         """Product of integers."""
         return self._binary("mul", lhs, rhs, flags)
 
+    def add(self, lhs, rhs, name="", flags=()) -> TextValue:
+        """Sum of integers."""
+        return self._binary("add", lhs, rhs, flags)
+
+    def sub(self, lhs, rhs, name="", flags=()) -> TextValue:
+        """Difference of integers."""
+        return self._binary("sub", lhs, rhs, flags)
+
+    def icmp_signed(self, cmpop, lhs, rhs, name="") -> TextValue:
+        """Comparison of signed integers."""
+        return self._compared("icmp", SIGNED[cmpop], lhs, rhs, ())
+
+    def extract_element(self, vector, idx, name="") -> TextValue:
+        """Element of a vector."""
+        return self._value(vector.type.element, f"extractelement {_typed(vector)}, {_typed(idx)}")
+
+    def insert_element(self, vector, value, idx, name="") -> TextValue:
+        """Vector with another element."""
+        return self._value(vector.type, f"insertelement {_typed(vector)}, {_typed(value)}, {_typed(idx)}")
+
     def fcmp_ordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is false where an operand is not a number."""
-        return self._compared(ORDERED[cmpop], lhs, rhs, flags)
+        return self._compared("fcmp", ORDERED[cmpop], lhs, rhs, flags)
 
     def fcmp_unordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is true where an operand is not a number."""
-        return self._compared(UNORDERED[cmpop], lhs, rhs, flags)
+        return self._compared("fcmp", UNORDERED[cmpop], lhs, rhs, flags)
 
-    def _compared(self, operation: str, x, y, flags) -> TextValue:
+    def _compared(self, compare: str, operation: str, x, y, flags) -> TextValue:
         kind = ir.VectorType(BIT, x.type.count) if isinstance(x.type, ir.VectorType) else BIT
-        return self._value(kind, f"{_flagged('fcmp', flags)} {operation} {_typed(x)}, {y.get_reference()}")
+        return self._value(kind, f"{_flagged(compare, flags)} {operation} {_typed(x)}, {y.get_reference()}")
 
     def select(self, cond, lhs, rhs, name="", flags=()) -> TextValue:
         """One of two values."""
@@ -97,6 +137,8 @@ class TextBuilder(ir.IRBuilder):
     def load(self, ptr, name="", align=None, typ=None) -> TextValue:
         """Value in memory."""
         kind = typ or ptr.type.pointee
+        if kind is DOUBLE and align is None:  # most of them
+            return self.written(kind, "double ", f"load double, {_typed(ptr)}")
         return self._value(kind, f"load {kind}, {_typed(ptr)}{_aligned(align)}")
 
     def store(self, value, ptr, align=None):
@@ -107,7 +149,9 @@ class TextBuilder(ir.IRBuilder):
         """Address of an element of an array of numbers."""
         if source_etype is not None or inbounds or len(indices) != 1:
             return super().gep(ptr, indices, inbounds, name, source_etype)
-        return self._value(ptr.type, f"getelementptr {ptr.type.pointee}, {_typed(ptr)}, {_index(indices[0])}")
+        typed = self._arguments.get(id(ptr)) or _typed(ptr)
+        begin = typed[: typed.rindex(" ") + 1]  # its type
+        return self.written(ptr.type, begin, f"getelementptr {ptr.type.pointee}, {typed}, {_index(indices[0])}")
 
     def call(self, fn, args, name="", **how):
         """Call a function."""
@@ -134,7 +178,7 @@ def _typed(value) -> str:
 
 
 def _index(value) -> str:
-    return f"{INTEGER} {value.constant}" if type(value) is ir.Constant and value.type is INTEGER else _typed(value)
+    return f"i64 {value.constant}" if type(value) is ir.Constant and value.type is INTEGER else _typed(value)
 
 
 def _aligned(align: int | None) -> str:
