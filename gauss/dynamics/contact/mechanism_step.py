@@ -367,8 +367,8 @@ class MechanismStepper:
         m, time = rows.gap.size, self.system.scale.time
         return rows.gap / time, rows.K[:m] / time, begun.H, [self.rows.name(near, k) for k in range(m)]
 
-    def refuse_penetration(self, state: State):
-        """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
+    def refuse_penetration(self, state: State, accepted: float = START_OVERLAP):
+        """Raise a StateError for penetration at the start, deeper than accepted, relative to the scale of a gap."""
         begun = self._begin(state, 0.0, 0.0)
         near = self._near(state, begun, 0.0, 0.0, 0.0)
         depth = (
@@ -376,7 +376,7 @@ class MechanismStepper:
             / self.system.scale.time
         )
         worst = int(np.argmax(depth)) if depth.size else 0
-        if depth.size and not depth[worst] <= START_OVERLAP:
+        if depth.size and not depth[worst] <= accepted:
             inside = -np.concatenate([near.gap, begun.terms.gap])[worst]
             raise StateError(
                 f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.rows.name(near, worst)!r}; "

@@ -18,6 +18,7 @@ from gauss.simulation.moreau.contact_motion import ContactMotion
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, in_words
 from gauss.simulation.moreau.sleeping_motion import SleepingMotion
+from gauss.simulation.moreau.start_overlap import accepted_overlap
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
@@ -69,7 +70,7 @@ class PairKernelRun(PythonRun):
     """
 
     def __init__(self, problem: Problem):
-        self.held, system = problem.held, problem.system
+        self.held, system, self.accepted = problem.held, problem.system, accepted_overlap(problem)
         sleeping, held = problem.sleeping, self.held is not None
         self.motion = ContactMotion(system, held) if sleeping is None else SleepingMotion(system, sleeping)
         self.stepper = self.motion.stepper
@@ -80,7 +81,7 @@ class PairKernelRun(PythonRun):
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
         self.motion.begin(start)
-        self.stepper.refuse_penetration(start)
+        self.stepper.refuse_penetration(start, self.accepted)
         found = super().collect(start, samples, progress)
         warn_of_laws(self.motion.largest, self.motion.relaxed, self.steps)
         warn_of_unseen_contacts(found)

@@ -12,6 +12,7 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point, Rates
 from gauss.simulation.moreau.contact_motion import ContactMotion
+from gauss.simulation.moreau.start_overlap import accepted_overlap
 from gauss.simulation.problem import Problem
 from gauss.system import State
 
@@ -43,7 +44,7 @@ class PairKernelSteps:
             ContactMotion(problem.system, held, new_contact_stepper(problem.system, held)),
             smooth_question(problem.question),
         )
-        self.motion.stepper.refuse_penetration(problem.start)
+        self.motion.stepper.refuse_penetration(problem.start, accepted_overlap(problem))
         self.motion.stepper.check(problem.start)
         measured = any(output.kind == "contact_force" for output in problem.system.scene.outputs.values())
         self.gaps = self.motion.stepper.gap_count if measured else 0
