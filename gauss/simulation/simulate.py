@@ -116,9 +116,10 @@ def simulate(
     rate : float, optional
         Samples of the law in a second [Hz]; the first is at the start.
     sleeping : bool or Sleeping
-        By time stepping of free bodies: islands of bodies that touch each other sleep once they have been slow for a while
-        (:class:`Sleeping`), and cost next to nothing until another body pushes them. Their kinetic energy counts as
-        dissipated; events "sleeps" and "wakes" name the bodies.
+        By time stepping with contacts of shapes: islands of bodies that touch each other, with all that joints and loads
+        connect with them, sleep once they have been slow for a while (:class:`Sleeping`), and cost little until another
+        body pushes them, or an input that acts on them changes. What a law of time or a prescribed motion acts on never
+        sleeps. Their kinetic energy counts as dissipated; events "sleeps" and "wakes" name the bodies.
     verify : bool
         Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool

@@ -58,15 +58,19 @@ class MechanismStepper:
     ----------
     inputs : ndarray, shape (n_u,)
         Values of the inputs in the next step.
+    asleep : ndarray of bool, shape (k + 1,)
+        Which bodies that carry shapes sleep: the contacts of a step must not push them.
     """
 
     def __init__(self, system: System, held: bool = False, removal: float = 0.0):
         self.system, self.smooth, self.table = system, smooth_system(system), ShapeTable(system)
         self.removal = removal
         carriers = tuple(sorted({int(body) for body in self.table.body if body >= 0}))
+        self.carriers, self.held = carriers, held
         self.kernels = mechanism_kernels(system, self.smooth, carriers, held)
         self.inputs = np.zeros(len(system.scene.inputs) if held else 0)
         self.n = len(carriers)
+        self.asleep = np.zeros(self.n + 1, dtype=bool)
         places = {body: k for k, body in enumerate(carriers)}
         self.table.body = np.array([places.get(int(body), self.n) for body in self.table.body], dtype=np.int64)
         self.reach = np.zeros(self.n + 1)
@@ -133,8 +137,12 @@ class MechanismStepper:
 
     def forget(self):
         """Forget the forces and inputs of the last step: a new motion begins."""
-        self.detection.connect()
         self.inputs[:] = 0.0
+        self.connect()
+
+    def connect(self):
+        """Forget the forces of the last step, and take all addresses anew."""
+        self.detection.connect()
         self.forget_forces()
         self.record.forget()
         if self.memory is not None:

@@ -84,6 +84,10 @@ class ContactMotion:
         """Set the inputs of the next steps."""
         self.stepper.inputs[:] = inputs
 
+    def jump(self, state: State, work: np.ndarray):
+        """Continue from a state after a jump of prescribed velocities, with its work."""
+        self.state, self.work = state, work
+
     def advance(self, ends: np.ndarray) -> np.ndarray:
         """Make steps to some times [s], and return (t, q, v, work) at these, (k, row).
 

@@ -72,7 +72,7 @@ class PairKernelRun(PythonRun):
     def __init__(self, problem: Problem):
         self.held, system, self.accepted = problem.held, problem.system, accepted_overlap(problem)
         sleeping, held = problem.sleeping, self.held is not None
-        self.motion = ContactMotion(system, held) if sleeping is None else SleepingMotion(system, sleeping)
+        self.motion = ContactMotion(system, held) if sleeping is None else SleepingMotion(system, sleeping, held)
         self.stepper = self.motion.stepper
         self.engine = PairKernelEngine(self.stepper)
         super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
@@ -112,7 +112,8 @@ class PairKernelRun(PythonRun):
         for place, stop in stops:
             jumped = self._jumped(point, impacts[place]) if place in impacts else None
             if jumped:
-                point, self.motion.state, self.motion.work = jumped, jumped.state, jumped.work
+                point = jumped
+                self.motion.jump(jumped.state, jumped.work)
                 yield point, None
             if place in holds:
                 self._hold(holds[place])

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.dynamics.conditions import are_free_in_contact
+from gauss.dynamics.conditions import are_free_in_contact, shapes_in_contact, smooth_question, takes_pair_kernels
+from gauss.dynamics.rules import reasons_in_words
 from gauss.errors import SimulationError, require
 from gauss.system import System
 
@@ -20,7 +21,8 @@ class Sleeping:
     Parameters
     ----------
     speed : float, optional
-        Largest speed of any point of their shapes [m/s]; 1e-3 of the scene's length over its time when not given.
+        Largest speed of any point of their shapes [m/s]; 1e-3 of the scene's length over its time when not given. Rates
+        that move no shape count as those of a point one length of the scene away.
     duration : float
         How long all of them are slower [s].
 
@@ -68,9 +70,16 @@ def checked_sleeping(sleeping: "bool | Sleeping", problem) -> Sleeping | None:
             f"sleeping: bodies sleep in time stepping of one step, not by {method.name!r} as asked: give "
             "integrator='time_stepping' and step= [s], or no sleeping=."
         )
-    if problem.held is not None or not are_free_in_contact(system):
+    why = takes_pair_kernels(problem.question) if shapes_in_contact(problem.question) else ["it has no contacts of shapes"]
+    if why:
         raise SimulationError(
-            f"sleeping: expected bodies on free joints on which contacts of shapes alone act; {system.scene.name!r} has "
-            "other joints, loads, constraints or inputs: give no sleeping=."
+            f"sleeping: bodies sleep in steps by kernels of pairs of shapes, which do not take {system.scene.name!r}: "
+            f"{reasons_in_words(why)}; give no sleeping=."
+        )
+    opaque = [] if are_free_in_contact(system) else list(smooth_question(problem.question).laws.reasons)
+    if opaque:
+        raise SimulationError(
+            f"sleeping: the laws of {', '.join(map(repr, opaque))} are opaque, and may change whatever moves: expected laws "
+            "that can be traced; write them with gauss.math, or give no sleeping=."
         )
     return Sleeping() if sleeping is True else sleeping
