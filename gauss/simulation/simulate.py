@@ -1,6 +1,7 @@
 """Simulation of a motion: check the arguments, select the plan, and let its driver compute the trajectory."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -232,4 +233,6 @@ def _again(problem: Problem, plan: Plan, step, tolerance, samples, mesh=()) -> T
 
 def _recorded(problem: Problem, found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
     """Trajectory with its settings and its plan, and with the system of its inputs."""
+    if found.stats.sleep is not None:
+        plan = replace(plan, sleepers=len(found.stats.sleep.able))
     return found.recorded(found.system if problem.held is None else problem.held.recorded(), settings, plan)

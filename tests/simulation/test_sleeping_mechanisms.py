@@ -217,3 +217,37 @@ def test_trees_under_opaque_laws_are_refused():
     scene.drive("a hinge", torque=lambda t: float(t))
     with pytest.raises(SimulationError, match="drive of a hinge"):
         moved(with_contacts(scene), 0.01, plan=None)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [None, [ENDS]])
+def test_the_record_of_a_motion_says_which_bodies_may_sleep_and_slept_and_when(times):
+    scene = chests(ball=3.0)
+    _driven_by_law(scene)
+    found = moved(with_contacts(scene), times=times)
+    record, a, b = found.stats.sleep, ("a", "a lid"), ("b", "b lid")
+    assert record.never == a and record.able == (*b, "ball")
+    assert set(record.steps) == set(b) == set(record.asleep) and record.woken == 0
+    (event,) = [event for event in found.events if event.kind == "sleeps"]
+    np.testing.assert_allclose(np.multiply([*record.steps.values()], STEP), event.t, rtol=BALANCE)
+    assert found.stats.plan.sleepers == 3 and Plan.from_json(found.stats.plan.to_json()).sleepers == 3
+    awake = moved(scene, 2 * STEP, sleeping=False).stats
+    assert awake.sleep is None and awake.plan.sleepers is None
+
+
+@pytest.mark.slow
+def test_files_of_results_hold_the_record(tmp_path):
+    pytest.importorskip("xarray")
+    found = moved(with_contacts(chests()), 0.1)
+    gauss.save(found, tmp_path / "slept.nc")
+    again = gauss.load_motion(tmp_path / "slept.nc").stats
+    assert again.sleep == found.stats.sleep and again.plan.sleepers == 4
+
+
+def test_the_report_of_a_system_counts_the_bodies_that_may_sleep():
+    scene = chests()
+    _driven_by_law(scene)
+    system = gauss.compile_scene(with_contacts(scene))
+    able, never = system.dynamics.sleepers(system)
+    assert (able, never) == (("b", "b lid"), ("a", "a lid"))
+    assert "2 of 4 moving bodies" in system.explain()

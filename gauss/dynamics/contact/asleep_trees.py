@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss.dynamics.contact.compiled_mechanism_step import KnownForces, MechanismMemory
 from gauss.dynamics.contact.contact_changes import ModeRecord
-from gauss.dynamics.contact.coordinate_groups import coordinate_groups
+from gauss.dynamics.contact.coordinate_groups import bodies_of_groups, coordinate_groups
 from gauss.dynamics.contact.linked import linked
 from gauss.dynamics.contact.mechanism_kernels import MechanismKernels
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
@@ -47,18 +47,8 @@ class TreeSleepers:
         self.of_body = np.append(self.groups.of_carrier, -1)
         self.rests = np.append(self.groups.of_carrier < 0, True)
         self.gaps, self.laws = len(self.rows.others), len(whole.table.contacts)
-        names, group = whole.system.structure.bodies, self._group_of_bodies()
-        self.bodies = [tuple(names[body] for body in np.flatnonzero(group == k)) for k in range(self.count)]
+        self.bodies = bodies_of_groups(whole.smooth, self.groups)
         self.length = whole.system.scale.length / whole.system.scale.coordinates
-
-    def _group_of_bodies(self) -> np.ndarray:
-        """Group of each body of the system; −1 of those that no rate moves."""
-        system = self.whole.smooth
-        group = np.full(system.structure.n_bodies + 1, -1)  # the ground is the last one
-        for edge in system.structure.tree:  # inner bodies come first
-            v = system.joints[edge.constraint].v
-            group[edge.outer] = self.groups.of_rate[v.start] if v.stop > v.start else group[edge.inner]
-        return group[:-1]
 
     def known_of_none(self) -> KnownForces:
         """Forces on nothing."""

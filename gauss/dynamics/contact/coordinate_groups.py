@@ -140,6 +140,16 @@ def _groups(traced: TracedMechanism) -> CoordinateGroups:
     return CoordinateGroups(of_rate, group_of(bodies), group_of(rows), timed, inputs)
 
 
+def bodies_of_groups(system: System, groups: CoordinateGroups) -> list[tuple[str, ...]]:
+    """Bodies that each group moves."""
+    group = np.full(system.structure.n_bodies + 1, -1)  # the ground is the last one
+    for edge in system.structure.tree:  # inner bodies come first
+        v = system.joints[edge.constraint].v
+        group[edge.outer] = groups.of_rate[v.start] if v.stop > v.start else group[edge.inner]
+    names = system.structure.bodies
+    return [tuple(names[body] for body in np.flatnonzero(group[:-1] == k)) for k in range(groups.timed.size)]
+
+
 def _columns(terms: _Terms, name: str, k: int) -> frozenset[int]:
     """Rates that a row, or the rows of a body, act on."""
     pattern = terms.pattern(name)[k].reshape(-1, terms.n_v)

@@ -31,7 +31,7 @@ from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection, near_pairs
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
-from gauss.dynamics.contact.shape_table import ShapeTable
+from gauss.dynamics.contact.shape_table import ShapeTable, carriers_of
 from gauss.dynamics.contact.step_doubts import JAMMED_RESPONSE, paradoxes_of_step, refuse_jam
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale, centrifugal_scale
 from gauss.dynamics.inputs import InputForces
@@ -65,7 +65,7 @@ class MechanismStepper:
     def __init__(self, system: System, held: bool = False, removal: float = 0.0):
         self.system, self.smooth, self.table = system, smooth_system(system), ShapeTable(system)
         self.removal = removal
-        carriers = tuple(sorted({int(body) for body in self.table.body if body >= 0}))
+        carriers = carriers_of(system)
         self.carriers, self.held = carriers, held
         self.kernels = mechanism_kernels(system, self.smooth, carriers, held)
         self.inputs = np.zeros(len(system.scene.inputs) if held else 0)

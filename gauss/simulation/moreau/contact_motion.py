@@ -14,7 +14,7 @@ from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_events import event_of
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings
-from gauss.simulation.motion_records import Event
+from gauss.simulation.motion_records import Event, SleepRecord
 from gauss.system import State, System
 
 
@@ -161,9 +161,9 @@ class ContactMotion:
             event = event_of(change, names[change.element], float(times[change.step + 1]), begins)
             self.events += [] if event is None else [event]
 
-    def in_words(self) -> str:
-        """What is to be said of the motion beside its steps; nothing."""
-        return ""
+    def slept(self) -> SleepRecord | None:
+        """Which bodies slept; None in motions without sleeping."""
+        return None
 
     def beside(self, begin: ContactMotionState, t: float) -> tuple[State, np.ndarray]:
         """State and work at a time after a shorter step from what was kept; the motion does not continue from there."""

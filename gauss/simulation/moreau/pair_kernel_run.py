@@ -147,8 +147,8 @@ class PairKernelRun(PythonRun):
         self.engine.evaluations = motion.steps
         self.events = sorted([*self.events, *motion.events], key=lambda event: event.t)
         whole = super()._trajectory(kept, samples, began)
-        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method) + motion.in_words()
-        return replace(whole, stats=whole.stats._replace(method=method), step=self.step)
+        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method)
+        return replace(whole, stats=whole.stats._replace(method=method, sleep=motion.slept()), step=self.step)
 
 
 def _divided(pairs: np.ndarray, changes: Iterable[int]) -> tuple[np.ndarray, list[tuple[int, int]]]:

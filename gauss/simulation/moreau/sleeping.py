@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.dynamics.conditions import are_free_in_contact, shapes_in_contact, smooth_question, takes_pair_kernels
-from gauss.dynamics.rules import reasons_in_words
+from gauss.dynamics.contact.sleepers import sleepers
 from gauss.errors import SimulationError, require
 from gauss.system import System
 
@@ -64,22 +63,11 @@ def checked_sleeping(sleeping: "bool | Sleeping", problem) -> Sleeping | None:
     require(sleeping, (bool, Sleeping), "simulate: sleeping")
     if sleeping is False:
         return None
-    method, system = problem.method, problem.system
+    method = problem.method
     if not getattr(method, "nonsmooth", False) or problem.step is None:
         raise SimulationError(
             f"sleeping: bodies sleep in time stepping of one step, not by {method.name!r} as asked: give "
             "integrator='time_stepping' and step= [s], or no sleeping=."
         )
-    why = takes_pair_kernels(problem.question) if shapes_in_contact(problem.question) else ["it has no contacts of shapes"]
-    if why:
-        raise SimulationError(
-            f"sleeping: bodies sleep in steps by kernels of pairs of shapes, which do not take {system.scene.name!r}: "
-            f"{reasons_in_words(why)}; give no sleeping=."
-        )
-    opaque = [] if are_free_in_contact(system) else list(smooth_question(problem.question).laws.reasons)
-    if opaque:
-        raise SimulationError(
-            f"sleeping: the laws of {', '.join(map(repr, opaque))} are opaque, and may change whatever moves: expected laws "
-            "that can be traced; write them with gauss.math, or give no sleeping=."
-        )
+    sleepers(problem.question)
     return Sleeping() if sleeping is True else sleeping

@@ -20,7 +20,7 @@ from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_motion import ContactMotion, ContactMotionState
 from gauss.simulation.moreau.sleeping import Sleeping
-from gauss.simulation.motion_records import Event
+from gauss.simulation.motion_records import Event, SleepRecord
 from gauss.system import State, System
 
 LOOK_STEPS = 16  # steps between two looks for islands at rest
@@ -78,7 +78,8 @@ class SleepingMotion(ContactMotion):
         n, elements = self.sleepers.count, len(self.whole.elements)
         nothing = self.sleepers.known_of_none(), np.zeros(elements, dtype=bool), np.arange(elements)
         self.asleep = _Asleep(np.full(n, -1), self.whole, *nothing)
-        self.since, self.counted, self.times_asleep, self.times_woken = np.full(n, start.t), 0, 0, 0
+        self.since, self.counted, self.times_woken = np.full(n, start.t), 0, 0
+        self.first: dict[str, int] = {}
         self.stepper = self.whole
         super().begin(start)
 
@@ -132,7 +133,7 @@ class SleepingMotion(ContactMotion):
         self.state, self.work = State(self.state.t, self.state.q, v), self.work + np.array([0.0, 0.0, lost])
         self._set_asleep(np.where(new, island, self.asleep.island), known)
         self.events.append(Event(self.state.t, "sleeps", self._names(new), lost))
-        self.times_asleep += len(self._names(new))
+        self.first = dict.fromkeys(self._names(new), self.counted) | self.first
         return True
 
     def _wake(self, pushed: np.ndarray):
@@ -209,20 +210,20 @@ class SleepingMotion(ContactMotion):
 
     def kept(self) -> ContactMotionState:
         """What the motion continues from."""
-        more = self.asleep, self.since.copy(), self.counted, self.times_asleep, self.times_woken
+        more = self.asleep, self.since.copy(), self.counted, self.first, self.times_woken
         return super().kept()._replace(asleep=more)
 
     def take(self, kept: ContactMotionState):
         """Continue from what was kept."""
-        self.asleep, since, self.counted, self.times_asleep, self.times_woken = kept.asleep
+        self.asleep, since, self.counted, self.first, self.times_woken = kept.asleep
         self.since, self.stepper = since.copy(), self.asleep.stepper
         super().take(kept)
 
-    def in_words(self) -> str:
-        """How many bodies slept."""
-        return (
-            f"; {len(self._names(self.asleep.which))} of {sum(map(len, self.sleepers.bodies))} bodies asleep at the end, "
-            f"{self.times_asleep} put to rest, {self.times_woken} woken"
+    def slept(self) -> SleepRecord:
+        """Which bodies may sleep, and slept."""
+        able = self.sleepers.able
+        return SleepRecord(
+            self._names(able), self._names(~able), dict(self.first), self._names(self.asleep.which), self.times_woken
         )
 
 
