@@ -6,7 +6,7 @@ import pytest
 import gauss
 from benchmarks.free_bodies import RADIUS, floor, free_body
 from gauss import Plan, Sleeping
-from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.coordinate_groups import coordinate_groups
 from gauss.errors import SimulationError
 
@@ -206,7 +206,7 @@ def test_groups_of_coordinates_are_those_that_loads_and_joints_connect():
         if act is not None:
             act(scene)
         system = gauss.compile_scene(with_contacts(scene))
-        stepper = contact_stepper(system)
+        stepper = new_contact_stepper(system)
         groups = coordinate_groups(system, stepper.smooth, stepper.carriers, False)
         assert groups.timed.size == count == len(set(groups.of_rate.tolist()))
         assert groups.timed.sum() == (act is _driven_by_law)

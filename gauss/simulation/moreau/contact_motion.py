@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.codegen.kernels.step_memory import CHANGES_ROOM
 from gauss.dynamics.contact.contact_changes import ModeChange
-from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
@@ -69,7 +69,7 @@ class ContactMotion:
     stepper: FreeBodyStepper | MechanismStepper
 
     def __init__(self, system: System, held: bool = False, stepper: FreeBodyStepper | MechanismStepper | None = None):
-        self.system, self.stepper = system, stepper or contact_stepper(system, held)
+        self.system, self.stepper = system, stepper or new_contact_stepper(system, held)
         self.row = 4 + system.n_q + system.n_v
         self.paradoxes, self.warned = ParadoxWarnings(), set[bytes]()
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.codegen.kernels import Due
+from gauss.dynamics.contact.contact_stepper import stepper_pool
 from gauss.dynamics.engines import Engine
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Point, Rates
@@ -72,17 +73,22 @@ class PairKernelRun(PythonRun):
     def __init__(self, problem: Problem):
         self.held, system, self.accepted = problem.held, problem.system, accepted_overlap(problem)
         sleeping, held = problem.sleeping, self.held is not None
-        self.motion = ContactMotion(system, held) if sleeping is None else SleepingMotion(system, sleeping, held)
-        self.stepper = self.motion.stepper
+        self.pool = stepper_pool(system, held)
+        self.stepper = own = self.pool.take()
+        asleep = None if sleeping is None else SleepingMotion(system, sleeping, held, own)
+        self.motion = asleep or ContactMotion(system, held, own)
         self.engine = PairKernelEngine(self.stepper)
         super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
         self.h = problem.step or 0.0  # a fixed step is always given
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
-        """Trajectory to the end, from a start without penetration."""
-        self.motion.begin(start)
-        self.stepper.refuse_penetration(start, self.accepted)
-        found = super().collect(start, samples, progress)
+        """Trajectory to the end, from a start without penetration; the run ends with it."""
+        try:
+            self.motion.begin(start)
+            self.stepper.refuse_penetration(start, self.accepted)
+            found = super().collect(start, samples, progress)
+        finally:
+            self.pool.give(self.stepper)
         warn_of_laws(self.motion.largest, self.motion.relaxed, self.steps)
         warn_of_unseen_contacts(found)
         return found

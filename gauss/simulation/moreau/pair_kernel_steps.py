@@ -5,7 +5,7 @@ import numpy as np
 from gauss.codegen.kernels import Control, LoopStatus
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_question
-from gauss.dynamics.contact.contact_stepper import contact_stepper, new_contact_stepper
+from gauss.dynamics.contact.contact_stepper import lent_stepper, new_contact_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.overlap_resolution import resolved
 from gauss.dynamics.traced_system import Program
@@ -67,9 +67,10 @@ class PairKernelSteps:
     def separated(self, state: State) -> State:
         """State whose shapes do not overlap."""
         stepper = self.motion.stepper
-        if not isinstance(stepper, MechanismStepper):
-            stepper = contact_stepper(self.motion.system, True)
-        return resolved(stepper, state)
+        if isinstance(stepper, MechanismStepper):
+            return resolved(stepper, state)
+        with lent_stepper(self.motion.system, True) as other:
+            return resolved(other, state)
 
     def begun(self, start: State) -> np.ndarray:
         """Point (layout.size,) of a new motion."""

@@ -13,6 +13,7 @@ import numpy as np
 from gauss.dynamics.contact.asleep_bodies import BodySleepers
 from gauss.dynamics.contact.asleep_trees import TreeSleepers
 from gauss.dynamics.contact.contact_changes import ModeChange
+from gauss.dynamics.contact.contact_stepper import Stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
@@ -66,10 +67,12 @@ class SleepingMotion(ContactMotion):
         When they are put to rest.
     held : bool
         Whether the inputs of the scene are held in each step.
+    stepper : FreeBodyStepper or MechanismStepper, optional
+        Steps of this motion alone.
     """
 
-    def __init__(self, system: System, sleeping: Sleeping, held: bool = False):
-        super().__init__(system, held)
+    def __init__(self, system: System, sleeping: Sleeping, held: bool = False, stepper: Stepper | None = None):
+        super().__init__(system, held, stepper)
         self.whole, self.speed, self.duration = self.stepper, sleeping.speed_in(system), sleeping.duration
         self.sleepers: Any = sleepers_of(self.stepper)
 
