@@ -12,7 +12,7 @@ from gauss.backends.certificate import UNDETERMINED_SHARE
 from gauss.backends.closure import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.contact_stepper import lent_stepper
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.gap_functions import gaps, with_gaps
 from gauss.dynamics.kinematics import kinematics
@@ -153,10 +153,10 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
 def _parts(trajectory: Trajectory):
     plan = trajectory.stats.plan
     if plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None:
-        stepper = contact_stepper(trajectory.system, removal=trajectory.removal)
-        stepper.forget()
-        for index in range(len(trajectory)):
-            yield stepper.forces_over(trajectory.state(index), trajectory.step)
+        with lent_stepper(trajectory.system, removal=trajectory.removal) as stepper:
+            stepper.forget()
+            for index in range(len(trajectory)):
+                yield stepper.forces_over(trajectory.state(index), trajectory.step)
         return
     for index, motion in enumerate(trajectory.motions):
         yield contact_parts(motion, step_at(trajectory, index).force)

@@ -70,6 +70,8 @@ class Plan:
         Tier of the machine code (:mod:`gauss.codegen.tiers`). Of a plan to be followed: "quick", "optimised", or "auto",
         that of the environment variable ``GAUSS_TIER``; code that is optimised already stays so, for the results are the
         same. Of a motion that has run: "quick" if quick code ran in it, else "optimised".
+    sleepers : int or None
+        Bodies that may sleep, of a motion with ``sleeping=`` that has run; None of others.
     """
 
     driver: str
@@ -78,6 +80,7 @@ class Plan:
     fallback: str = ""
     rejected: tuple[Rejected, ...] = field(default=(), compare=False)
     tier: str = field(default=AUTO, compare=False)
+    sleepers: int | None = field(default=None, compare=False)
 
     def __post_init__(self):
         checked(self.tier, "Plan: tier")
@@ -87,9 +90,9 @@ class Plan:
         """Plan from the text of :meth:`to_json`."""
         import json  # few runs need it
 
-        driver, dynamics, stabilisation, fallback, found, *tier = json.loads(text)  # no tier in files of before it
+        driver, dynamics, stabilisation, fallback, found, *later = json.loads(text)  # files of before hold fewer
         rejected = tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in found)
-        return cls(driver, dynamics, stabilisation, fallback, rejected, *tier)
+        return cls(driver, dynamics, stabilisation, fallback, rejected, *later)
 
     def ran(self, tier: str) -> "Plan":
         """Copy with the tier of the code that ran."""
@@ -102,13 +105,15 @@ class Plan:
         """All fields as JSON."""
         import json
 
-        return json.dumps([self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected, self.tier])
+        parts = self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected, self.tier, self.sleepers
+        return json.dumps(parts)
 
     def __str__(self) -> str:
         fallback = f"; fallback: {self.fallback}" if self.fallback else ""
+        sleep = "" if self.sleepers is None else f"; {self.sleepers} bodies may sleep"
         return "\n".join(
             [
-                f"{self.driver}, {self.dynamics} dynamics, stabilisation {self.stabilisation!r}{fallback}",
+                f"{self.driver}, {self.dynamics} dynamics, stabilisation {self.stabilisation!r}{fallback}{sleep}",
                 *(f"not {rejected}" for rejected in self.rejected),
             ]
         )

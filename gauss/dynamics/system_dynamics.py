@@ -4,6 +4,7 @@ Each method imports what it answers with: a motion needs few of them.
 """
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import Store
 from gauss.errors import SimulationError, judged_later
 from gauss.system import State, Subsystem, System
+
+if TYPE_CHECKING:
+    from gauss.dynamics.contact.sleepers import Sleepers
 
 
 class SystemDynamics(Store):
@@ -39,6 +43,15 @@ class SystemDynamics(Store):
         except SimulationError as refusal:  # of the default integrator: it says what to use
             motions = refusal
         return {"motions": motions, "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
+
+    def sleepers(self, system: System) -> "Sleepers | SimulationError":
+        """Bodies that may sleep in time stepping, and those that never do; where none may, the error with the reason."""
+        from gauss.dynamics.contact.sleepers import sleepers
+
+        try:
+            return sleepers(Question(system, Laws(system)))
+        except SimulationError as refusal:
+            return refusal
 
     def cost(self, system: System, plan: Plan) -> tuple[float, float]:
         """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""

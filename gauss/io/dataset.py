@@ -19,7 +19,7 @@ from gauss.rotors import RotorMotion
 from gauss.scene.toml import from_tables
 from gauss.servo import Tracking
 from gauss.simulation import Rollout, Trajectory
-from gauss.simulation.motion_records import Event, Stats
+from gauss.simulation.motion_records import Event, SleepRecord, Stats
 from gauss.simulation.provenance import library
 from gauss.system import System
 
@@ -187,6 +187,8 @@ def _require_own(path, system: System, rates: list[str], q: np.ndarray):
 
 def _stats(about: dict) -> Stats:
     stats = Stats(**{name: _read(about[f"cost_{name}"]) for name in Stats._fields if f"cost_{name}" in about})
+    if isinstance(stats.sleep, dict):
+        stats = stats._replace(sleep=SleepRecord(**stats.sleep))
     return stats if stats.plan is None else stats._replace(plan=Plan.from_json(str(stats.plan)))
 
 

@@ -8,6 +8,28 @@ import numpy as np
 from gauss.dynamics.rules import Plan
 
 
+class SleepRecord(NamedTuple):
+    """Sleeping of bodies in a motion.
+
+    Attributes
+    ----------
+    able, never : tuple of str
+        Bodies that may sleep, and those that never do, as a law of time or a prescribed motion acts on them.
+    steps : dict of str to int
+        Number of steps after which each body slept first; of those that slept.
+    asleep : tuple of str
+        Bodies asleep at the end.
+    woken : int
+        How often a body was woken.
+    """
+
+    able: tuple[str, ...]
+    never: tuple[str, ...]
+    steps: dict[str, int]
+    asleep: tuple[str, ...]
+    woken: int
+
+
 class Stats(NamedTuple):
     """Statistics of a simulation.
 
@@ -35,6 +57,8 @@ class Stats(NamedTuple):
         Driver and dynamics of the motion.
     handed_over : float or None
         Time from which the fallback of the plan continued [s]; None if it was not needed.
+    sleep : SleepRecord or None
+        Which bodies slept, of a motion with ``sleeping=``.
     """
 
     evaluations: int
@@ -50,6 +74,7 @@ class Stats(NamedTuple):
     opaque: str = ""
     plan: Plan | None = None
     handed_over: float | None = None
+    sleep: SleepRecord | None = None
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from gauss.errors import FileError, extra
 from gauss.scene import Scene
 from gauss.scene.toml import toml_text
 from gauss.simulation import Trajectory
+from gauss.simulation.motion_records import SleepRecord
 from gauss.versions import version_of
 
 MADE_BY = ("gauss", "numpy", "scipy", "llvmlite")
@@ -50,6 +51,8 @@ def plain(value):
     """Value as a type of netCDF attributes: number, text, array of a tuple, JSON of plans and dicts."""
     if isinstance(value, Plan):
         return value.to_json()
+    if isinstance(value, SleepRecord):
+        return json.dumps(value._asdict())
     if isinstance(value, tuple):
         return np.array(value, dtype=float)
     if isinstance(value, dict):

@@ -1,6 +1,7 @@
 """Simulation of a motion: check the arguments, select the plan, and let its driver compute the trajectory."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -117,9 +118,10 @@ def simulate(
     rate : float, optional
         Samples of the law in a second [Hz]; the first is at the start.
     sleeping : bool or Sleeping
-        By time stepping of free bodies: islands of bodies that touch each other sleep once they have been slow for a while
-        (:class:`Sleeping`), and cost next to nothing until another body pushes them. Their kinetic energy counts as
-        dissipated; events "sleeps" and "wakes" name the bodies.
+        By time stepping with contacts of shapes: islands of bodies that touch each other, with all that joints and loads
+        connect with them, sleep once they have been slow for a while (:class:`Sleeping`), and cost little until another
+        body pushes them, or an input that acts on them changes. What a law of time or a prescribed motion acts on never
+        sleeps. Their kinetic energy counts as dissipated; events "sleeps" and "wakes" name the bodies.
     verify : bool
         Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool
@@ -262,4 +264,6 @@ def _again(problem: Problem, plan: Plan, step, tolerance, samples, mesh=()) -> T
 
 def _recorded(problem: Problem, found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
     """Trajectory with its settings and its plan, and with the system of its inputs."""
+    if found.stats.sleep is not None:
+        plan = replace(plan, sleepers=len(found.stats.sleep.able))
     return found.recorded(found.system if problem.held is None else problem.held.recorded(), settings, plan)

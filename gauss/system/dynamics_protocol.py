@@ -49,6 +49,9 @@ class Dynamics(Protocol):
     def plans(self, system: "System") -> dict:
         """Plans of its motions and of single states, {what: plan}, or the error that says what they need."""
 
+    def sleepers(self, system: "System"):
+        """Bodies that may sleep in time stepping, and those that never do; where none may, the error with the reason."""
+
     def cost(self, system: "System", plan) -> tuple[float, float]:
         """Estimated cost of an evaluation by a plan [s], and its ratio to that of the fastest route that is barred."""
 

@@ -47,6 +47,18 @@ def _one_sided(system) -> list[str]:
     return [f"  unilateral constraints: {words}{more}"]
 
 
+def _sleeping(system) -> list[str]:
+    """How many bodies may sleep in time stepping, of scenes with contacts of shapes."""
+    if not system.scene.shapes or not system.scene.contacts or system.dynamics is None:
+        return []
+    found = system.dynamics.sleepers(system)
+    if isinstance(found, SimulationError):
+        return [f"  sleeping in time stepping: no body, {found}"]
+    able, never = found
+    rest = f"; never, by laws of time or prescribed motions: {listed(never, MOST_LISTED)}" if never else ""
+    return [f"  sleeping in time stepping: {len(able)} of {len(able) + len(never)} moving bodies may{rest}"]
+
+
 def _freedoms(system, counted: str) -> list[str]:
     """Freedoms by counting, and with loops by rank at the start of the scene."""
     structure, lines = system.structure, [f"  freedoms by counting: {counted}"]
@@ -119,6 +131,7 @@ def explain(system) -> str:
         else f"  loop constraints, couplings, relations: {', '.join(loops)}",
         *_one_sided(system),
         *([f"  set-valued elements: {listed(system.scene.set_valued, MOST_LISTED)}"] if system.scene.set_valued else []),
+        *_sleeping(system),
         *_method(system),
         *_reductions(system),
         "",

@@ -9,7 +9,7 @@ import pytest
 import gauss
 from gauss import Plan
 from gauss.bench.fuzz.scenes import moved_scene
-from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.errors import ContactLawWarning, PainleveWarning, StateError
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from tests.support import mechanisms
@@ -133,7 +133,7 @@ def test_mechanisms_move_as_by_the_machine_code_of_the_scene(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_machine_code_and_python_take_the_same_steps(name):
     system = gauss.compile_scene(SCENES[name]())
-    stepper = contact_stepper(system)
+    stepper = new_contact_stepper(system)
     if stepper.memory is None:
         assert name == "four_bar"
         return

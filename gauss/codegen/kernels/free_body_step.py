@@ -11,6 +11,7 @@ from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function
 from gauss.codegen.kernels.arrays import Routine, Value
+from gauss.codegen.kernels.asleep import pushes_asleep
 from gauss.codegen.kernels.block_contacts import CONTACT, ELIMINATED, MASS, BlockContactLaws, write_block_contacts
 from gauss.codegen.kernels.block_lu import write_order
 from gauss.codegen.kernels.contact_islands import ISLANDS, ContactIslands
@@ -282,14 +283,9 @@ class _FreeBodyStepWriter:
 
     def _wakes(self, m: Value) -> Value:
         """Whether a contact pushes a body asleep; their columns follow those of the moving bodies."""
-        r, at, woken = self.r, self.at, self.r.variable(0, INTEGER)
-        first, found, body = at.n["n"], at.table("found"), at.table("body")
-        with r.when(at.n["sleepers"] > 0), r.each(m) as c, r.when(at["f"][self.islands.contact[c] * 3] > 0.0):
-            for part in parts_of(found[c * 2], at.n["parts"]):
-                column = body[part * BODY]
-                with r.when((column >= first) & (column < first + at.n["sleepers"])):
-                    woken[0] = 1
-        return woken[0]
+        at, first = self.at, self.at.n["n"]
+        force = lambda c: at["f"][self.islands.contact[c] * 3]  # noqa: E731
+        return pushes_asleep(at, m, force, lambda column: (column >= first) & (column < first + at.n["sleepers"]))
 
     def _known(self, m: Value):
         """Initial impulses, those of the last step: contacts of both steps come in the same order."""

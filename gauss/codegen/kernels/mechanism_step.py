@@ -14,6 +14,7 @@ from llvmlite import ir
 from gauss.codegen import POINTER, Function
 from gauss.codegen.kernels.active_contacts import ActiveContacts
 from gauss.codegen.kernels.arrays import Routine, Value
+from gauss.codegen.kernels.asleep import pushes_asleep
 from gauss.codegen.kernels.contact_modes import ContactModes
 from gauss.codegen.kernels.contact_rows import ContactRows
 from gauss.codegen.kernels.contact_solver import ContactSolver
@@ -73,7 +74,7 @@ class _StepWriter:
         with r.when(~unknown):
             self.rows.write(m)
             self.free.at_later_rates(m * 3 + self.at.n["g"] + self.at.n["s"])
-            with r.when(~(self._impact(m) > 0.0)), r.when(self.contacts.solve(m)):
+            with r.when(~(self._impact(m) > 0.0)), r.when(self.contacts.solve(m)), r.when(~(self._wakes(m) > 0)):
                 self._finish(m, m * 3 + self.at.n["g"] + self.at.n["s"], speed)
         return r.done()
 
@@ -94,6 +95,11 @@ class _StepWriter:
         with r.when(found[0] > 0.0):
             self.status[0] = IMPACT
         return found[0]
+
+    def _wakes(self, m: Value) -> Value:
+        """Whether a contact pushes a body asleep."""
+        asleep = self.at.table("asleep")
+        return pushes_asleep(self.at, m, lambda c: self.at["force"][c], lambda body: asleep[body] > 0)
 
     def _finish(self, m: Value, rows: Value, speed: Value):
         """State at the end of the step, power, and the forces to be known in the next step."""

@@ -16,13 +16,13 @@ from gauss.codegen.kernels.near_pairs import INTEGERS, NEAR_INTEGERS, NEAR_NUMBE
 
 SIZES = (
     *("n_q", "n_v", "r", "links", "bodies", "g", "s", "entries", "flat", "parts", "pairs", "capacity", "loops", "input"),
-    "laws",
+    *("laws", "sleepers"),
 )
 ADDRESSES = (
     *("begin", "forces", "move", "entries"),
     *NEAR_INTEGERS,
     *NEAR_NUMBERS,
-    *("known_found", "known_count", "under", "status", "row", "column"),
+    *("known_found", "known_count", "under", "status", "row", "column", "asleep"),
     *("modes", "next_modes", "closed", "fresh", "counts"),
 )
 TERMS = ("M", "tau", "power", "bodies", "J", "gap", "rate", "K", "bias")  # of the mechanism, in this order

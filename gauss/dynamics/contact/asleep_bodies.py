@@ -11,91 +11,117 @@ import numpy as np
 from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_memory
 from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper, block_contact_laws
-from gauss.dynamics.contact.near_contacts import NearContacts
+from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
+from gauss.dynamics.contact.linked import linked
 from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.system import State
 
 
-def stepper_of_awake(whole: FreeBodyStepper, asleep: np.ndarray, state: State) -> FreeBodyStepper:
-    """Stepper of the bodies that are awake.
+class BodySleepers:
+    """What may sleep of free bodies: each of them.
 
     Parameters
     ----------
-    asleep : ndarray of bool, shape (n,)
-        Bodies that sleep.
+    whole : FreeBodyStepper
+        Stepper of all bodies.
+
+    Attributes
+    ----------
+    rates, bodies, able
+        As of :class:`gauss.dynamics.contact.asleep_trees.TreeSleepers`.
     """
-    made, awake = copy(whole), ~asleep
-    made.asleep = np.flatnonzero(asleep)
-    made.moving = [joint for joint, moves in zip(whole.moving, awake, strict=True) if moves]
-    made.child, made.n = whole.child[awake], len(made.moving)
-    for name in ("given", "q_places", "v_places", "gravity"):
-        setattr(made, name, getattr(whole, name)[:, awake].copy())
-    made.reach = whole.reach[awake]
-    still = np.zeros((24, made.asleep.size))
-    still[:12] = whole.begin(state, 0.0, 0.0).bodies[:12, made.asleep]
-    made.fixed = np.concatenate([still, whole.fixed], axis=1)
-    column = np.arange(whole.n + whole.fixed.shape[1])
-    column[np.flatnonzero(awake)], column[made.asleep] = np.arange(made.n), made.n + np.arange(made.asleep.size)
-    made.table = copy(whole.table)
-    made.table.body, made.table.law = column[whole.table.body], whole.table.law.copy()
-    stands = np.flatnonzero(made.table.body >= made.n)
-    made.table.law[np.ix_(stands, stands)] = 0
-    made.detection = NearDetection(made.table, column.size, whole.system.scale.length, whole.detection.code)
-    made.record, made.graph = ModeRecord(len(made.elements)), None
-    made.memory = first_memory(made, block_contact_laws(), made.settings)
-    made.forget()
-    return made
 
+    def __init__(self, whole: FreeBodyStepper):
+        self.whole, self.count = whole, whole.n
+        self.rates, names = list(whole.v_places.T), whole.system.structure.bodies
+        self.bodies = [(names[body],) for body in whole.child]
+        self.able = np.ones(whole.n, dtype=bool)
+        self.lever = whole.reach + np.linalg.norm(whole.given[21:24], axis=0)  # from the joint point
 
-def pushed_asleep(stepper: FreeBodyStepper, near: NearContacts, force: np.ndarray) -> np.ndarray:
-    """Bodies asleep that forces (m, 3) of near contacts push, as columns of the stepper of all bodies."""
-    pushed = near.bodies[force[:, 0] > 0.0] - stepper.n
-    return stepper.asleep[np.unique(pushed[(pushed >= 0) & (pushed < stepper.asleep.size)])]
+    def known_of_none(self) -> KnownContacts:
+        """Forces on nothing."""
+        return KnownContacts(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((6, 0)))
 
+    def speeds(self, v: np.ndarray, state: State) -> np.ndarray:
+        """Speeds (k, n) of the fastest point of each body, at rates (k, n_v) [m/s]."""
+        parts = v[:, self.whole.v_places]  # (k, 6, n)
+        return np.linalg.norm(parts[:, :3], axis=1) + np.linalg.norm(parts[:, 3:], axis=1) * self.lever
 
-def bodies_of(whole: FreeBodyStepper, key: np.ndarray) -> np.ndarray:
-    """Columns (m, 2) of the bodies of contacts by their keys."""
-    return whole.table.body[np.column_stack(whole.table.pair(key))].reshape(-1, 2)
+    def kinetic_energies(self, state: State) -> np.ndarray:
+        """Kinetic energy (n,) of each body [J]."""
+        n, begun = self.count, self.whole.begin(state, 0.0, 0.0)
+        spin, pull, inertia = begun.both[:n, :3, 0], begun.both[:n, 3:6, 0], begun.mass[:, :9].reshape(-1, 3, 3)
+        return 0.5 * ((spin[:, None] @ inertia @ spin[:, :, None]).ravel() + begun.mass[:, 18] * (pull * pull).sum(axis=1))
 
+    def _bodies_of(self, key: np.ndarray) -> np.ndarray:
+        """Columns (m, 2) of the bodies of contacts by their keys."""
+        return self.whole.table.body[np.column_stack(self.whole.table.pair(key))].reshape(-1, 2)
 
-def islands(whole: FreeBodyStepper, known: KnownContacts) -> np.ndarray:
-    """Number (n,) of the island of each body, by contacts that bear a force; −1 of bodies without one."""
-    bodies = bodies_of(whole, known.key[known.force[:, 0] > 0.0])
-    parent = list(range(whole.n))
+    def islands(self, known: KnownContacts) -> np.ndarray:
+        """Number (n,) of the island of each body, by contacts that bear a force; −1 of bodies without one."""
+        bodies = self._bodies_of(known.key[known.force[:, 0] > 0.0])
+        root = linked(self.count, bodies[(bodies < self.count).all(axis=1)].tolist())
+        touched, found = np.unique(bodies[bodies < self.count]), np.full(self.count, -1)
+        found[touched] = root[touched]
+        return found
 
-    def root(body: int) -> int:
-        while parent[body] != body:
-            parent[body] = parent[parent[body]]
-            body = parent[body]
-        return body
+    def split(self, known: KnownContacts, asleep: np.ndarray) -> tuple[KnownContacts, KnownContacts]:
+        """Contacts of bodies that are awake, and those of bodies asleep, of the known contacts of all."""
+        fixed = np.zeros(self.whole.fixed.shape[1], dtype=bool)
+        rests = np.append(asleep, fixed)[self._bodies_of(known.key)].any(axis=1)
+        return (
+            KnownContacts(known.key[~rests], known.force[~rests], known.expected[:, ~asleep]),
+            KnownContacts(known.key[rests], known.force[rests], known.expected[:, asleep]),
+        )
 
-    for one, other in bodies[(bodies < whole.n).all(axis=1)].tolist():
-        parent[root(other)] = root(one)
-    found = np.full(whole.n, -1)
-    for body in np.unique(bodies[bodies < whole.n]).tolist():
-        found[body] = root(body)
-    return found
+    def joined(self, awake: KnownContacts, resting: KnownContacts, asleep: np.ndarray) -> KnownContacts:
+        """Known contacts of all bodies, from those of :meth:`split`."""
+        key = np.concatenate([awake.key, resting.key])
+        order, expected = np.argsort(key), np.empty((6, asleep.size))
+        expected[:, ~asleep], expected[:, asleep] = awake.expected, resting.expected
+        return KnownContacts(key[order], np.concatenate([awake.force, resting.force])[order], expected)
 
+    def stepper(self, asleep: np.ndarray, state: State) -> FreeBodyStepper:
+        """Stepper of the bodies that are awake, by the state of all."""
+        whole = self.whole
+        made, awake = copy(whole), ~asleep
+        made.asleep = np.flatnonzero(asleep)
+        made.moving = [joint for joint, moves in zip(whole.moving, awake, strict=True) if moves]
+        made.child, made.n = whole.child[awake], len(made.moving)
+        for name in ("given", "q_places", "v_places", "gravity"):
+            setattr(made, name, getattr(whole, name)[:, awake].copy())
+        made.reach = whole.reach[awake]
+        still = np.zeros((24, made.asleep.size))
+        still[:12] = whole.begin(state, 0.0, 0.0).bodies[:12, made.asleep]
+        made.fixed = np.concatenate([still, whole.fixed], axis=1)
+        column = np.arange(whole.n + whole.fixed.shape[1])
+        column[np.flatnonzero(awake)], column[made.asleep] = np.arange(made.n), made.n + np.arange(made.asleep.size)
+        made.table = copy(whole.table)
+        made.table.body, made.table.law = column[whole.table.body], whole.table.law.copy()
+        stands = np.flatnonzero(made.table.body >= made.n)
+        made.table.law[np.ix_(stands, stands)] = 0
+        made.detection = NearDetection(made.table, column.size, whole.system.scale.length, whole.detection.code)
+        made.record, made.graph = ModeRecord(len(made.elements)), None
+        made.memory = first_memory(made, block_contact_laws(), made.settings)
+        made.forget()
+        return made
 
-def split(whole: FreeBodyStepper, known: KnownContacts, asleep: np.ndarray) -> tuple[KnownContacts, KnownContacts]:
-    """Contacts of bodies that are awake, and those of bodies asleep, of the known contacts of all."""
-    rests = np.append(asleep, np.zeros(whole.fixed.shape[1], dtype=bool))[bodies_of(whole, known.key)].any(axis=1)
-    return (
-        KnownContacts(known.key[~rests], known.force[~rests], known.expected[:, ~asleep]),
-        KnownContacts(known.key[rests], known.force[rests], known.expected[:, asleep]),
-    )
+    def places(self, asleep: np.ndarray) -> np.ndarray:
+        """Numbers of the elements of the stepper of those awake among the elements of the scene: all of them."""
+        return np.arange(len(self.whole.elements))
 
+    def pushed(self, stepper: FreeBodyStepper, step: FreeBodyStep) -> np.ndarray:
+        """Bodies asleep that contacts of a step push, as columns of the stepper of all bodies."""
+        pushed = step.contacts.bodies[step.force[:, 0] > 0.0] - stepper.n
+        return stepper.asleep[np.unique(pushed[(pushed >= 0) & (pushed < stepper.asleep.size)])]
 
-def joined(awake: KnownContacts, resting: KnownContacts, asleep: np.ndarray) -> KnownContacts:
-    """Known contacts of all bodies, from those of :func:`split`."""
-    key = np.concatenate([awake.key, resting.key])
-    order, expected = np.argsort(key), np.empty((6, asleep.size))
-    expected[:, ~asleep], expected[:, asleep] = awake.expected, resting.expected
-    return KnownContacts(key[order], np.concatenate([awake.force, resting.force])[order], expected)
+    def closed(self, known: KnownContacts, asleep: np.ndarray) -> np.ndarray:
+        """Whether elements of the scene have contacts that bear a force on the bodies asleep."""
+        found = np.zeros(len(self.whole.elements), dtype=bool)
+        first, second = self.whole.table.pair(known.key[known.force[:, 0] > 0.0])
+        found[self.whole.table.law[first, second] - 1] = True
+        return found
 
-
-def kinetic_energies(whole: FreeBodyStepper, state: State) -> np.ndarray:
-    """Kinetic energy (n,) of each body [J]."""
-    begun = whole.begin(state, 0.0, 0.0)
-    spin, pull, inertia = begun.both[: whole.n, :3, 0], begun.both[: whole.n, 3:6, 0], begun.mass[:, :9].reshape(-1, 3, 3)
-    return 0.5 * ((spin[:, None] @ inertia @ spin[:, :, None]).ravel() + begun.mass[:, 18] * (pull * pull).sum(axis=1))
+    def reached(self, before: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+        """Bodies that changed inputs act on: none."""
+        return np.zeros(0, dtype=np.int64)

@@ -59,6 +59,7 @@ class MechanismMemory(CompiledStepMemory):
             "loops": int(smooth.closes),
             "laws": len(table.contacts),
             "input": stepper.inputs.size,
+            "sleepers": stepper.asleep.sum(),
         }
         parts = dict(zip(MechanismTerms._fields, kernels.layout.parts, strict=True))
         terms = {f"flat:{name}": ("flat", parts[name][0].start) for name in TERMS}
@@ -84,6 +85,7 @@ class MechanismMemory(CompiledStepMemory):
             "status": np.zeros(1, dtype=np.int64),
             "row": row.astype(np.int64),
             "column": column.astype(np.int64),
+            "asleep": stepper.asleep.astype(np.int64),
         }
         time = stepper.system.scale.time
         rates = time * RESTING, time * SLIDING_SPEED

@@ -328,11 +328,11 @@ class FreeBodyStepper:
         normal[self.table.gap_places(key)] = force[:, 0]
         return normal
 
-    def refuse_penetration(self, state: State):
-        """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
+    def refuse_penetration(self, state: State, accepted: float = START_OVERLAP):
+        """Raise a StateError for penetration at the start, deeper than accepted, relative to the scale of a gap."""
         near = self._near(state, self.begin(state, 0.0, 0.0), 0.0, 0.0, 0.0)
         worst = int(np.argmin(near.gap)) if near.gap.size else 0
-        if near.gap.size and near.gap[worst] < -START_OVERLAP * self.system.scale.length:
+        if near.gap.size and near.gap[worst] < -accepted * self.system.scale.length:
             name = self.table.contacts[near.law[worst]].name
             raise StateError(
                 f"t = {state.t:.6g} s: {-near.gap[worst]:.3g} [m, rad] inside of {name!r}; move it out with scene.start, "

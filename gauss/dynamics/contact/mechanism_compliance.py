@@ -5,6 +5,7 @@
 Rows of loops G may be redundant, hence the pseudo-inverse. Coordinates with constant sums alone are made independent.
 """
 
+from copy import copy
 from typing import cast
 
 import numpy as np
@@ -33,9 +34,23 @@ class Compliance:
 
     def __init__(self, smooth: System):
         self.free_columns = _null_space(smooth) if is_coupled_tree(smooth) else None
+        self.still = np.zeros(smooth.n_v, dtype=bool)  # rates of bodies asleep
+
+    def without(self, rates: np.ndarray) -> "Compliance":
+        """The compliance while some rates (n_v,) stay zero; no constraint couples them with others."""
+        made = copy(self)
+        made.still = rates
+        if self.free_columns is not None:
+            made.free_columns = self.free_columns[:, ~self.free_columns[rates].any(axis=0)]
+        return made
 
     def of(self, terms: MechanismTerms) -> tuple[np.ndarray, np.ndarray]:
         """Compliance H (n_v, n_v), and accelerations (n_v,) by the biases of loops."""
+        H, offset = self._of_all(terms)
+        H[self.still], H[:, self.still], offset[self.still] = 0.0, 0.0, 0.0
+        return H, offset
+
+    def _of_all(self, terms: MechanismTerms) -> tuple[np.ndarray, np.ndarray]:
         M = terms.M
         if self.free_columns is not None:
             N = self.free_columns

@@ -8,6 +8,7 @@ bodies at q̈ = 0 are the biases of their accelerations. Stops, ropes and dry fr
 """
 
 from collections.abc import Callable
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +61,25 @@ class SparseArrays:
     def __getstate__(self) -> dict:
         return {name: vars(self)[name] for name in ("flat", "entries", "parts")}
 
+    def chosen(self, rows: list[np.ndarray | None]) -> "SparseArrays":
+        """The same outputs in arrays of some rows alone; None for all of them. The others go to an entry of their own.
+
+        Parameters
+        ----------
+        rows : list of ndarray of int, or None
+            Rows of each array.
+        """
+        numbers = [np.arange(part.start, part.stop).reshape(shape) for part, shape in self.parts]
+        kept = [one if which is None else one[which] for one, which in zip(numbers, rows, strict=True)]
+        old = np.concatenate([one.ravel() for one in kept])
+        place = np.full(self.flat.size, old.size)
+        place[old] = np.arange(old.size)
+        made, ends = copy(self), np.cumsum([one.size for one in kept]).tolist()
+        made.flat, made.entries = np.append(self.flat[old], 0.0), place[self.entries]
+        shapes = [one.shape for one in kept]
+        made.parts = [(slice(a, b), shape) for a, b, shape in zip([0, *ends], ends, shapes, strict=False)]
+        return made
+
     def filled(self, values: np.ndarray) -> list[np.ndarray]:
         """Arrays with the values of the outputs."""
         flat = self.flat.copy()
@@ -104,8 +124,8 @@ class MechanismTerms(NamedTuple):
     beta: np.ndarray
 
 
-class MechanismKernels:
-    """Machine code of one system.
+class TracedMechanism:
+    """Terms of one system, traced.
 
     Parameters
     ----------
@@ -119,39 +139,15 @@ class MechanismKernels:
         Whether the inputs of the scene are the last arguments of forces; otherwise they are zero.
     """
 
-    receiver = None  # machine code calls no opaque laws
-
     def __init__(self, system: System, smooth: System, carriers: tuple[int, ...], inputs: bool = False):
         self.system, self.smooth, self.carriers = system, smooth, carriers
-        laws = Laws(smooth)
-        self.called, kind = called_loads(smooth) if laws.called else None, CallingKernel if laws.called else Kernel
-        self.loads = [*laws.traced, *(input_loads(smooth) if inputs else ())]
+        self.laws = Laws(smooth)
+        self.called = called_loads(smooth) if self.laws.called else None
+        self.loads = [*self.laws.traced, *(input_loads(smooth) if inputs else ())]
         self.inputs = tuple(smooth.scene.inputs) if inputs else ()
-        n_q, n_v = smooth.n_q, smooth.n_v
 
-        def begin(t, q, v):
-            self._order_inputs(t)
-            arrays = SparseArrays(self._terms(t[0], q, v))
-            self.layout = arrays
-            return (arrays.outputs,)
-
-        self.begin = kind(write(begin, 1, n_q, n_v, name="mechanism"), batch=False)
-        self.forces = kind(write(self._forces, 1, n_q, n_v, name="forces"), batch=False)
-        self.move = Kernel(write(lambda q, by: (retract(smooth, q, by),), n_q, n_v, name="move"), batch=False)
-
-    def __getstate__(self) -> dict:
-        return {name: vars(self)[name] for name in ("layout", "begin", "forces", "move")}
-
-    def terms(self, t: float, q: np.ndarray, v: np.ndarray, inputs=()) -> MechanismTerms:
-        """Terms of a state; M, poses, Jacobians and rows."""
-        given = np.concatenate([[t], q, v, inputs])
-        return MechanismTerms(*self.layout.filled(self.begin(given)))
-
-    def addresses(self) -> dict[str, int]:
-        """Addresses of the kernels by name."""
-        return {name: getattr(self, name).address() for name in ("begin", "forces", "move")}
-
-    def _terms(self, t, q, v) -> MechanismTerms:
+    def terms_at(self, t, q, v) -> MechanismTerms:
+        """Terms of a state in symbols."""
         terms = StateTerms(self.smooth, q, v, t)
         parts = [*(_body(terms, body) for body in self.carriers), GROUND_BODY]
         bodies = np.array(parts, dtype=object).reshape(len(parts), BODY).T
@@ -172,13 +168,14 @@ class MechanismKernels:
             *self._dependent(terms),
         )
 
-    def _order_inputs(self, t):
+    def order_inputs(self, t):
         """Let the inputs of the scene be the last ones of a function that is traced, in the order of the scene."""
         for name in self.inputs:
             t[0].graph.parameter(name)
 
-    def _forces(self, t, q, v):
-        self._order_inputs(t)
+    def forces_at(self, t, q, v):
+        """Generalised forces less the bias forces, and power, of a state in symbols."""
+        self.order_inputs(t)
         terms = StateTerms(self.smooth, q, v, t[0])
         tau, power = self._load_forces(terms, t[0], q, v)
         return tau - terms.tree_bias_forces, power
@@ -220,6 +217,52 @@ class MechanismKernels:
             B[place] = jacobian(loop_joint.rates(terms.velocities, still=True), terms.v)
             beta[place] = loop_joint.rates(terms.biases, still=False)
         return B, beta
+
+
+class MechanismKernels:
+    """Machine code of one system; parameters as of :class:`TracedMechanism`."""
+
+    receiver = None  # machine code calls no opaque laws
+
+    def __init__(self, system: System, smooth: System, carriers: tuple[int, ...], inputs: bool = False):
+        traced, n_q, n_v = TracedMechanism(system, smooth, carriers, inputs), smooth.n_q, smooth.n_v
+        kind = CallingKernel if traced.laws.called else Kernel
+
+        def begin(t, q, v):
+            traced.order_inputs(t)
+            self.layout = SparseArrays(traced.terms_at(t[0], q, v))
+            return (self.layout.outputs,)
+
+        self.begin = kind(write(begin, 1, n_q, n_v, name="mechanism"), batch=False)
+        self.forces = kind(write(traced.forces_at, 1, n_q, n_v, name="forces"), batch=False)
+        self.move = Kernel(write(lambda q, by: (retract(smooth, q, by),), n_q, n_v, name="move"), batch=False)
+
+    def __getstate__(self) -> dict:
+        return {name: vars(self)[name] for name in ("layout", "begin", "forces", "move")}
+
+    def of_rows(self, rows: np.ndarray, gaps: int) -> "MechanismKernels":
+        """The same code for some of the stops, ropes and set-valued elements.
+
+        Parameters
+        ----------
+        rows : ndarray of int
+            Their numbers.
+        gaps : int
+            How many of them are gap functions; these come first.
+        """
+        made = copy(self)
+        chosen = {name: rows for name in ("rate", "K", "bias")} | {"gap": rows[:gaps]}
+        made.layout = self.layout.chosen([chosen.get(name) for name in MechanismTerms._fields])
+        return made
+
+    def terms(self, t: float, q: np.ndarray, v: np.ndarray, inputs=()) -> MechanismTerms:
+        """Terms of a state; M, poses, Jacobians and rows."""
+        given = np.concatenate([[t], q, v, inputs])
+        return MechanismTerms(*self.layout.filled(self.begin(given)))
+
+    def addresses(self) -> dict[str, int]:
+        """Addresses of the kernels by name."""
+        return {name: getattr(self, name).address() for name in ("begin", "forces", "move")}
 
 
 class CallingMechanismKernels:

@@ -5,6 +5,7 @@
 Stops, ropes and gap functions are written out with the mechanism, contacts of shapes come from kernels of their pairs.
 """
 
+from copy import copy
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -55,7 +56,7 @@ class MechanismRows:
         gaps = sides(scene)
         mine = np.array([side.name in others for side in gaps], dtype=bool)
         self.others = [side for side in gaps if side.name in others]
-        self.other_places = np.flatnonzero(mine)
+        self.other_places, self.contact_places = np.flatnonzero(mine), np.flatnonzero(~mine)
         self.gap_count = len(gaps)
         scales = gap_scales(system)[mine] if mine.any() else np.zeros(0)
         time, length = system.scale.time, system.scale.length
@@ -72,6 +73,18 @@ class MechanismRows:
             *scene.set_valued,
         ]
         self.lossy = np.array([element.lossy for element in elements], dtype=bool)
+
+    def chosen(self, rows: np.ndarray, table: ShapeTable) -> "MechanismRows":
+        """Rows of some of the other gaps and set-valued elements, by their numbers in order, with another table."""
+        made, g = copy(self), len(self.others)
+        gaps, elements = rows[rows < g], rows[rows >= g] - g
+        made.table, made.others = table, [self.others[k] for k in gaps]
+        made.other_places, made.other_unit = self.other_places[gaps], self.other_unit[gaps]
+        made.other_restitution, made.set_unit = self.other_restitution[gaps], self.set_unit[elements]
+        made.limit, made.lossy = self.limit[elements], self.lossy[elements]
+        laws = len(table.contacts)
+        made.elements = [*self.elements[:laws], *(self.elements[laws + k] for k in rows)]
+        return made
 
     def of(self, terms: MechanismTerms, near: NearContacts) -> StepRows:
         """Rows of a state."""
@@ -167,15 +180,14 @@ class MechanismRows:
         normal = np.zeros(self.gap_count)
         normal[self.other_places] = others[: len(self.others)]
         if key.size:
-            own = np.setdiff1d(np.arange(self.gap_count), self.other_places)
-            normal[own[self.table.gap_places(key)]] = force[:, 0]
+            normal[self.contact_places[self.table.gap_places(key)]] = force[:, 0]
         return normal
 
     def of_gaps(self, near: NearContacts, force: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Normal forces (g,) of all gaps of the scene, and friction (g, 3) on the first bodies, world axes [N]."""
         normal, friction = self.normal_forces(near.key, force, others), np.zeros((self.gap_count, 3))
         if near.gap.size:
-            places = np.setdiff1d(np.arange(self.gap_count), self.other_places)[self.table.gap_places(near.key)]
+            places = self.contact_places[self.table.gap_places(near.key)]
             across = (force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1)
             friction[places] = across * self.table.sides(near.key)[:, None]
         return normal, friction

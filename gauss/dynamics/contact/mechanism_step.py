@@ -31,7 +31,7 @@ from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection, near_pairs
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
-from gauss.dynamics.contact.shape_table import ShapeTable
+from gauss.dynamics.contact.shape_table import ShapeTable, carriers_of
 from gauss.dynamics.contact.step_doubts import JAMMED_RESPONSE, paradoxes_of_step, refuse_jam
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale, centrifugal_scale
 from gauss.dynamics.inputs import InputForces
@@ -58,15 +58,19 @@ class MechanismStepper:
     ----------
     inputs : ndarray, shape (n_u,)
         Values of the inputs in the next step.
+    asleep : ndarray of bool, shape (k + 1,)
+        Which bodies that carry shapes sleep: the contacts of a step must not push them.
     """
 
     def __init__(self, system: System, held: bool = False, removal: float = 0.0):
         self.system, self.smooth, self.table = system, smooth_system(system), ShapeTable(system)
         self.removal = removal
-        carriers = tuple(sorted({int(body) for body in self.table.body if body >= 0}))
+        carriers = carriers_of(system)
+        self.carriers, self.held = carriers, held
         self.kernels = mechanism_kernels(system, self.smooth, carriers, held)
         self.inputs = np.zeros(len(system.scene.inputs) if held else 0)
         self.n = len(carriers)
+        self.asleep = np.zeros(self.n + 1, dtype=bool)
         places = {body: k for k, body in enumerate(carriers)}
         self.table.body = np.array([places.get(int(body), self.n) for body in self.table.body], dtype=np.int64)
         self.reach = np.zeros(self.n + 1)
@@ -130,8 +134,12 @@ class MechanismStepper:
 
     def forget(self):
         """Forget the forces and inputs of the last step: a new motion begins."""
-        self.detection.connect()
         self.inputs[:] = 0.0
+        self.connect()
+
+    def connect(self):
+        """Forget the forces of the last step, and take all addresses anew."""
+        self.detection.connect()
         self.forget_forces()
         self.record.forget()
         if self.memory is not None:
@@ -361,8 +369,8 @@ class MechanismStepper:
         m, time = rows.gap.size, self.system.scale.time
         return rows.gap / time, rows.K[:m] / time, begun.H, [self.rows.name(near, k) for k in range(m)]
 
-    def refuse_penetration(self, state: State):
-        """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
+    def refuse_penetration(self, state: State, accepted: float = START_OVERLAP):
+        """Raise a StateError for penetration at the start, deeper than accepted, relative to the scale of a gap."""
         begun = self._begin(state, 0.0, 0.0)
         near = self._near(state, begun, 0.0, 0.0, 0.0)
         depth = (
@@ -370,7 +378,7 @@ class MechanismStepper:
             / self.system.scale.time
         )
         worst = int(np.argmax(depth)) if depth.size else 0
-        if depth.size and not depth[worst] <= START_OVERLAP:
+        if depth.size and not depth[worst] <= accepted:
             inside = -np.concatenate([near.gap, begun.terms.gap])[worst]
             raise StateError(
                 f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.rows.name(near, worst)!r}; "

@@ -289,14 +289,14 @@ class MoreauStepper:
         """Name of the contact, stop or rope of a gap."""
         return self.owners[self.names.index(gap)]
 
-    def refuse_penetration(self, state: State):
-        """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
+    def refuse_penetration(self, state: State, accepted: float = START_OVERLAP):
+        """Raise a StateError for penetration at the start, deeper than accepted, relative to the scale of a gap."""
         width = self.kernel(state).width / gap_scales(self.system)
         if not np.isfinite(width).all():
             name = self.names[int(np.flatnonzero(~np.isfinite(width))[0])]
             raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
         worst = int(np.argmin(width)) if width.size else 0
-        if width.size and width[worst] < -START_OVERLAP:
+        if width.size and width[worst] < -accepted:
             inside = -width[worst] * gap_scales(self.system)[worst]
             raise StateError(
                 f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."

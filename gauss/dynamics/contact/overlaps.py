@@ -8,7 +8,27 @@ from gauss.scene import Box, Contact, Scene
 from gauss.system import System, guards
 
 START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
+# A step closes gaps by their rates, and leaves half of h² times what curvature adds to their accelerations: up to (h ω)² of
+# the scale for points that turn at ω. Twice that is accepted, for the rates were larger before the step.
+LEFT_BY_STEPS, MOST_LEFT = 2.0, 0.02
 UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
+
+
+def left_by_steps(system: System, v: np.ndarray, h: float) -> float:
+    """Largest penetration at a start with rates v, relative to the scale of a gap.
+
+    A motion may begin at any sample of one with steps of the same length: what such steps leave is accepted.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    v : ndarray, shape (n_v,)
+        Rates at the start.
+    h : float
+        Length of a step [s].
+    """
+    return START_OVERLAP + min(LEFT_BY_STEPS * (h * system.scale.fastest(v)) ** 2, MOST_LEFT)
 
 
 class UnseenOverlaps:

@@ -66,6 +66,13 @@ def _parts(system: System, contacts: list[Contact]) -> list[ConvexPart]:
     return sorted(parts, key=lambda part: RANK[part.kind])
 
 
+def carriers_of(system: System) -> tuple[int, ...]:
+    """Bodies that carry shapes of contacts, without the ground."""
+    contacts = [contact for contact in system.scene.contacts.values() if isinstance(contact, Contact)]
+    shapes = {system.scene.shapes[name].body for contact in contacts for name in (contact.shape, contact.other)}
+    return tuple(sorted({body for shape in shapes if (body := system.frame(shape).body) >= 0}))
+
+
 class ShapeTable:
     """Convex parts of the shapes of a system that take part in contacts, as arrays with one column for each part.
 

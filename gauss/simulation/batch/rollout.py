@@ -12,6 +12,7 @@ from gauss.codegen.gpu.devices import double_precision
 from gauss.codegen.tiers import AUTO, OPTIMISED
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.contact.moreau_step import moreau_stepper
+from gauss.dynamics.contact.overlaps import left_by_steps
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.initial_states import constraint_residual
 from gauss.dynamics.laws.switching import Switching, switching
@@ -173,7 +174,7 @@ def _fixed(
     settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
     if device is None and one_by_one(system, method, control is not None):
         return _singly(system, starts, run, settings, control)
-    batch = _begun(system, starts, method, control is not None, device)
+    batch = _begun(system, starts, method, step, control is not None, device)
     times = _switching(system, starts, steps * step).times
     if times.switches.size:  # steps of a batch cannot end there
         return _singly(system, starts, run, settings, control)
@@ -215,14 +216,14 @@ def _refuse_beyond_memory(system: System, starts: np.ndarray, samples: int, reme
     refuse_beyond_memory(numbers, f"{samples:.3g} samples of {starts.shape[1]} motions of {system.scene.name!r}", remedy)
 
 
-def _begun(system: System, starts: np.ndarray, method: FixedStep, held: bool, device: str | None):
+def _begun(system: System, starts: np.ndarray, method: FixedStep, step: float, held: bool, device: str | None):
     """Batch at its initial states, which meet the constraints and do not penetrate."""
     kind = FixedStepBatch if device is None else DeviceFixedStepBatch
     batch = kind(fixed_step_code(system, method, held, device), starts)
     refuse_inconsistent(system, starts, batch.residual)
     if method.nonsmooth:
-        for start in starts.T:
-            moreau_stepper(system).refuse_penetration(State(0.0, *np.split(start, [system.n_q])))
+        for q, v in (np.split(start, [system.n_q]) for start in starts.T):
+            moreau_stepper(system).refuse_penetration(State(0.0, q, v), left_by_steps(system, v, step))
     return batch
 
 

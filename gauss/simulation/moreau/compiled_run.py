@@ -23,6 +23,7 @@ from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_s
 from gauss.simulation.moreau.contact_events import ContactEvents
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
+from gauss.simulation.moreau.start_overlap import accepted_overlap
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
@@ -46,7 +47,7 @@ class CompiledMoreauRun(CompiledFixedRun):
 
     def __init__(self, problem: Problem, laws: Laws, dynamics: str = "compiled", removal: float = 0.0):
         self.whole, self.stepper = problem, moreau_stepper(problem.system, removal=removal)
-        self.stepper.refuse_penetration(problem.start)
+        self.stepper.refuse_penetration(problem.start, accepted_overlap(problem, bool(removal)))
         self.contacts, self.forces = ContactEvents(self.stepper.modes), self.stepper.lossy.size
         self.codes = self.stepper.modes.codes
         super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()), dynamics)

@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.codegen.kernels.step_memory import CHANGES_ROOM
 from gauss.dynamics.contact.contact_changes import ModeChange
-from gauss.dynamics.contact.contact_stepper import contact_stepper
+from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
@@ -14,7 +14,7 @@ from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_events import event_of
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings
-from gauss.simulation.motion_records import Event
+from gauss.simulation.motion_records import Event, SleepRecord
 from gauss.system import State, System
 
 
@@ -69,7 +69,7 @@ class ContactMotion:
     stepper: FreeBodyStepper | MechanismStepper
 
     def __init__(self, system: System, held: bool = False, stepper: FreeBodyStepper | MechanismStepper | None = None):
-        self.system, self.stepper = system, stepper or contact_stepper(system, held)
+        self.system, self.stepper = system, stepper or new_contact_stepper(system, held)
         self.row = 4 + system.n_q + system.n_v
         self.paradoxes, self.warned = ParadoxWarnings(), set[bytes]()
 
@@ -83,6 +83,10 @@ class ContactMotion:
     def hold(self, inputs: np.ndarray):
         """Set the inputs of the next steps."""
         self.stepper.inputs[:] = inputs
+
+    def jump(self, state: State, work: np.ndarray):
+        """Continue from a state after a jump of prescribed velocities, with its work."""
+        self.state, self.work = state, work
 
     def advance(self, ends: np.ndarray) -> np.ndarray:
         """Make steps to some times [s], and return (t, q, v, work) at these, (k, row).
@@ -157,9 +161,9 @@ class ContactMotion:
             event = event_of(change, names[change.element], float(times[change.step + 1]), begins)
             self.events += [] if event is None else [event]
 
-    def in_words(self) -> str:
-        """What is to be said of the motion beside its steps; nothing."""
-        return ""
+    def slept(self) -> SleepRecord | None:
+        """Which bodies slept; None in motions without sleeping."""
+        return None
 
     def beside(self, begin: ContactMotionState, t: float) -> tuple[State, np.ndarray]:
         """State and work at a time after a shorter step from what was kept; the motion does not continue from there."""

@@ -174,7 +174,7 @@ def controlled_motion(problem: Problem, plan: Plan) -> Trajectory:
         what = "a control law" if problem.held is not None else "a prescribed velocity that jumps"
         raise SimulationError(f"error control of time stepping does not take {what}; give a fixed step=.")
     if plan.dynamics == "pair kernels":
-        return ControlledMotion(problem, PairKernelSingleSteps(problem.system)).collect()
+        return ControlledMotion(problem, PairKernelSingleSteps(problem)).collect()
     whole = problem._replace(step=problem.end - problem.start.t)  # steps that Python repeats have lengths of their own
     run = moreau_run(whole, removal_time(problem.system))
     return ControlledMotion(problem, CompiledSingleSteps(run)).collect()

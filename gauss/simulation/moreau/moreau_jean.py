@@ -19,6 +19,7 @@ from gauss.backends.solution import Solution
 from gauss.codegen import Entry, Scalar
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.moreau_step import MoreauStep, advance_positions, moreau_stepper
+from gauss.dynamics.contact.overlaps import left_by_steps
 from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.switching import Switching
@@ -71,7 +72,7 @@ class MoreauRun(PythonRun):
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
-        self.stepper.refuse_penetration(start)
+        self.stepper.refuse_penetration(start, left_by_steps(self.system, start.v, self.h))
         found = super().collect(start, samples, progress)
         warn_of_laws(self.error, self.relaxed, self.steps)
         warn_of_unseen_contacts(found)

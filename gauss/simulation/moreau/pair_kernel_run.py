@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.codegen.kernels import Due
+from gauss.dynamics.contact.contact_stepper import stepper_pool
 from gauss.dynamics.engines import Engine
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Point, Rates
@@ -18,6 +19,7 @@ from gauss.simulation.moreau.contact_motion import ContactMotion
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, in_words
 from gauss.simulation.moreau.sleeping_motion import SleepingMotion
+from gauss.simulation.moreau.start_overlap import accepted_overlap
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
@@ -69,19 +71,24 @@ class PairKernelRun(PythonRun):
     """
 
     def __init__(self, problem: Problem):
-        self.held, system = problem.held, problem.system
+        self.held, system, self.accepted = problem.held, problem.system, accepted_overlap(problem)
         sleeping, held = problem.sleeping, self.held is not None
-        self.motion = ContactMotion(system, held) if sleeping is None else SleepingMotion(system, sleeping)
-        self.stepper = self.motion.stepper
+        self.pool = stepper_pool(system, held)
+        self.stepper = own = self.pool.take()
+        asleep = None if sleeping is None else SleepingMotion(system, sleeping, held, own)
+        self.motion = asleep or ContactMotion(system, held, own)
         self.engine = PairKernelEngine(self.stepper)
         super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
         self.h = problem.step or 0.0  # a fixed step is always given
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
-        """Trajectory to the end, from a start without penetration."""
-        self.motion.begin(start)
-        self.stepper.refuse_penetration(start)
-        found = super().collect(start, samples, progress)
+        """Trajectory to the end, from a start without penetration; the run ends with it."""
+        try:
+            self.motion.begin(start)
+            self.stepper.refuse_penetration(start, self.accepted)
+            found = super().collect(start, samples, progress)
+        finally:
+            self.pool.give(self.stepper)
         warn_of_laws(self.motion.largest, self.motion.relaxed, self.steps)
         warn_of_unseen_contacts(found)
         return found
@@ -111,7 +118,8 @@ class PairKernelRun(PythonRun):
         for place, stop in stops:
             jumped = self._jumped(point, impacts[place]) if place in impacts else None
             if jumped:
-                point, self.motion.state, self.motion.work = jumped, jumped.state, jumped.work
+                point = jumped
+                self.motion.jump(jumped.state, jumped.work)
                 yield point, None
             if place in holds:
                 self._hold(holds[place])
@@ -145,8 +153,8 @@ class PairKernelRun(PythonRun):
         self.engine.evaluations = motion.steps
         self.events = sorted([*self.events, *motion.events], key=lambda event: event.t)
         whole = super()._trajectory(kept, samples, began)
-        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method) + motion.in_words()
-        return replace(whole, stats=whole.stats._replace(method=method), step=self.step)
+        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method)
+        return replace(whole, stats=whole.stats._replace(method=method, sleep=motion.slept()), step=self.step)
 
 
 def _divided(pairs: np.ndarray, changes: Iterable[int]) -> tuple[np.ndarray, list[tuple[int, int]]]:

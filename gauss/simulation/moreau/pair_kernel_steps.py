@@ -5,13 +5,14 @@ import numpy as np
 from gauss.codegen.kernels import Control, LoopStatus
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_question
-from gauss.dynamics.contact.contact_stepper import contact_stepper, new_contact_stepper
+from gauss.dynamics.contact.contact_stepper import lent_stepper, new_contact_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.overlap_resolution import resolved
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point, Rates
 from gauss.simulation.moreau.contact_motion import ContactMotion
+from gauss.simulation.moreau.start_overlap import accepted_overlap
 from gauss.simulation.problem import Problem
 from gauss.system import State
 
@@ -43,7 +44,7 @@ class PairKernelSteps:
             ContactMotion(problem.system, held, new_contact_stepper(problem.system, held)),
             smooth_question(problem.question),
         )
-        self.motion.stepper.refuse_penetration(problem.start)
+        self.motion.stepper.refuse_penetration(problem.start, accepted_overlap(problem))
         self.motion.stepper.check(problem.start)
         measured = any(output.kind == "contact_force" for output in problem.system.scene.outputs.values())
         self.gaps = self.motion.stepper.gap_count if measured else 0
@@ -66,9 +67,10 @@ class PairKernelSteps:
     def separated(self, state: State) -> State:
         """State whose shapes do not overlap."""
         stepper = self.motion.stepper
-        if not isinstance(stepper, MechanismStepper):
-            stepper = contact_stepper(self.motion.system, True)
-        return resolved(stepper, state)
+        if isinstance(stepper, MechanismStepper):
+            return resolved(stepper, state)
+        with lent_stepper(self.motion.system, True) as other:
+            return resolved(other, state)
 
     def begun(self, start: State) -> np.ndarray:
         """Point (layout.size,) of a new motion."""

@@ -10,8 +10,10 @@ from gauss.dynamics.contact.gap_laws import removal_time
 from gauss.errors import SimulationError
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.contact_motion import ContactMotion
+from gauss.simulation.moreau.start_overlap import accepted_overlap
 from gauss.simulation.motion_records import Event
-from gauss.system import State, System
+from gauss.simulation.problem import Problem
+from gauss.system import State
 
 
 class ReachedPoint(NamedTuple):
@@ -158,11 +160,12 @@ class PairKernelSingleSteps:
 
     Parameters
     ----------
-    system : System
-        The system.
+    problem : Problem
+        Initial value problem.
     """
 
-    def __init__(self, system: System):
+    def __init__(self, problem: Problem):
+        system, self.accepted = problem.system, accepted_overlap(problem, controlled=True)
         self.motion = ContactMotion(system, stepper=new_contact_stepper(system, removal=removal_time(system)))
 
     @property
@@ -188,7 +191,7 @@ class PairKernelSingleSteps:
     def begun(self, start: State) -> ReachedPoint:
         """Point at a start without penetration."""
         self.motion.begin(start)
-        self.motion.stepper.refuse_penetration(start)
+        self.motion.stepper.refuse_penetration(start, self.accepted)
         self.motion.stepper.check(start)
         return ReachedPoint(np.concatenate([[start.t], start.q, start.v, np.zeros(3)]), self.motion.kept(), [], False)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.dynamics.conditions import are_free_in_contact
+from gauss.dynamics.contact.sleepers import sleepers
 from gauss.errors import SimulationError, require
 from gauss.system import System
 
@@ -20,7 +20,8 @@ class Sleeping:
     Parameters
     ----------
     speed : float, optional
-        Largest speed of any point of their shapes [m/s]; 1e-3 of the scene's length over its time when not given.
+        Largest speed of any point of their shapes [m/s]; 1e-3 of the scene's length over its time when not given. Rates
+        that move no shape count as those of a point one length of the scene away.
     duration : float
         How long all of them are slower [s].
 
@@ -62,15 +63,11 @@ def checked_sleeping(sleeping: "bool | Sleeping", problem) -> Sleeping | None:
     require(sleeping, (bool, Sleeping), "simulate: sleeping")
     if sleeping is False:
         return None
-    method, system = problem.method, problem.system
+    method = problem.method
     if not getattr(method, "nonsmooth", False) or problem.step is None:
         raise SimulationError(
             f"sleeping: bodies sleep in time stepping of one step, not by {method.name!r} as asked: give "
             "integrator='time_stepping' and step= [s], or no sleeping=."
         )
-    if problem.held is not None or not are_free_in_contact(system):
-        raise SimulationError(
-            f"sleeping: expected bodies on free joints on which contacts of shapes alone act; {system.scene.name!r} has "
-            "other joints, loads, constraints or inputs: give no sleeping=."
-        )
+    sleepers(problem.question)
     return Sleeping() if sleeping is True else sleeping

@@ -1,56 +1,63 @@
 """A motion in which islands of bodies at rest sleep until they are pushed.
 
-An island are bodies connected by contacts that bear a force. Once all of its bodies have been slow for long enough
-(:class:`gauss.simulation.moreau.sleeping.Sleeping`), their velocities are set to zero and their forces are kept; the energy
-that this takes is dissipated. A step in which another body pushes one of them is repeated with the island awake.
+An island are bodies connected by contacts that bear a force; joints, loads and constraints connect bodies, too. Once all of
+its bodies have been slow for long enough (:class:`gauss.simulation.moreau.sleeping.Sleeping`), their velocities are set to
+zero and their forces are kept; the energy that this takes is dissipated. A step in which another body pushes one of them is
+repeated with the island awake; a changed input wakes the islands that it acts on.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from gauss.dynamics.contact.asleep_bodies import islands, joined, kinetic_energies, pushed_asleep, split, stepper_of_awake
-from gauss.dynamics.contact.compiled_free_body_step import KnownContacts
+from gauss.dynamics.contact.asleep_bodies import BodySleepers
+from gauss.dynamics.contact.asleep_trees import TreeSleepers
 from gauss.dynamics.contact.contact_changes import ModeChange
+from gauss.dynamics.contact.contact_stepper import Stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
+from gauss.dynamics.contact.mechanism_step import MechanismStepper
+from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_motion import ContactMotion, ContactMotionState
 from gauss.simulation.moreau.sleeping import Sleeping
-from gauss.simulation.motion_records import Event
+from gauss.simulation.motion_records import Event, SleepRecord
 from gauss.system import State, System
 
 LOOK_STEPS = 16  # steps between two looks for islands at rest
 
 
 class _Asleep(NamedTuple):
-    """Bodies asleep.
+    """Bodies, or trees of joints, asleep.
 
     Attributes
     ----------
     island : ndarray of int, shape (n,)
-        Island of each body that sleeps; −1 of those awake.
-    stepper : FreeBodyStepper
-        Steps of the bodies that are awake.
-    resting : KnownContacts
-        Contacts of those asleep.
+        Island of each that sleeps; −1 of those awake.
+    stepper : FreeBodyStepper or MechanismStepper
+        Steps of those that are awake.
+    resting : KnownContacts or KnownForces
+        Forces on those asleep.
     closed : ndarray of bool
-        Elements that have closed contacts among these.
+        Elements that bear a force on these.
+    places : ndarray of int
+        Elements of the stepper among those of the scene.
     """
 
     island: np.ndarray
-    stepper: FreeBodyStepper
-    resting: KnownContacts
+    stepper: FreeBodyStepper | MechanismStepper
+    resting: Any
     closed: np.ndarray
+    places: np.ndarray
 
     @property
     def which(self) -> np.ndarray:
-        """Whether each body (n,) sleeps."""
+        """Whether each (n,) sleeps."""
         return self.island >= 0
 
 
 class SleepingMotion(ContactMotion):
-    """Motion of free bodies that sleep.
+    """Motion of bodies that sleep.
 
     Parameters
     ----------
@@ -58,21 +65,24 @@ class SleepingMotion(ContactMotion):
         The system.
     sleeping : Sleeping
         When they are put to rest.
+    held : bool
+        Whether the inputs of the scene are held in each step.
+    stepper : FreeBodyStepper or MechanismStepper, optional
+        Steps of this motion alone.
     """
 
-    stepper: FreeBodyStepper  # scenes of other steps are refused
-
-    def __init__(self, system: System, sleeping: Sleeping):
-        super().__init__(system)
+    def __init__(self, system: System, sleeping: Sleeping, held: bool = False, stepper: Stepper | None = None):
+        super().__init__(system, held, stepper)
         self.whole, self.speed, self.duration = self.stepper, sleeping.speed_in(system), sleeping.duration
-        self.lever = self.whole.reach + np.linalg.norm(self.whole.given[21:24], axis=0)  # from the joint point
+        self.sleepers: Any = sleepers_of(self.stepper)
 
     def begin(self, start: State):
         """Begin at a state, with all bodies awake."""
-        n, nothing = self.whole.n, np.zeros(0, dtype=np.int64)
-        resting = KnownContacts(nothing, np.zeros((0, 3)), np.zeros((6, 0)))
-        self.asleep = _Asleep(np.full(n, -1), self.whole, resting, np.zeros(len(self.whole.elements), dtype=bool))
-        self.since, self.counted, self.times_asleep, self.times_woken = np.full(n, start.t), 0, 0, 0
+        n, elements = self.sleepers.count, len(self.whole.elements)
+        nothing = self.sleepers.known_of_none(), np.zeros(elements, dtype=bool), np.arange(elements)
+        self.asleep = _Asleep(np.full(n, -1), self.whole, *nothing)
+        self.since, self.counted, self.times_woken = np.full(n, start.t), 0, 0
+        self.first: dict[str, int] = {}
         self.stepper = self.whole
         super().begin(start)
 
@@ -102,8 +112,7 @@ class SleepingMotion(ContactMotion):
             self.steps, self.state = self.steps + ends.size, State(float(ends[-1]), state.q, state.v)
             return np.column_stack([ends, np.tile(np.concatenate([state.q, state.v, self.work]), (ends.size, 1))])
         rows = super().advance(ends)
-        v = rows[:, 1 + self.system.n_q :][:, self.whole.v_places]  # (k, 6, n)
-        speed = np.linalg.norm(v[:, :3], axis=1) + np.linalg.norm(v[:, 3:], axis=1) * self.lever
+        speed = self.sleepers.speeds(rows[:, 1 + self.system.n_q : -3], self.state)
         fast = np.flatnonzero((speed > self.speed).any(axis=0))
         last = len(rows) - 1 - np.argmax((speed > self.speed)[::-1], axis=0)
         self.since[fast] = rows[last[fast], 0]
@@ -112,61 +121,80 @@ class SleepingMotion(ContactMotion):
     def _put_to_rest(self) -> bool:
         """Put islands to rest in which all bodies have been slow for long enough; returned is whether there are any."""
         which = self.asleep.which
-        calm = ~which & (self.state.t - self.since >= self.duration)
+        calm = ~which & self.sleepers.able & (self.state.t - self.since >= self.duration)
         if not calm.any():
             return False
         known = self._known()
-        island = islands(self.whole, known)
+        island = self.sleepers.islands(known)
         restless = np.unique(island[~calm & ~which])
         new = calm & (island >= 0) & ~np.isin(island, restless)
         if not new.any():
             return False
-        lost, v = float(kinetic_energies(self.whole, self.state)[new].sum()), self.state.v.copy()
-        v[self.whole.v_places[:, new]] = 0.0
+        lost, v = float(self.sleepers.kinetic_energies(self.state)[new].sum()), self.state.v.copy()
+        for k in np.flatnonzero(new):
+            v[self.sleepers.rates[k]] = 0.0
         self.state, self.work = State(self.state.t, self.state.q, v), self.work + np.array([0.0, 0.0, lost])
         self._set_asleep(np.where(new, island, self.asleep.island), known)
         self.events.append(Event(self.state.t, "sleeps", self._names(new), lost))
-        self.times_asleep += int(new.sum())
+        self.first = dict.fromkeys(self._names(new), self.counted) | self.first
         return True
 
-    def _wake(self, bodies: np.ndarray):
-        """Wake the islands of some bodies."""
-        woken = np.isin(self.asleep.island, self.asleep.island[bodies])
+    def _wake(self, pushed: np.ndarray):
+        """Wake the islands of some bodies or trees asleep."""
+        woken = np.isin(self.asleep.island, self.asleep.island[pushed])
         known, self.since[woken] = self._known(), self.state.t
         self._set_asleep(np.where(woken, -1, self.asleep.island), known)
         self.events.append(Event(self.state.t, "wakes", self._names(woken)))
-        self.times_woken += int(woken.sum())
+        self.times_woken += len(self._names(woken))
 
-    def _known(self) -> KnownContacts:
-        """Contacts of all bodies with their forces."""
-        return joined(self.stepper.known, self.asleep.resting, self.asleep.which)
+    def _known(self):
+        """Forces on all bodies."""
+        return self.sleepers.joined(self.stepper.known, self.asleep.resting, self.asleep.which)
 
-    def _set_asleep(self, island: np.ndarray, known: KnownContacts):
-        """Continue with other bodies asleep, from the contacts of all bodies."""
-        which, modes = island >= 0, np.maximum(self.stepper.record.modes, self.asleep.closed)
-        stepper = stepper_of_awake(self.whole, which, self.state) if which.any() else self.whole
-        awake, resting = split(self.whole, known, which)
-        closed, moving = (self._closed(part) for part in (resting, awake))
-        self.asleep, self.stepper = _Asleep(island, stepper, resting, closed), stepper
+    def _set_asleep(self, island: np.ndarray, known):
+        """Continue with others asleep, from the forces on all bodies."""
+        which, sleepers, modes = island >= 0, self.sleepers, self.asleep.closed.astype(np.int64)
+        before = self.asleep.places
+        modes[before] = np.maximum(modes[before], self.stepper.record.modes[: before.size])
+        stepper = sleepers.stepper(which, self.state) if which.any() else self.whole
+        awake, resting = sleepers.split(known, which)
+        closed, moving = sleepers.closed(resting, which), sleepers.closed(awake, ~which)
+        places = sleepers.places(which)
+        self.asleep, self.stepper = _Asleep(island, stepper, resting, closed, places), stepper
         stepper.known = awake
-        stepper.record.take(np.where(moving, modes, 0))
-
-    def _closed(self, known: KnownContacts) -> np.ndarray:
-        """Whether elements have contacts that bear a force among some."""
-        found = np.zeros(self.stepper.record.modes.size, dtype=bool)
-        first, second = self.whole.table.pair(known.key[known.force[:, 0] > 0.0])
-        found[self.whole.table.law[first, second] - 1] = True
-        return found
+        kept = np.zeros(stepper.record.modes.size, dtype=np.int64)
+        kept[: places.size] = np.where(moving, modes, 0)[places]
+        stepper.record.take(kept)
 
     def _names(self, which: np.ndarray) -> tuple[str, ...]:
-        names = list(self.system.scene.bodies)
-        return tuple(names[body] for body in self.whole.child[which])
+        """Names of the bodies of some, in the order of the scene."""
+        names = {name for k in np.flatnonzero(which) for name in self.sleepers.bodies[k]}
+        return tuple(name for name in self.system.scene.bodies if name in names)
 
-    def _python_step(self, h: float) -> FreeBodyStep:
+    def hold(self, inputs: np.ndarray):
+        """Set the inputs of the next steps; those that change wake the islands that they act on."""
+        before, is_first = self.stepper.inputs.copy(), self.state.t == self.start
+        super().hold(inputs)
+        reached = self.sleepers.reached(before, self.stepper.inputs)
+        if is_first:
+            return
+        self.since[reached] = self.state.t
+        asleep = reached[self.asleep.which[reached]]
+        if asleep.size:
+            self._wake(asleep)
+
+    def jump(self, state: State, work: np.ndarray):
+        """Continue after a jump of prescribed velocities; it wakes the islands that it moves."""
+        moved = np.array([bool(state.v[rates].any()) for rates in self.sleepers.rates])
+        super().jump(state, work)
+        if (moved & self.asleep.which).any():
+            self._wake(np.flatnonzero(moved & self.asleep.which))
+
+    def _python_step(self, h: float) -> FreeBodyStep | MechanismStep:
         while True:
             known = self.stepper.known
             found = self.stepper.python_step(self.state, h)
-            pushed = pushed_asleep(self.stepper, found.contacts, found.force)
+            pushed = self.sleepers.pushed(self.stepper, found)
             if not pushed.size:
                 return found
             self.stepper.known = known
@@ -175,7 +203,7 @@ class SleepingMotion(ContactMotion):
     def _note(self, times, changes: list[ModeChange]):
         closed = self.asleep.closed
         if closed.any():  # an element of which contacts rest is closed all the time
-            least = closed.astype(int)[[one.element for one in changes]].tolist()
+            least = closed.astype(int)[self.asleep.places[[one.element for one in changes]]].tolist()
             raised = [
                 one._replace(before=max(one.before, k), after=max(one.after, k))
                 for one, k in zip(changes, least, strict=True)
@@ -185,18 +213,23 @@ class SleepingMotion(ContactMotion):
 
     def kept(self) -> ContactMotionState:
         """What the motion continues from."""
-        more = self.asleep, self.since.copy(), self.counted, self.times_asleep, self.times_woken
+        more = self.asleep, self.since.copy(), self.counted, self.first, self.times_woken
         return super().kept()._replace(asleep=more)
 
     def take(self, kept: ContactMotionState):
         """Continue from what was kept."""
-        self.asleep, since, self.counted, self.times_asleep, self.times_woken = kept.asleep
+        self.asleep, since, self.counted, self.first, self.times_woken = kept.asleep
         self.since, self.stepper = since.copy(), self.asleep.stepper
         super().take(kept)
 
-    def in_words(self) -> str:
-        """How many bodies slept."""
-        return (
-            f"; {np.count_nonzero(self.asleep.which)} of {self.whole.n} bodies asleep at the end, "
-            f"{self.times_asleep} put to rest, {self.times_woken} woken"
+    def slept(self) -> SleepRecord:
+        """Which bodies may sleep, and slept."""
+        able = self.sleepers.able
+        return SleepRecord(
+            self._names(able), self._names(~able), dict(self.first), self._names(self.asleep.which), self.times_woken
         )
+
+
+def sleepers_of(stepper: FreeBodyStepper | MechanismStepper) -> BodySleepers | TreeSleepers:
+    """What may sleep in the steps of a stepper."""
+    return TreeSleepers(stepper) if isinstance(stepper, MechanismStepper) else BodySleepers(stepper)
