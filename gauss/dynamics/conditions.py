@@ -354,8 +354,10 @@ def smooth(condition: Callable[[Question], list[str]]) -> Callable[[Question], l
 
 def smooth_question(ask: Question) -> Question:
     """The question of the system without unilateral and set-valued elements."""
-    system = smooth_system(ask.system)
-    return ask._replace(system=system, laws=Laws(system, ask.laws.trace))
+    system, laws = smooth_system(ask.system), ask.laws
+    if laws.of_smooth is None:  # several conditions ask in a row
+        laws.of_smooth = Laws(system, laws.trace)
+    return ask._replace(system=system, laws=laws.of_smooth)
 
 
 def has_contacts(ask: Question) -> bool:

@@ -106,7 +106,8 @@ def _solid_at(shape: Collider) -> Solid | None:
 
 
 @cache
-def _terrain_of(field: HeightField) -> Terrain:
+def terrain_of(field: HeightField) -> Terrain:
+    """Surface of a field, made once."""
     return Terrain(field)
 
 
@@ -117,7 +118,7 @@ def solid_pair(first: Collider, second: Collider) -> PairOfSolids:
     assert solid is not None
     if not isinstance(second, HeightField):
         return SolidPair(solid, _solid_at(second))
-    terrain = _terrain_of(second)
+    terrain = terrain_of(second)
     if isinstance(solid, Segment) and not solid.half:
         return BallOnTerrain(solid, terrain)
     return SolidOnTerrain(solid, terrain)

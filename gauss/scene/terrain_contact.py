@@ -11,7 +11,7 @@ from math import dist, sqrt
 import numpy as np
 
 from gauss.rotations import cross
-from gauss.scene.contact_patch import SLOTS, ContactPoint, Solid, SolidPair, SolidPose, spread
+from gauss.scene.contact_patch import SLOTS, ContactPoint, Solid, SolidPair, SolidPose
 from gauss.scene.support_faces import Polytope, Segment
 from gauss.scene.terrain import Terrain, Triangles
 
@@ -61,7 +61,7 @@ class BallOnTerrain:
                 key = tuple(np.rint(places[k] / (SAME * (self.radius or terrain.size))).tolist())
                 gap = float(distances[k]) - self.radius
                 found.setdefault(key, ContactPoint(gap, other.x + other.R @ places[k], other.R @ up))
-        return _chosen(list(found.values()), self.radius or terrain.size)
+        return _chosen(list(found.values()), self.radius or terrain.size, other.R)
 
 
 def nearest_places(point: np.ndarray, triangles: Triangles, cell: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ class SolidOnTerrain:
                 within += pair.patch(one, pose, other.R @ normal, reach)[0]
         if all(point.gap > 0.0 for point in found):
             found += within
-        return _chosen(_outlines(found, SAME * self.first.size), self.first.size)
+        return _chosen(_outlines(found, SAME * self.first.size), self.first.size, other.R)
 
     def _prism(self, corners: np.ndarray, points: np.ndarray) -> tuple[SolidPair, np.ndarray]:
         """Solid and prism under a triangle, and the middle of the prism."""
@@ -143,20 +143,25 @@ class SolidOnTerrain:
 
 
 def _beside(points: list[ContactPoint], nearest: ContactPoint, near: float) -> list[ContactPoint]:
-    """Points without those of other normals at the place of the nearest one: an edge on an edge has one normal."""
-    return [p for p in points if p.normal @ nearest.normal >= FLUSH or dist(p.place, nearest.place) > near]
+    """The nearest point and others, without those of other normals at its place: an edge on an edge has one normal."""
+    flush = [p for p in points if p.normal @ nearest.normal >= FLUSH] or [nearest]
+    return flush + [p for p in points if p.normal @ nearest.normal < FLUSH and dist(p.place, nearest.place) > near]
 
 
-def _chosen(points: list[ContactPoint], size: float) -> list[ContactPoint]:
-    """The nearest points, and those farthest out, where there are too many; closed ones first, in the order of their places.
+def _chosen(points: list[ContactPoint], size: float, axes: np.ndarray) -> list[ContactPoint]:
+    """The nearest points, and those farthest out along the grid where there are too many, in the order of their places.
 
-    So a contact keeps its number from step to step, whatever the distance up to which points are looked for.
+    Closed ones come first. So a contact keeps its number from step to step, whatever the distance up to which points are
+    looked for.
     """
     near = sorted(points, key=lambda point: (round(point.gap / (CLOSED * size)), *point.place.tolist()))
     if len(near) <= SLOTS:
         return near
-    kept = near[: SLOTS // 2]
-    return kept + spread(near[SLOTS // 2 :])[: SLOTS - len(kept)]
+    half = SLOTS // 2
+    angles = 2.0 * np.pi / half * np.arange(half)
+    directions = np.outer(np.cos(angles), axes[:, 0]) + np.outer(np.sin(angles), axes[:, 1])
+    far = (np.array([point.place for point in near[half:]]) @ directions.T).argmax(axis=0)
+    return near[:half] + [near[half + k] for k in sorted(set(far.tolist()))]
 
 
 def _prism(upper: np.ndarray, lower: np.ndarray) -> Polytope:

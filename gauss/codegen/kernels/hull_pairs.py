@@ -4,6 +4,9 @@ The points are those of :class:`gauss.scene.contact_patch.SolidPair`, whose sear
 here has no certificate, and whose choice of points where there are many.
 """
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 from llvmlite import ir
 
@@ -20,8 +23,106 @@ MOVED_APART = 1e-2  # relative to the size of both hulls: distance at which the 
 SAME_NORMAL = 1e-9  # difference of normals that is rounding there
 
 
-class _PointsWriter:
-    """Writer of the points of a pair; see :class:`HullDistances`.
+class Corners(NamedTuple):
+    """Corners over a face, as of :func:`gauss.codegen.kernels.hull_patch.write_patch`."""
+
+    corners: Array
+    number: Array
+    lowest: Array
+
+
+class PointsWriter:
+    """Writer of the points of a pair.
+
+    Parameters
+    ----------
+    r : Routine
+        Where code is emitted.
+    records : list of Array
+        Records of both hulls.
+    R, x : list of ndarray
+        Rotations (3, 3) and centres (3,) of both.
+    reach : Value
+        Distance [m] of the farthest points.
+    """
+
+    def __init__(self, r: Routine, records: list[Array], R: list[np.ndarray], x: list[np.ndarray], reach: Value):
+        self.r, self.records, self.R, self.x, self.reach = r, records, R, x, reach
+        self.count = r.variable(0, INTEGER)
+
+    def add(self, gap: Value, place: np.ndarray, normal: np.ndarray):
+        """Add a point in the axes of the poses."""
+        raise NotImplementedError
+
+    def search(self, placed: Array, reach: Array, nearest: Array, status: Array):
+        """Nearest points; where the place of the least way out is not known, that of hulls moved apart along it."""
+        r, search, moved, known = self.r, write_nearest_points(self.r.module), self.r.buffer(POSE), self.r.buffer(NEAREST)
+        first, second = (Hull(r, record) for record in self.records)
+        r.call(search, *self.records, placed, reach, nearest, status)
+        with r.when((status[0] >= PLACELESS) & (status[0] <= PLACELESS)):
+            way = (first.size + second.size) * MOVED_APART - nearest[0]
+            r.copy(moved, placed, 9)
+            put(moved, vector(placed, 9) + vector(nearest, 1) * way, 9)
+            reach[0] = np.inf
+            r.call(search, *self.records, moved, reach, known, status)
+            off = vector(known, 1) - vector(nearest, 1)
+            with r.when(~(off @ off <= SAME_NORMAL * SAME_NORMAL)):
+                status[0] = LEFT
+            put(nearest, vector(known, 4), 4)
+
+    def faces(self, hulls, poses, normal: np.ndarray, across: float) -> Iterator[tuple[int, Value, np.ndarray, Corners]]:
+        """Number of the hull whose face is across a normal, radius over it, its normal, and corners of the other one's."""
+        r, write = self.r, write_patch(self.r.module)
+        R = self.R[1].T @ self.R[0]
+        (one, cosine), (other, other_cosine) = hulls[0].face(-(R.T @ normal)), hulls[1].face(normal)
+        corners = Corners(r.buffer(HIGH * ROOM), r.variable(0, INTEGER), r.buffer(2))
+        for k, face, is_own in ((1, other, other_cosine >= cosine), (0, one, ~(other_cosine >= cosine))):
+            with r.when(is_own & ((other_cosine >= across) | (cosine >= across))):
+                r.call(write, self.records[k], face, self.records[1 - k], poses[1 - k], *corners)
+                yield k, hulls[1 - k].radius, vector(hulls[k].normals, face * 3), corners
+
+    def corner(self, k: int, radius: Value, upward: np.ndarray, seen: Array, i: Value):
+        """Point of a corner over the face of hull k: its height, place and normal."""
+        height = seen[i * HIGH + 3] - radius
+        depth, out = height + radius if k else radius, self.R[k] @ upward
+        return height, self.x[k] + self.R[k] @ (vector(seen, i * HIGH) - upward * depth), out if k else -out
+
+    def write_patch(self, hulls, poses, nearest, across: float, near: Value):
+        """Nearest points, and corners of faces that meet there."""
+        r, (gap, place, normal) = self.r, nearest
+        least, is_alone = r.variable(np.inf), r.variable(1, INTEGER)
+        for k, radius, upward, (seen, count, lowest) in self.faces(hulls, poses, normal, across):
+            with r.each(count[0]) as i:
+                height = seen[i * HIGH + 3] - radius
+                least[0] = r.choose((height <= self.reach) & (height < least[0]), height, least[0])
+            is_theirs = (lowest[0] - radius >= gap - near) & (lowest[0] <= lowest[1] + near)
+            flat = is_theirs & (least[0] <= lowest[0] - radius + near)
+            is_alone[0] = r.as_integer(~flat)
+            with r.when(~flat):
+                self.add(gap, place, self.R[1] @ normal)
+            with r.each(count[0]) as i:
+                height, corner, out = self.corner(k, radius, upward, seen, i)
+                with r.when((height <= self.reach) & (flat | (height > gap))):
+                    self.add(height, corner, out)
+        with r.when((is_alone[0] > 0) & (self.count[0] < 1)):
+            self.add(gap, place, self.R[1] @ normal)
+
+
+def array_at(r: Routine, address: Value, kind: ir.Type) -> Array:
+    """Array by its address in a double."""
+    return Array(r.b, r.b.inttoptr(r.b.fptosi(address.value, INTEGER), kind))
+
+
+def given_poses(given: Array) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Rotations (3, 3) and centres (3,) of both shapes in the input of distances."""
+    return (
+        [np.array([[given[at + 3 * i + j] for j in range(3)] for i in range(3)]) for at in (0, SECOND)],
+        [np.array([given[at + 9 + i] for i in range(3)]) for at in (0, SECOND)],
+    )
+
+
+class _PairWriter(PointsWriter):
+    """Writer of the points of a pair of shapes; see :class:`HullDistances`.
 
     Parameters
     ----------
@@ -34,19 +135,11 @@ class _PointsWriter:
     """
 
     def __init__(self, r: Routine, given, found, slots: int):
-        self.r, self.given, self.found, self.slots = r, given, found, slots
-        self.records = [Array(r.b, self._pointer(given[place], INTEGERS)) for place in (RECORDS, RECORDS + 1)]
-        self.points = Array(r.b, self._pointer(given[PATCH], found.pointer.type))
-        self.reach, self.count = given[REACH], r.variable(0, INTEGER)
-        self.R, self.x = (
-            [np.array([[given[at + 3 * i + j] for j in range(3)] for i in range(3)]) for at in (0, SECOND)],
-            [np.array([given[at + 9 + i] for i in range(3)]) for at in (0, SECOND)],
-        )
+        records = [array_at(r, given[place], INTEGERS) for place in (RECORDS, RECORDS + 1)]
+        super().__init__(r, records, *given_poses(given), given[REACH])
+        self.found, self.slots, self.points = found, slots, array_at(r, given[PATCH], found.pointer.type)
         with r.each(slots) as k:
             found[k] = FAR_AWAY
-
-    def _pointer(self, address: Value, kind: ir.Type) -> ir.Value:
-        return self.r.b.inttoptr(self.r.b.fptosi(address.value, INTEGER), kind)
 
     def add(self, gap: Value, place: np.ndarray, normal: np.ndarray):
         """Add a point in world axes."""
@@ -80,57 +173,13 @@ class _PointsWriter:
         put(poses[1], [*R.T.ravel(), *(-(R.T @ x))])
         reach[0], status[0] = self.reach + first.radius + second.radius, LEFT
         with r.when((first.vertex_count > 0) & (second.vertex_count > 0)):
-            self._search(poses[0], reach, nearest, status)
+            self.search(poses[0], reach, nearest, status)
         gap, normal = nearest[0] - first.radius - second.radius, vector(nearest, 1)
         place = self.x[1] + self.R[1] @ (vector(nearest, 4) + normal * second.radius)
         with r.when((status[0] <= FOUND) & (gap <= self.reach)):
             near = (first.size + second.size) * same_depth
-            self._write_patch((first, second), poses, (gap, place, normal), across, near)
+            self.write_patch((first, second), poses, (gap, place, normal), across, near)
         self.leave((status[0] >= LEFT) | (self.count[0] > self.slots))
-
-    def _search(self, placed: Array, reach: Array, nearest: Array, status: Array):
-        """Nearest points; where the place of the least way out is not known, that of hulls moved apart along it."""
-        r, search, moved, known = self.r, write_nearest_points(self.r.module), self.r.buffer(POSE), self.r.buffer(NEAREST)
-        first, second = (Hull(r, record) for record in self.records)
-        r.call(search, *self.records, placed, reach, nearest, status)
-        with r.when((status[0] >= PLACELESS) & (status[0] <= PLACELESS)):
-            way = (first.size + second.size) * MOVED_APART - nearest[0]
-            r.copy(moved, placed, 9)
-            put(moved, vector(placed, 9) + vector(nearest, 1) * way, 9)
-            reach[0] = np.inf
-            r.call(search, *self.records, moved, reach, known, status)
-            off = vector(known, 1) - vector(nearest, 1)
-            with r.when(~(off @ off <= SAME_NORMAL * SAME_NORMAL)):
-                status[0] = LEFT
-            put(nearest, vector(known, 4), 4)
-
-    def _write_patch(self, hulls, poses, nearest, across: float, near: Value):
-        r, (gap, place, normal), write = self.r, nearest, write_patch(self.r.module)
-        R = self.R[1].T @ self.R[0]
-        (one, cosine), (other, other_cosine) = hulls[0].face(-(R.T @ normal)), hulls[1].face(normal)
-        seen, count, lowest, least = r.buffer(HIGH * ROOM), r.variable(0, INTEGER), r.buffer(2), r.variable(np.inf)
-        is_alone = r.variable(1, INTEGER)
-        for k, face, is_own in ((1, other, other_cosine >= cosine), (0, one, ~(other_cosine >= cosine))):
-            with r.when(is_own & ((other_cosine >= across) | (cosine >= across))):
-                r.call(write, self.records[k], face, self.records[1 - k], poses[1 - k], seen, count, lowest)
-                radius, upward = hulls[1 - k].radius, vector(hulls[k].normals, face * 3)
-                with r.each(count[0]) as i:
-                    height = seen[i * HIGH + 3] - radius
-                    least[0] = r.choose((height <= self.reach) & (height < least[0]), height, least[0])
-                is_theirs = (lowest[0] - radius >= gap - near) & (lowest[0] <= lowest[1] + near)
-                flat = is_theirs & (least[0] <= lowest[0] - radius + near)
-                is_alone[0] = r.as_integer(~flat)
-                with r.when(~flat):
-                    self.add(gap, place, self.R[1] @ normal)
-                out = self.R[k] @ upward
-                with r.each(count[0]) as i:
-                    height = seen[i * HIGH + 3] - radius
-                    with r.when((height <= self.reach) & (flat | (height > gap))):
-                        depth = height + radius if k else radius
-                        corner = self.x[k] + self.R[k] @ (vector(seen, i * HIGH) - upward * depth)
-                        self.add(height, corner, out if k else -out)
-        with r.when((is_alone[0] > 0) & (self.count[0] < 1)):
-            self.add(gap, place, self.R[1] @ normal)
 
 
 class HullDistances(NativeFunction):
@@ -161,7 +210,7 @@ class HullDistances(NativeFunction):
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code, for one pair at a time."""
         r, given, found = routine(self, writer.module, width)
-        points = _PointsWriter(r, given, found, self.slots)
+        points = _PairWriter(r, given, found, self.slots)
         if self.laws:
             points.write(*self.laws)
         else:

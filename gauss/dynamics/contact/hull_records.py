@@ -1,13 +1,16 @@
-"""Records of the convex hulls of shapes in memory, for :mod:`gauss.codegen.kernels.hull_points`."""
+"""Records of convex hulls and of terrain in memory, for :mod:`gauss.codegen.kernels.hull_points` and ``terrain_surface``."""
 
 from functools import lru_cache
 
 import numpy as np
 
 from gauss.codegen.kernels.hull_points import CORNER, MOST_CORNERS, RECORD
+from gauss.codegen.kernels.terrain_surface import NUMBERS
+from gauss.codegen.kernels.terrain_surface import RECORD as TERRAIN_RECORD
 from gauss.dynamics.contact.shape_table import ShapeTable
-from gauss.scene import Box, Capsule, ConvexMesh, Sphere
+from gauss.scene import Box, Capsule, ConvexMesh, HeightField, Sphere
 from gauss.scene.contact_patch import solid_of
+from gauss.scene.patch_distances import terrain_of
 from gauss.scene.support_faces import Polytope, Segment
 
 KEPT = 1024  # records: copies of a mesh share theirs
@@ -46,12 +49,45 @@ class HullRecord:
         return self.record.ctypes.data
 
 
-def hull_records(table: ShapeTable) -> list[HullRecord | None]:
-    """Records of the parts of a table; none where no part is a hull of points, or where a part is no hull."""
-    if not any(part.kind is ConvexMesh for part in table.parts):
+class TerrainRecord:
+    """Record of a height field, and the arrays that it names.
+
+    Parameters
+    ----------
+    field : HeightField
+        The field.
+    """
+
+    def __init__(self, field: HeightField):
+        terrain = terrain_of(field)
+        self.numbers = np.array(
+            [*terrain.start, *terrain.end, *terrain.edges, terrain.base, terrain.size, terrain.least], dtype=float
+        )
+        self.heights, self.tops = (np.ascontiguousarray(part, dtype=float) for part in (terrain.heights, terrain.tops))
+        addresses = [array.ctypes.data for array in (self.numbers, self.heights, self.tops)]
+        self.record = np.array([*self.heights.shape, *addresses], dtype=np.int64)
+        assert self.record.size == TERRAIN_RECORD
+        assert self.numbers.size == len(NUMBERS)
+
+    @property
+    def address(self) -> int:
+        """Address of the record."""
+        return self.record.ctypes.data
+
+
+def shape_records(table: ShapeTable) -> list[HullRecord | TerrainRecord | None]:
+    """Records of the parts of a table that are hulls of points or terrain; none at all where no part needs them."""
+    if not any(part.kind in (ConvexMesh, HeightField) for part in table.parts):
         return [None] * len(table.parts)
-    solids = (solid_of(table.scene.shapes[part.shape]) if part.kind in HULLS else None for part in table.parts)
-    return [_record(solid) if isinstance(solid, Polytope | Segment) else None for solid in solids]
+    return [_record_of(table.scene.shapes[part.shape], part.kind) for part in table.parts]
 
 
-_record = lru_cache(maxsize=KEPT)(HullRecord)
+def _record_of(shape, kind: type) -> HullRecord | TerrainRecord | None:
+    """Record of the part of a shape."""
+    if kind is HeightField:
+        return _terrain_record(shape)
+    solid = solid_of(shape) if kind in HULLS else None
+    return _record(solid) if isinstance(solid, Polytope | Segment) else None
+
+
+_record, _terrain_record = lru_cache(maxsize=KEPT)(HullRecord), lru_cache(maxsize=KEPT)(TerrainRecord)

@@ -11,7 +11,7 @@ from gauss.codegen.kernels.near_pairs import FEATURE, KIND, MOST, MOVED, NEAR_IN
 from gauss.codegen.kernels.near_pairs import KINDS as MOST_KINDS
 from gauss.codegen.kernels.patch_rows import POINT
 from gauss.dynamics.contact.free_bodies import place_function
-from gauss.dynamics.contact.hull_records import hull_records
+from gauss.dynamics.contact.hull_records import shape_records
 from gauss.dynamics.contact.near_contacts import COLUMNS, NearContacts, Overlap
 from gauss.dynamics.contact.overlaps import START_OVERLAP
 from gauss.dynamics.contact.pair_kernels import SIGNS, PairKernels, pair_kernels
@@ -48,7 +48,7 @@ class NearDetection:
         self.pair = np.column_stack(np.nonzero(np.triu(self.law))) if is_listed else np.zeros((0, 2), dtype=np.int64)
         self.grid = grid_room(0 if is_listed else n)
         self.body = np.column_stack([table.body, table.kind == KINDS.index(HalfSpace), table.kind]).astype(np.int64)
-        self.records = hull_records(table)
+        self.records = shape_records(table)
         addresses = [[0.0 if record is None else record.address for record in self.records]]
         self.own = np.concatenate([table.own, table.centre, table.sizes, table.ball[None], addresses]).T.copy()
         assert self.own.shape == (n, PART)

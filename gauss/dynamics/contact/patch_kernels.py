@@ -1,7 +1,8 @@
 """Patches of contact of two solids, in place of the kernels of a pair of shapes: by machine code, or called from there.
 
 The distances of a pair are asked first; its patch is kept for the rows of its near points, which machine code writes next.
-Patches of convex hulls are found by :mod:`gauss.codegen.kernels.hull_pairs`; other ones, and what that leaves, in Python.
+Patches of convex hulls are found by :mod:`gauss.codegen.kernels.hull_pairs`, those with terrain by
+:mod:`gauss.codegen.kernels.terrain_points`; other ones, and what these leave, in Python.
 Biases are zero: a point of a patch moves on both solids, and is found anew in each step.
 """
 
@@ -17,10 +18,11 @@ from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.kernels.hull_pairs import HullDistances
 from gauss.codegen.kernels.near_pairs import DISTANCE_INPUTS, FAR_AWAY
 from gauss.codegen.kernels.patch_rows import PatchRows
+from gauss.codegen.kernels.terrain_points import TerrainDistances, TerrainLaws
 from gauss.dynamics.contact.hull_records import HULLS
 from gauss.dynamics.contact.pair_kernels import Feature
 from gauss.rotations import cross
-from gauss.scene import Collider, HalfSpace
+from gauss.scene import Collider, HalfSpace, HeightField, Sphere, terrain, terrain_contact
 from gauss.scene.contact import tangents
 from gauss.scene.contact_patch import ACROSS, SAME_DEPTH, SLOTS, SolidPose
 from gauss.scene.patch_distances import PairOfSolids, solid_pair
@@ -61,6 +63,8 @@ class PatchKernels:
         self.otherwise: _Entry | None = None
         if kinds[0] in HULLS and kinds[1] in (*HULLS, HalfSpace):
             self.otherwise, self.distances = self.distances, hull_distances(kinds[1] is HalfSpace)
+        elif kinds[0] in HULLS and kinds[1] is HeightField:
+            self.otherwise, self.distances = self.distances, terrain_distances(kinds[0] is Sphere)
         self.rows = [patch_rows()]
 
     def _distances(self, given: np.ndarray, found: np.ndarray):
@@ -85,6 +89,27 @@ def hull_distances(on_plane: bool) -> Kernel:
     """Machine code of the distances of two hulls, or of a hull and a half-space, made once on a machine."""
     laws = None if on_plane else (ACROSS, SAME_DEPTH)
     return from_disk((HullDistances, laws), lambda: Kernel(HullDistances(SLOTS, laws), batch=False))
+
+
+@cache
+def terrain_distances(is_ball: bool) -> Kernel:
+    """Machine code of the distances of a hull, or of a ball, and terrain, made once on a machine."""
+    laws = TerrainLaws(
+        same=terrain_contact.SAME,
+        tiny=terrain_contact.TINY,
+        least_depth=terrain_contact.LEAST_DEPTH,
+        near_side=terrain_contact.NEAR_SIDE,
+        beside=terrain_contact.BESIDE,
+        flush=terrain_contact.FLUSH,
+        closed=terrain_contact.CLOSED,
+        odd=tuple(map(tuple, terrain_contact.ODD.tolist())),
+        aligned=terrain.ALIGNED,
+        on_edge=terrain.ON_EDGE,
+        across=ACROSS,
+        same_depth=SAME_DEPTH,
+        slots=SLOTS,
+    )
+    return from_disk((TerrainDistances, laws, is_ball), lambda: Kernel(TerrainDistances(laws, is_ball), batch=False))
 
 
 @cache

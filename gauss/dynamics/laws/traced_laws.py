@@ -45,6 +45,8 @@ class Laws:
         The system in symbols, where there are laws.
     functions : list of (str, Function)
         Traced laws over these symbols, each with the name of its load.
+    of_smooth : Laws or None
+        Laws of the system without unilateral and set-valued elements, once they are asked for.
     """
 
     def __init__(self, system: System, trace: bool = True):
@@ -55,6 +57,7 @@ class Laws:
         self.key = ""
         self.functions: list[tuple[str, Function]] = []
         self.motion: Kinematics | None = None
+        self.of_smooth: Laws | None = None
         self.probed: dict[tuple[float, bytes, bytes], Kinematics] = {}
         for number, bound in enumerate(system.loads):
             found = [self._traced(law) for law in bound.functions]
