@@ -8,6 +8,7 @@ from benchmarks.free_bodies import bin_of_balls, dominoes, floor, free_body, sta
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
+from gauss.dynamics.contact.near_detection import FIRST_ROOM
 
 pytestmark = pytest.mark.slow
 
@@ -114,3 +115,18 @@ def test_islands_are_problems_of_their_own(count, apart, islands):
     each = rows[done - 1, 1 : 1 + system.n_q].reshape(count, -1)
     each[:, ::7] -= apart * np.arange(count)[:, None]
     np.testing.assert_allclose(each, np.repeat(each[:1], count, axis=0), atol=SAME_STEP)
+
+
+def test_a_new_stepper_continues_with_all_forces_of_the_last_step():
+    """More contacts than it has room for at first: none of their forces is lost."""
+    system = gauss.compile_scene(piles(8, 1.0))
+    stepper, state = new_contact_stepper(system), system.initial_state()
+    for _ in range(3):
+        found = stepper.python_step(state, STEP)
+        state = gauss.State(state.t + STEP, found.q, found.v)
+    known, other = stepper.known, new_contact_stepper(system)
+    assert known.key.size > FIRST_ROOM
+    other.known = known
+    for one, same in zip(other.known, known, strict=True):
+        np.testing.assert_array_equal(one, same)
+    np.testing.assert_allclose(other.python_step(state, STEP).v, stepper.python_step(state, STEP).v, atol=SAME_STEP)

@@ -103,10 +103,10 @@ class FreeBodyMemory(CompiledStepMemory):
     @known.setter
     def known(self, found: KnownContacts):
         key, force, expected = found
-        m = min(key.size, self.sizes["capacity"])
-        self.integers["known_found"][: 2 * m] = np.column_stack(np.divmod(key[:m], MOST_FEATURES)).ravel()
+        m = key.size
+        self.integers["known_found"][: 2 * m] = np.column_stack(np.divmod(key, MOST_FEATURES)).ravel()
         self.integers["known_count"][0] = m
-        self.at["known"][: 3 * m] = force[:m].ravel()
+        self.at["known"][: 3 * m] = force.ravel()
         self.at["expected"][:] = expected.T.ravel()
 
 

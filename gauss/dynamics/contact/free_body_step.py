@@ -140,6 +140,7 @@ class FreeBodyStepper:
 
     @known.setter
     def known(self, found: KnownContacts):
+        self.detection.expect(found.key.size)  # a new stepper that continues a motion has met no contacts yet
         self.memory = self.memory.fitting()
         self.memory.known = found
 

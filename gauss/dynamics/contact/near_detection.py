@@ -66,6 +66,12 @@ class NearDetection:
     def _make_room(self, capacity: int):
         self.rows, self.found = np.empty((capacity, ROW)), np.empty((capacity, 2), dtype=np.int64)
 
+    def expect(self, contacts: int):
+        """Make room for a number of contacts, if there is less."""
+        if contacts > len(self.rows):
+            self._make_room(2 * contacts)
+            self._take_addresses()
+
     def _kernels(self, code: int) -> PairKernels | PatchKernels:
         """Kernels of a pair of kinds of shapes."""
         one, other = divmod(code, MOST_KINDS)
@@ -125,8 +131,7 @@ class NearDetection:
                 self.kinds[unmade - 1] = self._kernels(unmade - 1)
                 self.connect()
             elif m > len(self.rows):
-                self._make_room(2 * m)
-                self._take_addresses()
+                self.expect(m)
             else:
                 break
         pair, feature = self.found[:m].T
