@@ -52,6 +52,11 @@ def _yielded(a: Sized) -> Iterator[int]:
 
 
 @checked
+def _in_space(a: Shaped[np.ndarray, " 3"] | None = None, R: Shaped[np.ndarray, "3 3"] | None = None):
+    return a
+
+
+@checked
 def _plain(count: int):
     return count
 
@@ -79,6 +84,9 @@ RIGHT = {
     "sizes of two calls": lambda: (_doubled(TWO), _doubled(THREE)),
     "sizes of a call within a call": lambda: _nested(TWO, THREE),
     "none of a union": lambda: _of_a_union(TWO),
+    "in numbers": lambda: _in_space(THREE, np.eye(3)),
+    "in numbers, of symbols": lambda: _in_space(THREE.astype(object)),
+    "none of a union in numbers": lambda: _in_space(None, np.eye(3)),
     "quoted": lambda: _quoted(TWO, 1),
     "generator": lambda: list(_yielded(TWO)) == [0, 1],
     "dataclass": lambda: _Pair(TWO, TWO),
@@ -90,6 +98,9 @@ WRONG = {
     "too many axes": lambda: _doubled(np.zeros((2, 2))),
     "no number": lambda: _doubled(TWO, "2"),
     "what is returned": lambda: _cut(THREE),
+    "in numbers": lambda: _in_space(TWO),
+    "in numbers, too few axes": lambda: _in_space(THREE, THREE),
+    "in numbers, no array": lambda: _in_space([0.0, 0.0, 0.0]),
     "two arguments": lambda: _of_a_union(TWO, THREE),
     "quoted": lambda: _quoted(np.zeros((2, 2))),
     "generator": lambda: next(_yielded(np.zeros((2, 2)))),
