@@ -9,6 +9,10 @@ os.environ.setdefault("GAUSS_TIER", "quick")  # the tiers give the same digits (
 import pytest  # noqa: E402
 from hypothesis import settings  # noqa: E402
 
+from tests.support import shape_checks  # noqa: E402
+
+shape_checks.install()  # before the first module of the package is imported
+
 from gauss.codegen import disk_cache, gc_pause  # noqa: E402
 
 settings.register_profile("gauss", deadline=None, derandomize=True)
@@ -25,7 +29,11 @@ def pytest_collection():
 
 
 @pytest.fixture(autouse=True)
-def _code_of_the_sources(request, monkeypatch):
+def _code_of_the_sources(request):
     """A test that replaces parts of the package neither reads nor leaves code on disk that other processes trust."""
-    if "monkeypatch" in request.node.fixturenames and request.node.get_closest_marker("disk") is None:
-        monkeypatch.setattr(disk_cache, "package_digest", lambda: None)
+    if "monkeypatch" not in request.fixturenames or request.node.get_closest_marker("disk") is not None:
+        yield
+        return
+    with pytest.MonkeyPatch.context() as replaced:  # the fixture, were it asked for here, would be one of every test
+        replaced.setattr(disk_cache, "package_digest", lambda: None)
+        yield

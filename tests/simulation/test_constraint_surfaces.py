@@ -193,6 +193,7 @@ def _wrapped(angle):
     return gm.atan2(gm.sin(angle), gm.cos(angle))
 
 
+PAST = 4.0  # s: the first wheel is at its branch cut at π
 # residuals that jump by 2π where an angle does, with the rate of the second wheel
 CUT = {
     "one angle": (lambda a, b: b - _wrapped(a), 1.0),
@@ -208,11 +209,16 @@ UNCUT = {
 }
 
 
-@pytest.mark.parametrize("method", [{}, {"integrator": "rk4", "step": 0.01}, {"integrator": "time_stepping", "step": 0.01}])
-@pytest.mark.parametrize("name", CUT)
+# every residual by the default method; where a driver looks for a cut does not depend on how the residual is written:
+# a cut of its own and one that a function hides are enough for each other one
+MET = [(name, "dop853") for name in CUT]
+MET += [(name, method) for name in ("one angle", "within a function") for method in ("rk4", "time_stepping")]
+
+
+@pytest.mark.parametrize(("name", "method"), MET)
 def test_a_branch_cut_that_the_motion_meets_is_refused(name, method):
     with pytest.raises(SimulationError, match=r"'bound': what it prescribes jumps by .* at t = 3\.14159") as caught:
-        gauss.simulate(_two_wheels(*CUT[name]), 8.0, progress=False, **method)
+        gauss.simulate(_two_wheels(*CUT[name]), PAST, integrator=method, progress=False, **METHODS[method])
     assert caught.value.trajectory.q[-1, 0] == pytest.approx(np.pi, abs=1e-6)
 
 
@@ -225,7 +231,7 @@ def test_a_branch_cut_is_refused_where_it_is_not_located(name):
 @pytest.mark.parametrize("name", UNCUT)
 def test_a_branch_cut_away_from_the_constraint_is_none(name):
     scene = _two_wheels(*UNCUT[name])
-    assert gauss.simulate(scene, 8.0, progress=False).q[-1] == pytest.approx([8.0, 8.0], abs=ROUNDING)
+    assert gauss.simulate(scene, PAST, progress=False).q[-1] == pytest.approx([PAST, PAST], abs=ROUNDING)
     simulator = gauss.Simulator(scene, 0.01)
-    simulator.step(n=800)
-    assert simulator.coordinates[0] == pytest.approx([8.0, 8.0], abs=ROUNDING)
+    simulator.step(n=round(PAST / 0.01))
+    assert simulator.coordinates[0] == pytest.approx([PAST, PAST], abs=ROUNDING)
