@@ -37,7 +37,7 @@ from benchmarks.contacts import in_mujoco
 from benchmarks.convex_meshes import mesh_depth
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
-from gauss.dynamics.contact.asleep_bodies import kinetic_energies
+from gauss.dynamics.contact.asleep_bodies import BodySleepers
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.system import State
 
@@ -88,7 +88,7 @@ def ours(scene: gauss.Scene, end: float, step: float) -> Iterator[Instant]:
 
 
 def _energy(stepper: FreeBodyStepper, state: State, masses: np.ndarray) -> float:
-    return float(kinetic_energies(stepper, state).sum() + g * masses @ state.q.reshape(-1, 7)[:, 2])
+    return float(BodySleepers(stepper).kinetic_energies(state).sum() + g * masses @ state.q.reshape(-1, 7)[:, 2])
 
 
 def theirs(scene: gauss.Scene, end: float, step: float) -> Iterator[Instant]:
