@@ -205,8 +205,8 @@ class _BlockContactWriter:
     def _assemble(self):
         """Matrix M + Jᵀ K J and right-hand side −Jᵀ g."""
         r, A, x, rows = self.r, self.A, self.x, self.rows
-        with r.each(self.blocks * BLOCK) as i:
-            A[i] = 0.0
+        with r.each(self.blocks * SIX) as i:
+            rows.store(rows.zero(), A, i * WIDTH)
         with r.each(self.n * WIDTH) as i:
             x[i] = 0.0
         with r.each(self.n) as i:

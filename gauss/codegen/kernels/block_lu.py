@@ -2,14 +2,20 @@
 
 Elimination in order of least degree (Tinney, Walker 1967; George, Liu 1981), without pivoting between blocks: the matrices
 are M + Jᵀ K J with positive definite M and K that is nearly so. ``slot[i n + j]`` is 1 + the number of block (i, j), 0 where
-it is zero; the neighbours of the k-th eliminated body are ``list[start[k]] … list[start[k + 1] − 1]``.
+it is zero; the neighbours of the k-th eliminated body are ``list[start[k]] … list[start[k + 1] − 1]``. Pivots of which each
+has the next one and its neighbours as neighbours (supernodes: Ashcraft, Grimes 1989) are eliminated together, and blocks
+read once for all of them; their products are summed in the order of the pivots, as one by one.
 """
 
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
 from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
-from gauss.codegen.kernels.vectors import BLOCK, WIDTH, write_apply, write_inverse, write_product
+from gauss.codegen.kernels.vectors import BLOCK, ROW, SIX, WIDTH, TwistRows, write_apply, write_inverse, write_product
+
+TOGETHER = 16  # most pivots that are eliminated together
+FEW = 4  # neighbours of a pivot: with fewer, the next one does not gain by waiting for it
+TILE = 8  # columns that are updated together: their blocks of the pivots stay in the nearest cache
 
 
 def write_order(module: ir.Module) -> ir.Function:
@@ -67,43 +73,150 @@ def write_solve(module: ir.Module) -> ir.Function:
 
     A becomes its factors. Rows of ``x`` (n, 8) and of blocks end with two zeros.
     """
-    product, times, inverse, apply_, add = (
-        _sub(module, "subtract_product", 3, lambda r: write_product(r, -1.0, True)),
-        _sub(module, "times", 3, lambda r: write_product(r, 1.0, False)),
-        _sub(module, "inverse", 1, write_inverse),
-        _sub(module, "subtract_applied", 3, lambda r: write_apply(r, -1.0)),
-        _sub(module, "add_applied", 3, lambda r: write_apply(r, 1.0)),
-    )
-    r = subroutine(module, "solve_blocks", [INTEGER, *[INTEGERS] * 4, *[POINTER] * 2])
-    (n,), (slot, order, start, listed, A, x) = r.integers, r.arrays
-    L, y = r.buffer(BLOCK), r.buffer(WIDTH)
+    return _SolveWriter(module).write()
 
-    def block(i: Value, j: Value) -> Array:
-        return A.after((slot[i * n + j] - 1) * BLOCK)
 
-    with r.each(n) as k:
-        p, end = order[k], start[k + 1]
-        pivot = block(p, p)
-        r.call(inverse, pivot)
-        with r.each(end, start[k]) as a:
-            i = listed[a]
-            r.call(times, L, block(i, p), pivot)
-            r.call(apply_, x.after(i * WIDTH), L, x.after(p * WIDTH))
-            with r.each(end, start[k]) as b:
-                r.call(product, block(i, listed[b]), L, block(p, listed[b]))
-    with r.each(n) as back:
-        k = n - back - 1
-        p = order[k]
-        own = x.after(p * WIDTH)
-        with r.each(start[k + 1], start[k]) as a:
-            r.call(apply_, own, block(p, listed[a]), x.after(listed[a] * WIDTH))
-        for entry in range(WIDTH):
-            y[entry] = 0.0
-        r.call(add, y, block(p, p), own)
-        for entry in range(WIDTH):
-            own[entry] = y[entry]
+class _SolveWriter:
+    """Writer of the solution: pivots with the same neighbours are eliminated together, so that blocks are read once."""
+
+    def __init__(self, module: ir.Module):
+        self.update, self.product, self.times, self.inverse, self.subtract, self.add = (
+            _sub(module, "add_products", 3, _write_products, [INTEGER], [INTEGERS] * 2),
+            _sub(module, "add_product", 3, lambda r: write_product(r, 1.0, True)),
+            _sub(module, "minus_times", 3, lambda r: write_product(r, -1.0, False)),
+            _sub(module, "inverse", 1, write_inverse),
+            _sub(module, "subtract_applied", 3, lambda r: write_apply(r, -1.0)),
+            _sub(module, "add_applied", 3, lambda r: write_apply(r, 1.0)),
+        )
+        r = self.r = subroutine(module, "solve_blocks", [INTEGER, *[INTEGERS] * 4, *[POINTER] * 2])
+        (self.n,), (self.slot, self.order, self.start, self.listed, self.A, self.x) = r.integers, r.arrays
+        self.y = r.buffer(WIDTH)
+        self.left, self.beside, self.above = (r.buffer(TOGETHER, INTEGER) for _ in range(3))
+        self.right = r.buffer(TOGETHER * TILE, INTEGER)
+
+    def write(self) -> ir.Function:
+        r, first = self.r, self.r.variable(0, INTEGER)
+        with r.loop() as leave_if:
+            leave_if(first[0] >= self.n)
+            end = self._end_of(first[0])
+            with r.each(end, first[0]) as k:
+                self._eliminate(first[0], k)
+            with r.when(end <= first[0] + 1):
+                self._update_alone(first[0])
+            with r.when(end > first[0] + 1):
+                self._update_others(first[0], end)
+            first[0] = end
+        self._substitute_back()
+        return r.done()
+
+    def _place(self, i: Value, j: Value) -> Value:
+        return (self.slot[i * self.n + j] - 1) * BLOCK
+
+    def _block(self, i: Value, j: Value) -> Array:
+        return self.A.after(self._place(i, j))
+
+    def _count(self, k: Value) -> Value:
+        return self.start[k + 1] - self.start[k]
+
+    def _end_of(self, first: Value) -> Value:
+        """End of the pivots from ``first`` on of which each has the next one and its neighbours as neighbours."""
+        r, end, goes_on = self.r, self.r.variable(first + 1, INTEGER), self.r.variable(0, INTEGER)
+        goes_on[0] = r.as_integer(self._count(first) >= FEW)
+        with r.loop() as leave_if:
+            leave_if((goes_on[0] < 1) | (end[0] >= self.n) | (end[0] - first >= TOGETHER))
+            k, goes_on[0] = end[0], 0
+            with r.when((self._count(k) + 1 <= self._count(k - 1)) & (self._count(k - 1) <= self._count(k) + 1)):
+                with r.when(self.slot[self.order[k - 1] * self.n + self.order[k]] > 0):
+                    goes_on[0], end[0] = 1, k + 1
+        return end[0]
+
+    def _eliminate(self, first: Value, k: Value):
+        """Factors −L of one pivot, which replace its column, after the products of the pivots from ``first`` on."""
+        r, x, p = self.r, self.x, self.order[k]
+        pivot = self._block(p, p)
+        with r.when(k > first):
+            self._update_own(first, k)
+        r.call(self.inverse, pivot)
+        with r.each(self.start[k + 1], self.start[k]) as a:
+            i = self.listed[a]
+            own = self._block(i, p)
+            r.call(self.times, own, own, pivot)  # row by row: a row is read before it is replaced
+            r.call(self.add, x.after(i * WIDTH), own, x.after(p * WIDTH))
+
+    def _update_own(self, first: Value, k: Value):
+        """Products of the pivots from ``first`` on in the row and the column of the next one."""
+        r, p, count, A = self.r, self.order[k], k - first, self.A
+        with r.each(count) as m:
+            q = self.order[first + m]
+            self.left[m], self.right[m] = self._place(p, q), self._place(q, p)
+        r.call(self.update, count, self._block(p, p), A, A, self.left, self.right)
+        with r.each(self.start[k + 1], self.start[k]) as a:
+            i = self.listed[a]
+            with r.each(count) as m:
+                q = self.order[first + m]
+                self.above[m], self.beside[m] = self._place(q, i), self._place(i, q)
+            r.call(self.update, count, self._block(p, i), A, A, self.left, self.above)
+            r.call(self.update, count, self._block(i, p), A, A, self.beside, self.right)
+
+    def _update_alone(self, k: Value):
+        """Products of one pivot in the blocks of its neighbours."""
+        r, p, begin, end = self.r, self.order[k], self.start[k], self.start[k + 1]
+        with r.each(end, begin) as a:
+            L = self._block(self.listed[a], p)
+            with r.each(end, begin) as b:
+                r.call(self.product, self._block(self.listed[a], self.listed[b]), L, self._block(p, self.listed[b]))
+
+    def _update_others(self, first: Value, end: Value):
+        """Products of some pivots in the blocks of the neighbours of all."""
+        r, count, begin, last = self.r, end - first, self.start[end - 1], self.start[end]
+        tile = r.variable(begin, INTEGER)
+        with r.loop() as leave_if:
+            leave_if(tile[0] >= last)
+            stop = r.variable(tile[0] + TILE, INTEGER)
+            with r.when(stop[0] > last):
+                stop[0] = last
+            with r.each(stop[0], tile[0]) as b, r.each(count) as k:
+                self.right[(b - tile[0]) * TOGETHER + k] = self._place(self.order[first + k], self.listed[b])
+            with r.each(last, begin) as a:
+                i = self.listed[a]
+                with r.each(count) as k:
+                    self.left[k] = self._place(i, self.order[first + k])
+                with r.each(stop[0], tile[0]) as b:
+                    right = self.right.after((b - tile[0]) * TOGETHER)
+                    r.call(self.update, count, self._block(i, self.listed[b]), self.A, self.A, self.left, right)
+            tile[0] = stop[0]
+
+    def _substitute_back(self):
+        r, x, y = self.r, self.x, self.y
+        with r.each(self.n) as back:
+            k = self.n - back - 1
+            p = self.order[k]
+            own = x.after(p * WIDTH)
+            with r.each(self.start[k + 1], self.start[k]) as a:
+                r.call(self.subtract, own, self._block(p, self.listed[a]), x.after(self.listed[a] * WIDTH))
+            for entry in range(WIDTH):
+                y[entry] = 0.0
+            r.call(self.add, y, self._block(p, p), own)
+            for entry in range(WIDTH):
+                own[entry] = y[entry]
+
+
+def _write_products(r: Routine) -> ir.Function:
+    """Complete ``(i64 m, double* C, double* A, double* B, i64* left, i64* right)``: C += Σ A[left[k]] B[right[k]]."""
+    rows, (C, A, B, left, right), (m,) = TwistRows(r), r.arrays, r.integers
+    with r.b.goto_entry_block():
+        sums = [r.b.alloca(ROW) for _ in range(SIX)]
+    for i, total in enumerate(sums):
+        r.b.store(rows.load(C, i * WIDTH), total)
+    with r.each(m) as k:
+        one, other = A.after(left[k]), B.after(right[k])
+        factors = [rows.load(other, q * WIDTH) for q in range(SIX)]
+        for i, total in enumerate(sums):
+            r.b.store(rows.added(r.b.load(total), [one[i * WIDTH + q] for q in range(SIX)], factors), total)
+    for i, total in enumerate(sums):
+        rows.store(r.b.load(total), C, i * WIDTH)
     return r.done()
 
 
-def _sub(module: ir.Module, name: str, count: int, write) -> ir.Function:
-    return write(subroutine(module, name, [POINTER] * count))
+def _sub(module: ir.Module, name: str, count: int, write, before=(), after=()) -> ir.Function:
+    return write(subroutine(module, name, [*before, *[POINTER] * count, *after]))
