@@ -12,7 +12,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import TypeVar
 
-BEGUN = time.time_ns()  # time at which the sources of this process were as it has loaded them [ns]
+LOADED_AT = time.time_ns()  # time at which the sources of this process were as it has loaded them [ns]
 IMPORT = re.compile(r"^ *from (\S+) import (?:\(([^)]*)\)|(.*))$", re.MULTILINE)
 PUBLIC = re.compile(r"^__all__ = \[([^]]*)\]", re.MULTILINE)
 Source = TypeVar("Source")

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.work_precision.scenes import TimedScene
 from gauss.bench.contest import with_time
-from gauss.bench.precision import LOST, REPEATS, TOLERANCES, Attempt, ReferencePositions
+from gauss.bench.precision import LOST_DISTANCE, REPEATS, TOLERANCES, Attempt, ReferencePositions
 from gauss.system import System
 
 STEPS = tuple(4**k for k in range(3, 11))  # parts of the duration
@@ -82,7 +82,7 @@ def _ladder(engine, method, settings, run, case, against, patience, made) -> Ite
             yield Attempt(engine, method, setting, reason=_short(error))
             continue
         off = float(np.abs(found - against.positions).max(initial=0.0)) if found.shape == against.positions.shape else np.inf
-        yield Attempt(engine, method, setting, off, best, made, reason="" if off <= LOST else "lost")
+        yield Attempt(engine, method, setting, off, best, made, reason="" if off <= LOST_DISTANCE else "lost")
         if best > patience:
             return
 

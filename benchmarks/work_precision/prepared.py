@@ -7,7 +7,7 @@ import numpy as np
 
 import gauss
 from benchmarks.work_precision.scenes import TimedScene
-from gauss.bench.precision import LOST, REPEATS, TOLERANCES, Attempt, ReferencePositions
+from gauss.bench.precision import LOST_DISTANCE, REPEATS, TOLERANCES, Attempt, ReferencePositions
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import GaussError
 from gauss.system import State, System
@@ -46,4 +46,4 @@ def _attempt(case: TimedScene, system: System, method: str, tolerance: float, ag
         return Attempt("gauss", name, tolerance, reason=str(error).split(". ")[0].split("; ")[0][:120])
     placed = kinematics(system, State(case.duration, q[-1], v[-1])).x[: system.structure.n_bodies]
     off = float(np.abs(np.array(placed) - against.positions).max(initial=0.0))
-    return Attempt("gauss", name, tolerance, off, best, first, reason="" if off <= LOST else "lost")
+    return Attempt("gauss", name, tolerance, off, best, first, reason="" if off <= LOST_DISTANCE else "lost")

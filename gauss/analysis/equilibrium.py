@@ -30,7 +30,7 @@ from gauss.system import State, System, retract
 AT_REST = 1e-9  # largest acceleration of an equilibrium, in the units of the scene
 STEPS, LEAST_SHARE, LONGEST = 60, 2.0**-12, 0.5  # of Newton's method; share of a step that is tried last; step in units
 KICKS = 5  # steps along the accelerations, where Newton's method stalls
-SAME = 1e-6  # distance of two equilibria in units, below which they are one
+EQUAL_STATES = 1e-6  # distance of two equilibria in units, below which they are one
 
 
 @dataclass(frozen=True)
@@ -271,10 +271,10 @@ def _are_same(system: System, one: StaticEquilibrium, other: StaticEquilibrium) 
     far = [np.abs(a - b).max(initial=0.0) for a, b in zip(poses[0].R, poses[1].R, strict=True)]
     near = [np.abs(a - b).max(initial=0.0) / system.scale.length for a, b in zip(poses[0].x, poses[1].x, strict=True)]
     apart = np.abs(one.state.v - other.state.v)[values] / np.maximum(1.0, np.abs(one.state.v[values]))
-    if max([*far, *near, *apart], default=0.0) <= SAME:
+    if max([*far, *near, *apart], default=0.0) <= EQUAL_STATES:
         return True
     roots = [np.sort_complex(found.model.eigenvalues) for found in (one, other)]
     size = max(np.abs(part).max(initial=0.0) for part in roots)
-    in_family = any((np.abs(part) <= np.sqrt(SAME) * size).any() for part in roots)
-    alike = np.abs(one.energy - other.energy) <= SAME * system.scale.energy
-    return bool(in_family and alike and (np.abs(roots[0] - roots[1]) <= np.sqrt(SAME) * size).all())
+    in_family = any((np.abs(part) <= np.sqrt(EQUAL_STATES) * size).any() for part in roots)
+    alike = np.abs(one.energy - other.energy) <= EQUAL_STATES * system.scale.energy
+    return bool(in_family and alike and (np.abs(roots[0] - roots[1]) <= np.sqrt(EQUAL_STATES) * size).all())

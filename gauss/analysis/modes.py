@@ -18,7 +18,7 @@ from gauss.system import State, System, retract
 
 SAMPLES = 60  # of a period
 PROJECTION_STEPS = 20
-STILL = 1.0  # period shown of a mode that does not oscillate [s]
+STILL_PERIOD = 1.0  # period shown of a mode that does not oscillate [s]
 
 
 @named_arguments
@@ -106,7 +106,7 @@ def mode_motion(model: LinearModel, mode: int = 0, *, amplitude: float = 0.1, pe
     system, state, frequency = model.system, model.state, modes.frequencies[mode]
     phase = np.linspace(0.0, 2.0 * np.pi * periods, SAMPLES * periods + 1)
     q = np.array([_sample(system, state, amplitude * (modes.shapes[mode] * np.exp(1j * one)).real) for one in phase])
-    period = 1.0 / frequency if frequency else STILL
+    period = 1.0 / frequency if frequency else STILL_PERIOD
     return Trajectory.from_coordinates(system, phase / (2.0 * np.pi) * period, q)
 
 

@@ -14,7 +14,7 @@ from gauss import math
 from gauss.analysis.loop_closure import closed, with_rates
 from gauss.analysis.tangents import Tangents
 from gauss.analysis.target_problem import positive_values
-from gauss.analysis.time_scaling import REST, along_lines, extremes, through_points
+from gauss.analysis.time_scaling import REST_LENGTH, along_lines, extremes, through_points
 from gauss.arguments import LARGEST_FLOAT, named_arguments, real_array
 from gauss.codegen import Expression
 from gauss.dynamics import compile_scene
@@ -38,7 +38,7 @@ else:
 
 SHAPES = ("trapezoid", "s-curve", "cubic", "quintic")
 SAMPLES = 201  # of a trajectory, when no times are given
-BEYOND = 1e-9  # relative excess over a limit that is round-off
+LIMIT_ROUNDING = 1e-9  # relative excess over a limit that is round-off
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class PlannedMotion:
     def _at(law: PPoly, t) -> np.ndarray:
         if isinstance(t, Expression):
             return math.piecewise(law, t)
-        return law(np.clip(t, law.x[1] - REST / 2.0, law.x[-2] + REST / 2.0))
+        return law(np.clip(t, law.x[1] - REST_LENGTH / 2.0, law.x[-2] + REST_LENGTH / 2.0))
 
     def states(self, system: System, times, start: State | None = None) -> list[State]:
         """Consistent states at times; other coordinates follow by the constraints, or stay.
@@ -343,7 +343,7 @@ def _refuse_beyond(system: System, names: Sequence[str], law: PPoly):
     lowest, highest = limits(system)
     for name, low, high in zip(names, *extremes(law), strict=True):
         column = system.column(name)
-        room = BEYOND * system.scale.coordinates[column]
+        room = LIMIT_ROUNDING * system.scale.coordinates[column]
         if low < lowest[column] - room or high > highest[column] + room:
             raise ArgumentError(
                 f"plan_motion: {name!r} goes from {low:.6g} to {high:.6g}, beyond the limits of its joint, "

@@ -21,7 +21,7 @@ from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.system import State, System, retract
 
 NEAR_SINGULAR = 1e-3  # σ_min/σ_max of the loop-closure Jacobian below which a configuration is near-singular
-STIFF = 100.0  # fastest decay over the other rates above which an implicit method is recommended
+STIFFNESS_RATIO = 100.0  # fastest decay over the other rates above which an implicit method is recommended
 INCREMENT = 1e-6  # units of the scene, of coordinates and rates for finite differences
 SLOWEST_RATE = 1.0  # in the time of the scene, about the inverse duration of a simulation: slower motions do not count
 RESOLVING_STEP = 0.1  # step of a fourth-order method times the fastest rate
@@ -88,7 +88,7 @@ def advise(system: System, state: State | None = None) -> Recommendation:
     """Recommend an integrator for a system.
 
     "time_stepping" where contacts have friction; "dop853" with unilateral constraints; "radau5" where a motion decays
-    :data:`STIFF` times faster than others oscillate or grow; else "dop853".
+    :data:`STIFFNESS_RATIO` times faster than others oscillate or grow; else "dop853".
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
         return "dop853", "order 8, step chosen by tolerances (the scene cannot rest in its start, to look for stiffness)"
     slow, decay, swinging = SLOWEST_RATE / system.scale.time, -rates.real.min(initial=0.0), abs(rates.imag) > abs(rates.real)
     pace = max(rates.real.max(initial=slow), abs(rates[swinging]).max(initial=slow))
-    if decay > STIFF * pace:
+    if decay > STIFFNESS_RATIO * pace:
         return "radau5", f"a motion decays {decay / pace:.3g} times faster than others oscillate or grow: stiff"
     return "dop853", "order 8, step chosen by tolerances; nothing is stiff at the start"
 

@@ -16,7 +16,7 @@ else:
     PPoly = object  # scipy.interpolate is imported where a law is made
 
 DEGREE = 5  # of all pieces
-REST = 1.0  # s, length of the pieces of rest before and after a motion
+REST_LENGTH = 1.0  # s, length of the pieces of rest before and after a motion
 
 
 def phases(v: float, a: float, j: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
@@ -159,5 +159,5 @@ def _joined(durations: list, pieces: list, first: np.ndarray, last: np.ndarray, 
 
     before, after = np.zeros((2, DEGREE + 1, len(first)))
     before[DEGREE], after[DEGREE] = first, last
-    times = begin + np.concatenate([[-REST], np.cumsum([0.0, *durations])])
-    return Piecewise(np.array([before, *pieces, after]).transpose(1, 0, 2), np.append(times, times[-1] + REST))
+    times = begin + np.concatenate([[-REST_LENGTH], np.cumsum([0.0, *durations])])
+    return Piecewise(np.array([before, *pieces, after]).transpose(1, 0, 2), np.append(times, times[-1] + REST_LENGTH))

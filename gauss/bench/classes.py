@@ -14,9 +14,9 @@ from gauss.bench.suite import CLASSES, recipes
 from gauss.bench.suite_instances import SUITE, of_suite, suite_class
 from gauss.bench.table import ResultTable
 
-FEW = 8  # problems of a class in a quick run, and of levels other than the main one, evenly spread
+QUICK_PROBLEMS = 8  # problems of a class in a quick run, and of levels other than the main one, evenly spread
 OTHER_LEVELS = ("low", "mid")
-LARGE = "large"  # class whose problems take solvers seconds each
+LARGE_CLASS = "large"  # class whose problems take solvers seconds each
 TOGETHER = {"friction": ("cones", "coulomb")}  # names of several classes
 STORIES = {
     "equality": "Accelerations of open and closed mechanisms: equality rows alone.",
@@ -69,7 +69,7 @@ def compare_class(
     how |= {"name": name_of(kind)}
     main = few if quick else wanted
     table = compare(folder, instances=_instances(kind, main), levels=levels or (MAIN_LEVEL,), fresh=fresh, **how)
-    if levels is None and kind != LARGE:
+    if levels is None and kind != LARGE_CLASS:
         table = compare(folder, instances=_instances(kind, few), levels=OTHER_LEVELS, **how)
     return table
 
@@ -88,7 +88,7 @@ def problems_of(kind: str) -> tuple[str, ...]:
 
 def spread(names: tuple[str, ...]) -> tuple[str, ...]:
     """Few names of many, evenly spread."""
-    places = np.unique(np.linspace(0, len(names) - 1, min(FEW, len(names))).round().astype(int))
+    places = np.unique(np.linspace(0, len(names) - 1, min(QUICK_PROBLEMS, len(names))).round().astype(int))
     return tuple(names[place] for place in places)
 
 

@@ -107,7 +107,7 @@ def median_times(times: list[Times], seconds: list[float]) -> dict:
 
 # Solvers whose libraries report no time of their own; that around the call of the library, as qpsolvers takes it, stands
 # for it.
-AROUND = ("cvxopt", "gurobi", "highs", "kvxopt", "qpax", "qtqp", "quadprog", "sip")
+TIMED_AROUND = ("cvxopt", "gurobi", "highs", "kvxopt", "qpax", "qtqp", "quadprog", "sip")
 COMPILING = ("jaxopt_osqp", "qpax")  # solvers that compile for every size of problem in their first call
 UNITS = {"proxqp": 1e-6, "scs": 1e-3}  # of the times that are reported, where these are not seconds
 
@@ -116,7 +116,7 @@ def library(solver: str, problem, settings: dict) -> Callable[[Any], Times]:
     """Times that the library of a solver of qpsolvers reports with a solution."""
     if solver == "daqp":
         return lambda found: _daqp(problem, settings)
-    if solver in AROUND:
+    if solver in TIMED_AROUND:
         return lambda found: Times(np.nan, np.nan, found.solve_time if found.x is not None else np.nan)
     if solver == "clarabel":
         return lambda found: Times(np.nan, np.nan, found.extras.get("solve_time", np.nan))

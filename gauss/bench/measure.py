@@ -108,7 +108,7 @@ def _returned(call):
 
 
 # Tiny programmes by the kind of their structure: rows, cones, Coulomb's law, stages.
-TINY = {
+TINY_PROGRAMMES = {
     ROWS: of_arrays("", "", np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], np.eye(2)[:1], [1.0]),
     STAGES: of_arrays(
         "",
@@ -131,7 +131,7 @@ TINY = {
 @lru_cache
 def _loaded(backend: str, level: str, kind: str):
     """Solve a tiny programme once, so that loading the library is no part of the first timed solve."""
-    tiny = TINY[kind]
+    tiny = TINY_PROGRAMMES[kind]
     prepared = ready(backend, tiny.programme(""), level)
     with prepared.around, ended(LOADING):
         _returned(prepared.call)

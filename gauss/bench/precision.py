@@ -32,7 +32,7 @@ from gauss.system import System
 USUAL = ("dop853", "taylor", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
 TOLERANCES = tuple(10.0**-k for k in range(3, 15))
 DIVISIONS = tuple(2**k for k in range(5, 21, 2))  # of the duration, into fixed steps
-LOST = 10.0  # m: a motion that is off by more has nothing to do with the reference
+LOST_DISTANCE = 10.0  # m: a motion that is off by more has nothing to do with the reference
 TWO = ("dopri5", "dop853")  # a reference, and its check
 FINEST = 1e-14
 STEPS = 2**14  # of the finest run from which time stepping is extrapolated
@@ -203,7 +203,7 @@ def attempt(
         return Attempt("gauss", name, setting, reason=_short(f"{type(error).__name__}: {error}"))
     off = float(np.abs(centres(trajectory) - against.positions).max(initial=0.0))
     drift, gap = abs(float(energy(trajectory).balance[-1])), _gap(system, trajectory)
-    reason = "" if off <= LOST else "lost"
+    reason = "" if off <= LOST_DISTANCE else "lost"
     return Attempt("gauss", name, setting, off, best, max(first - best, 0.0), drift, gap, reason)
 
 

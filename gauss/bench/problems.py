@@ -15,9 +15,9 @@ from gauss.io import load
 from gauss.scene import Scene
 from gauss.system import State, System, random_state
 
-FLAT = 1e-6  # [rad], how far the ladder of four-bars is from its flat configuration
-STIFF = 1e5  # [1/s], rate of Baumgarte's stabilisation
-OFF = 1e-6  # [rad], what the stabilised state is off
+FLAT_ANGLE = 1e-6  # [rad], how far the ladder of four-bars is from its flat configuration
+STABILISATION_RATE = 1e5  # [1/s], rate of Baumgarte's stabilisation
+STABILISED_ANGLE = 1e-6  # [rad], what the stabilised state is off
 EDGES = np.array([1.0, 0.6, 0.4])  # of a box [m], its centre of mass in the middle
 NOISE = 1e-8  # relative, of the rows of redundant constraints
 SOLVABLE, INCONSISTENT, UNKNOWN = "solvable", "inconsistent", "unknown"  # verdicts; the last of files without any
@@ -128,7 +128,7 @@ def flat_ladder():
     """Three windows 1e-6 rad from the flat configuration, where rows lose rank."""
     system = compile_scene(load("n_four_bar", n=3))
     signs = np.array([-1.0 if name.startswith("B") else 1.0 for name in system.coordinates])
-    return system, system.state(-(np.pi / 2 - FLAT) * signs, -2.0 * signs)
+    return system, system.state(-(np.pi / 2 - FLAT_ANGLE) * signs, -2.0 * signs)
 
 
 @selected("stewart")
@@ -171,7 +171,7 @@ def small_units():
 def stiff():
     """Four-bar off its constraints by 1e-6 rad, pulled back at 1e5 1/s: the right-hand side outweighs all else."""
     system, state = _started(load("four_bar"))
-    off = replace(state, q=state.q + OFF * np.random.default_rng(0).standard_normal(state.q.size))
+    off = replace(state, q=state.q + STABILISED_ANGLE * np.random.default_rng(0).standard_normal(state.q.size))
     compulsion, motion = assemble(system, off), kinematics(system, off)
     moving = compulsion.about_rest().residuals(motion.quasi_velocities(), off.v, np.zeros(compulsion.D.size))[1]
     closures = np.zeros(compulsion.D.size)
@@ -179,7 +179,7 @@ def stiff():
         closures[system.structure.constraints[i].rows] = 1.0
     return replace(
         compulsion,
-        D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * position_residual(motion)),
+        D=compulsion.D - closures * (2 * STABILISATION_RATE * moving + STABILISATION_RATE**2 * position_residual(motion)),
         constraint_residual=0.0,
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gauss.bench import compiled
-from gauss.bench.clocks import AROUND
+from gauss.bench.clocks import TIMED_AROUND
 from gauss.bench.instances import FILE, MAIN_FORM
 from gauss.bench.levels import LEVELS, LIMIT, MAIN_LEVEL, OURS, OWN
 from gauss.bench.markdown import head, in_time, number, share, table
@@ -198,7 +198,7 @@ def _times(rows) -> list[str]:
             f"## Times, class {group}, {_form_of(rows, group)}, level {MAIN_LEVEL}",
             "",
             "Microseconds of right answers: call from Python / reported by the library, – where it reports none (of "
-            f"{', '.join(AROUND)}: around the call of the library).",
+            f"{', '.join(TIMED_AROUND)}: around the call of the library).",
             "",
             *table(["problem", *names], ([p, *(_both(cells.get((name, p))) for name in names)] for p in problems)),
             "",

@@ -5,7 +5,7 @@ import qpsolvers
 
 from gauss.backends.accuracy import DEFAULT_TOLERANCE, KEPT, own_settings
 from gauss.bench import casadi_, coulomb, jaxopt_, mujoco_
-from gauss.bench.clocks import AROUND
+from gauss.bench.clocks import TIMED_AROUND
 from gauss.bench.contestants import contestants
 from gauss.bench.levels import LIMIT, LOOSEST, OF_ANYBODY, POLICIES, WALL_LIMIT, promise, settings
 from gauss.bench.markdown import table
@@ -72,7 +72,7 @@ def _way(name: str) -> tuple[str, str, str]:
         return "itself", "sparse", "nothing"
     matrices = "sparse" if name in qpsolvers.sparse_solvers else "dense"
     reports = "set-up and solve together" if name == "clarabel" else "set-up, solve"
-    return "qpsolvers", matrices, "nothing; around its call" if name in AROUND else reports
+    return "qpsolvers", matrices, "nothing; around its call" if name in TIMED_AROUND else reports
 
 
 def _promised(name: str, level: str) -> str:

@@ -29,7 +29,7 @@ import numpy as np
 from gauss.codegen import machine, object_cache
 from gauss.codegen.content_digest import content_digest
 from gauss.codegen.processor import features
-from gauss.lazy import BEGUN
+from gauss.lazy import LOADED_AT
 
 T = TypeVar("T")
 FOLDER = Path(__file__).parent.parent
@@ -133,7 +133,7 @@ class _Unpickler(pickle.Unpickler):
 def package_digest() -> bytes | None:
     """SHA-256 of sources and environment; None if sources have changed since this process began."""
     files = sorted(_sources(str(FOLDER)))
-    if max(changed for *_, changed in files) >= BEGUN:
+    if max(changed for *_, changed in files) >= LOADED_AT:
         return None
     listed = "sources-" + hashlib.sha256(repr((str(FOLDER), files)).encode()).hexdigest()
     content = object_cache.read(listed)

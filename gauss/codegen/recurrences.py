@@ -23,12 +23,12 @@ LINE = 64  # bytes of a cache line, and of the widest vector register
 OPERATIONS_PER_PIECE = 100  # or products
 LINEAR = frozenset({"add", "sub", "neg"})
 SUMS = LINEAR | {"mul"}
-KNOWN = LINEAR | {"constant", "symbol", "mul", "div", "sqrt", "sin", "cos", "exp", "log"}
+SERIES_OPERATIONS = LINEAR | {"constant", "symbol", "mul", "div", "sqrt", "sin", "cos", "exp", "log"}
 
 
 def without_series(function: Function) -> list[str]:
     """Operations of a function without Taylor series, such as the selections of a branch."""
-    return sorted({node.op for node in function.nodes} - KNOWN)
+    return sorted({node.op for node in function.nodes} - SERIES_OPERATIONS)
 
 
 class SeriesPlan:

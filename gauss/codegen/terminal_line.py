@@ -14,7 +14,7 @@ from threading import Lock, Timer
 
 from gauss.codegen.tiers import Run
 
-SLOW = 1.0  # a line appears where code is made for longer than this [s]
+LINE_DELAY = 1.0  # a line appears where code is made for longer than this [s]
 TEXT = "gauss: making machine code …"
 WRITTEN = TEXT + " functions written: {}"
 COMPILING = "gauss: compiling {} functions"
@@ -113,7 +113,7 @@ def compile_notice() -> Iterator[None]:
         yield
         return
     line = TerminalLine()
-    timer, token = Timer(SLOW, line.show), _line.set(line)
+    timer, token = Timer(LINE_DELAY, line.show), _line.set(line)
     timer.daemon = True
     timer.start()
     try:

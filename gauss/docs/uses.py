@@ -13,7 +13,7 @@ from gauss.io.catalog import folder
 PAGES = Path(__file__).parent / "pages"
 SNIPPET = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 PACKAGES = ("gauss", "gauss.linkages", "gauss.rotors", "gauss.servo", "gauss.view", "gauss.view.viewer", "gauss.scene")
-MOST = 8  # pages listed for one name
+MOST_PAGES = 8  # pages listed for one name
 
 
 def snippets(page: Path) -> list[str]:
@@ -32,7 +32,7 @@ def uses() -> dict[str, list[tuple[str, str]]]:
     for page, title, code in _sources():
         for name in names_in(code):
             pages = found.setdefault(name, [])
-            if (page, title) not in pages and len(pages) < MOST:
+            if (page, title) not in pages and len(pages) < MOST_PAGES:
                 pages.append((page, title))
     return found
 

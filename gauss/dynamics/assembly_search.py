@@ -28,7 +28,7 @@ RESIDUAL_TOLERANCE = 1e-10  # residual relative to the scales of the rows of a c
 NEWTON_STEPS = 60
 PATH_STEPS = 120
 LARGEST_STEP = 0.5  # rad and lengths of the scene, of a step along the path
-FAR = np.pi  # rad and lengths of the scene: from a pose that is farther away, a nearer one is looked for
+FAR_POSE = np.pi  # rad and lengths of the scene: from a pose that is farther away, a nearer one is looked for
 STARTS = 24
 SPREAD = 2.0  # rad and lengths of the scene: largest distance of a start from the guess
 
@@ -57,7 +57,7 @@ def assembled(system: System, guess: State, held, restart: bool) -> AssembledPos
         Whether starts around the guess are tried where the paths from it end at a residual.
     """
     best = _pose(system, project_positions(system, guess, NEWTON_STEPS, held))
-    if best.is_met and _distance(system, guess, best.state) <= FAR:
+    if best.is_met and _distance(system, guess, best.state) <= FAR_POSE:
         return best
     best = min(best, followed(system, guess, held), key=lambda pose: _rank(system, guess, pose))
     if best.is_met or not restart:

@@ -28,7 +28,7 @@ from gauss.system.elimination_cost import MOST_SHARED_JOINTS, MOST_WORK
 LARGE_TREE_BODIES = (
     40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
 )
-WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
+MOST_RATES = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
 MOST_COUPLING_WORK = 10_000  # operations for couplings above which kernels are as fast, and compiled in a fifth of the time
 # Pairs of loops that share a joint of the tree, per body, up to which kernels of loops are made within seconds; they are
 # slower than straight-line code above MOST_SHARED_JOINTS
@@ -79,7 +79,7 @@ def has_large_loops(system) -> bool:
     bound = any(subsystem.relations or subsystem.trains for subsystem in subsystems)
     if bound or not any(subsystem.loop_joints or subsystem.couplings for subsystem in subsystems):
         return False
-    if system.n_v <= WIDE and _loop_work(subsystems) <= MOST_WORK and _coupling_work(subsystems) <= MOST_COUPLING_WORK:
+    if system.n_v <= MOST_RATES and _loop_work(subsystems) <= MOST_WORK and _coupling_work(subsystems) <= MOST_COUPLING_WORK:
         return False
     if _share_few_joints(subsystems):
         return True

@@ -22,7 +22,7 @@ LARGEST_LEAK = 1e-11  # relative: derivatives have eight digits; round-off of lo
 REFUSED_LEAK = 1e-7  # the same where nothing has more digits: five are left
 SHARE_UNDER_FORCES = 0.01  # of the constraint accelerations under forces, whose round-off is that much larger
 
-ALIKE = 1e3  # ratio of masses, and of moments of inertia, of one loop up to which elimination leaves twelve digits
+MASS_RATIO = 1e3  # ratio of masses, and of moments of inertia, of one loop up to which elimination leaves twelve digits
 
 
 def may_leak(system: System) -> bool:
@@ -38,7 +38,7 @@ def _has_unlike_bodies(system: System) -> bool:
 def _are_alike(subsystem: Subsystem) -> bool:
     """Whether masses, and largest moments of inertia, of the bodies of a subsystem are of similar size, none zero."""
     moments, masses = _moments_and_masses(subsystem)
-    return all(sizes.max() <= ALIKE * sizes.min() for sizes in (moments.max(axis=1), masses))
+    return all(sizes.max() <= MASS_RATIO * sizes.min() for sizes in (moments.max(axis=1), masses))
 
 
 def _moments_and_masses(subsystem: Subsystem) -> tuple[np.ndarray, np.ndarray]:
@@ -65,7 +65,7 @@ def with_alike_bodies(system: System, pattern: System | None = None) -> tuple[Su
 
 def _with_alike(subsystem: Subsystem, pattern: Subsystem) -> Subsystem:
     """Subsystem whose masses and moments of inertia are at least a share of the largest."""
-    raised = [np.maximum(sizes, sizes.max(initial=0.0) / ALIKE) for sizes in _moments_and_masses(pattern)]
+    raised = [np.maximum(sizes, sizes.max(initial=0.0) / MASS_RATIO) for sizes in _moments_and_masses(pattern)]
     Phi = np.concatenate([raised[0], np.repeat(raised[1][:, None], 3, axis=1)], axis=1).ravel()
     return ungrouped(replace(subsystem, Phi=Phi))
 

@@ -13,7 +13,7 @@ from gauss.scene import OneSidedConstraint, Stop
 from gauss.system import Relations, System, retract, sides
 from gauss.system.relations import place_relations
 
-AROUND = 0.1  # units: distance from the start at which gradients are taken that vanish there
+GRADIENT_DISTANCE = 0.1  # units: distance from the start at which gradients are taken that vanish there
 
 
 def _of_constraints(system: System) -> np.ndarray:
@@ -75,7 +75,7 @@ def relation_scales(system: System, relations: Relations) -> np.ndarray:
         return np.zeros(0)
     rng, start = np.random.default_rng(0), system.start()
     found = np.zeros(sum(placed.size for placed in relations.placed))
-    for around in (0.0, AROUND, AROUND, AROUND):
+    for around in (0.0, GRADIENT_DISTANCE, GRADIENT_DISTANCE, GRADIENT_DISTANCE):
         away = around * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
         state = system.state(retract(system, start.q, away))
         seen = _slopes(system, relations, state)

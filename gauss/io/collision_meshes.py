@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.errors import FileError
 
-ABOVE = 6  # folders above a file in which its package:// paths are looked for
+FOLDERS_ABOVE = 6  # folders above a file in which its package:// paths are looked for
 SCHEMES = ("package://", "model://", "file://")
 
 
@@ -23,7 +23,7 @@ def mesh_path(file: Path, named: str) -> Path | None:
     home, in_package = file.resolve().parent, scheme in SCHEMES[:2]
     if in_package and ".." in PurePosixPath(rest).parts:
         return None
-    folders = file.resolve().parents[:ABOVE] if in_package else [home]
+    folders = file.resolve().parents[:FOLDERS_ABOVE] if in_package else [home]
     found = next((folder / rest for folder in folders if (folder / rest).is_file()), None)
     inside = found is not None and (in_package or found.resolve().is_relative_to(home.parent))  # meshes/ beside urdf/
     return found if inside else None

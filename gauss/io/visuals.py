@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gauss.errors import FileError, NotImportedWarning, extra
-from gauss.io.collision_meshes import ABOVE
+from gauss.io.collision_meshes import FOLDERS_ABOVE
 from gauss.io.urdf.guard import guarded, require_own_meshes
 from gauss.io.urdf.numbers import for_parser
 from gauss.io.urdf.read import ROOTS, base_of, body_names
@@ -50,7 +50,7 @@ def read_visuals(source, root: str = "fixed") -> list[Visual]:
     text = for_parser(source)
     try:
         model = pin.buildModelFromXML(text, *base_of(root))
-        folders = [str(folder) for folder in path.resolve().parents[:ABOVE] if folder != folder.parent]
+        folders = [str(folder) for folder in path.resolve().parents[:FOLDERS_ABOVE] if folder != folder.parent]
         found = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL, package_dirs=folders)
     except Exception as error:  # the parser raises whatever its libraries do
         raise FileError(f"{path}: its meshes cannot be read: {error}") from error

@@ -17,7 +17,7 @@ from gauss.errors import ArgumentError, LinkageError
 from gauss.linkages.four_bar import DIMENSIONS, FourBarDesign, numbers
 
 STARTS, SPREAD = 400, 3.0  # starts, and their distance from the poses in sizes of these
-EQUAL = 1e-6  # share of the size, within which two solutions are one
+EQUAL_SOLUTIONS = 1e-6  # share of the size, within which two solutions are one
 RESIDUAL_SHARE = 1e-9  # share of the square of the size, below which an equation is met
 FARTHEST = 100.0  # sizes; farther pivots are those of slides
 
@@ -104,8 +104,8 @@ def _dyads(poses: np.ndarray, size: float) -> list[np.ndarray]:
     solved = [_solved(poses, center + SPREAD * size * rng.uniform(-1.0, 1.0, 4), size) for _ in range(STARTS)]
     least = min(residual for _, residual in solved)
     for z, residual in sorted(solved, key=lambda one: one[1]):
-        is_finite = np.abs(z - center).max() < FARTHEST * size and np.linalg.norm(z[:2] - z[2:]) > EQUAL * size
-        is_new = all(np.abs(z - other).max() > EQUAL * size for other in found)
+        is_finite = np.abs(z - center).max() < FARTHEST * size and np.linalg.norm(z[:2] - z[2:]) > EQUAL_SOLUTIONS * size
+        is_new = all(np.abs(z - other).max() > EQUAL_SOLUTIONS * size for other in found)
         if is_finite and is_new and residual <= max(RESIDUAL_SHARE, 2.0 * least):
             found.append(z)
     return found

@@ -10,7 +10,7 @@ from gauss.rotors.elements import Torque
 from gauss.rotors.laws import Dry
 from gauss.rotors.links import GearPair
 from gauss.rotors.network import Network
-from gauss.rotors.reduced import CYCLE, REST, GearBranch, ReducedNetwork
+from gauss.rotors.reduced import CYCLE, REST_SPEED, GearBranch, ReducedNetwork
 
 RUN_UP_ANGLE = 0.1  # rad: a network that starts at rest is given the speed it reaches over this angle, as scale
 
@@ -48,7 +48,7 @@ def reduce(network: Network) -> ReducedNetwork:
         np.array([shaft.inertia for shaft in network.shafts.values()]),
         group, K, tuple(roots), tuple(reversed(outward)), tuple(redundant), terms, _dry_torques(network, index),
         np.array([shaft.angle for shaft in network.shafts.values()]), speed,
-        REST * (_known_speed(speed, group, K, terms) or _run_up_speed(network, K)),
+        REST_SPEED * (_known_speed(speed, group, K, terms) or _run_up_speed(network, K)),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.rotors.mechanics import NetworkInstant, link_kinematics
 from gauss.rotors.mode import indicate
-from gauss.rotors.reduced import REST
+from gauss.rotors.reduced import REST_SPEED
 
 if TYPE_CHECKING:
     from gauss.rotors.phase import NetworkPhase
@@ -39,7 +39,7 @@ def margins(phase: NetworkPhase, t: float, theta, w, scale: float) -> tuple[list
     every += _reserves(phase, t, found, torques, scale)
     signs = indicate(reduced, speed) * mode.signs
     keys = [key for key, _ in every] + [("indicator", i) for i in range(len(signs))]
-    return keys, np.array([*(value for _, value in every), *np.where(mode.signs == 0, np.inf, signs * REST)])
+    return keys, np.array([*(value for _, value in every), *np.where(mode.signs == 0, np.inf, signs * REST_SPEED)])
 
 
 def _flows(phase: NetworkPhase, found: NetworkInstant, speed: np.ndarray, scale: float) -> Margins:

@@ -16,8 +16,8 @@ from gauss.rotors.links import GearPair
 from gauss.rotors.network import Network
 
 CYCLE = 1e-9  # relative difference of ratios round a cycle that rounding of typed numbers explains
-REST = 1e-6  # v_0 relative to the largest known speed (Rotor chains, section 4)
-SLOW = 1e-2  # slow speed relative to the largest known one
+REST_SPEED = 1e-6  # v_0 relative to the largest known speed (Rotor chains, section 4)
+SLOW_SPEED = 1e-2  # slow speed relative to the largest known one
 
 
 class GearBranch(NamedTuple):
@@ -94,12 +94,12 @@ class ReducedNetwork:
     @property
     def largest(self) -> float:
         """Largest speed given in the network [rad/s]."""
-        return self.v_0 / REST
+        return self.v_0 / REST_SPEED
 
     @property
     def slow(self) -> float:
         """Scale of slow speeds [rad/s]; that of angles is 1 rad."""
-        return SLOW * self.largest
+        return SLOW_SPEED * self.largest
 
     @property
     def n_groups(self) -> int:

@@ -27,7 +27,7 @@ from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import NetworkEquations
 from gauss.rotors.mode_search import find_phase
 from gauss.rotors.phase import NetworkPhase
-from gauss.rotors.reduced import REST
+from gauss.rotors.reduced import REST_SPEED
 from gauss.rotors.stops import StepEnd
 from gauss.rotors.switching import NetworkSwitching, resolved_share
 
@@ -281,7 +281,7 @@ class RotorRun:
 
     def _sign_indicators(self) -> bool:
         """Give a sign to indicators that started at zero; whether there were any."""
-        before, self.phase = self.phase, self.phase.signed(*self.split(self.y), self.slack / REST)
+        before, self.phase = self.phase, self.phase.signed(*self.split(self.y), self.slack / REST_SPEED)
         return self.phase is not before
 
     def record(self, t: float | None = None) -> None:

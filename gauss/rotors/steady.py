@@ -19,7 +19,7 @@ from gauss.rotors.mode_search import find_phase
 from gauss.rotors.network import Network
 from gauss.rotors.operating_point import OperatingPoint, point_of, slopes
 from gauss.rotors.phase import NetworkPhase
-from gauss.rotors.reduced import REST, ReducedNetwork
+from gauss.rotors.reduced import REST_SPEED, ReducedNetwork
 
 SCANNED = 400  # speeds of a network of one coordinate
 STARTS = 400  # of Newton's method otherwise, at most
@@ -57,7 +57,7 @@ def operating_points(network: Network, t: float = 0.0) -> list[OperatingPoint]:
     v_0 = reduce(network).v_0
     reduced = replace(reduce(_rigid(network, ())), v_0=v_0)
     equations, roots = NetworkEquations(reduced), list(reduced.roots)
-    largest = reduced.v_0 / REST
+    largest = reduced.v_0 / REST_SPEED
     found: list[NetworkPhase] = []
     points: list[np.ndarray] = []
     for speeds in _candidates(network, t, v_0):
@@ -81,7 +81,7 @@ def _candidates(network: Network, t: float, v_0: float):
         except SceneError:  # the links close a loop whose ratios contradict: they cannot all stick
             continue
         search = _scan if reduced.n_groups == 1 else _newton_from_everywhere
-        for w in search(NetworkEquations(reduced), t, SPEED_RANGE * v_0 / REST):
+        for w in search(NetworkEquations(reduced), t, SPEED_RANGE * v_0 / REST_SPEED):
             yield reduced.K * w[reduced.group]
 
 
@@ -123,7 +123,7 @@ def _scan(equations: NetworkEquations, t: float, largest: float):
 
     # evenly over the range, and far beyond it in case that no initial or no-load speed is known
     speeds = np.concatenate(
-        [np.linspace(largest * REST, largest, SCANNED), largest * np.geomspace(1.0, FARTHEST, TAIL_SPEEDS)[1:]]
+        [np.linspace(largest * REST_SPEED, largest, SCANNED), largest * np.geomspace(1.0, FARTHEST, TAIL_SPEEDS)[1:]]
     )
     grid = np.concatenate([-speeds[::-1], speeds])
     values = [residual(speed) for speed in grid]

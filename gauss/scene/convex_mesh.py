@@ -11,7 +11,7 @@ from gauss.errors import SceneError
 from gauss.scene import values
 from gauss.scene.curved_shapes import ConvexCollider
 
-FLAT = 1e-9  # least extent of a solid, relative to its largest
+LEAST_EXTENT = 1e-9  # least extent of a solid, relative to its largest
 MESHES = 256  # hulls that are kept
 COPLANAR = 1e-7  # difference of normals and of relative distances of two triangles of one face
 
@@ -46,7 +46,7 @@ class ConvexMesh(ConvexCollider):
             raise SceneError(f"{self.what}: vertices are to be finite; point {_first(~np.isfinite(points))} is not.")
         values.keep(self, vertices=tuple(map(tuple, points.tolist())))
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) if len(points) > 3 else np.zeros(3)
-        if spread[2] <= FLAT * spread[0]:
+        if spread[2] <= LEAST_EXTENT * spread[0]:
             raise SceneError(
                 f"{self.what}: its {len(points)} vertices lie in one plane, line or point; a solid needs four that do not."
             )
@@ -63,7 +63,7 @@ class ConvexMesh(ConvexCollider):
             )
         p = np.array(self.vertices)[faces]
         double = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-        if (double <= FLAT * np.ptp(np.array(self.vertices), axis=0).max() ** 2).any():
+        if (double <= LEAST_EXTENT * np.ptp(np.array(self.vertices), axis=0).max() ** 2).any():
             raise SceneError(f"{self.what}: face {int(np.argmin(double))} has no area; leave it out.")
         _, first, same = np.unique(np.array(self.vertices), axis=0, return_index=True, return_inverse=True)
         faces = first[same.ravel()][faces]  # one number of vertices that are given several times

@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss.scene.height_field import HeightField
 
-AROUND = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1))  # rows and columns to the neighbours of a vertex
+NEIGHBOURS = ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (-1, -1))  # rows and columns to the neighbours of a vertex
 ROWS = np.array([[0, 0, 1], [0, 1, 1]])  # of the corners of the lower and the upper triangle of a cell
 COLUMNS = np.array([[0, 1, 1], [0, 1, 0]])
 ON_EDGE = 1e-5  # share of a corner in a place of a triangle below which the place is on the opposite edge
@@ -125,5 +125,5 @@ class Terrain:
         """Neighbours of a vertex."""
         rows, columns = self.heights.shape
         i, j = divmod(number, columns)
-        around = ((i + di, j + dj) for di, dj in AROUND)
+        around = ((i + di, j + dj) for di, dj in NEIGHBOURS)
         return {k * columns + m for k, m in around if 0 <= k < rows and 0 <= m < columns}

@@ -15,16 +15,16 @@ from gauss.scene.contact_patch import SLOTS, ContactPoint, Solid, SolidPair, Sol
 from gauss.scene.support_faces import Polytope, Segment
 from gauss.scene.terrain import Terrain, Triangles
 
-SAME = 1e-9  # relative to the size of a solid: places and planes that are the same
+PLANE_TOLERANCE = 1e-9  # relative to the size of a solid: places and planes that are the same
 LEAST_DEPTH = 4.0  # sizes of the solid that prisms reach below their triangles at least, where the field does
 NEAR_SIDE = 1e-5  # of the size of the solid: a place is at the sides or the bottom of the field
 ODD = np.array([(0.31, 0.57, 0.76), (0.76, -0.31, 0.57)])  # along which no edges are expected: ties are sorted by rounding
 LOOKED_AT = 0.1  # of the size of a solid: up to this distance points are found where no step says how far they may move
-BESIDE = 0.05  # of the size of a solid: points that are no farther from the nearest one are at its place
+DISTANCE = 0.05  # of the size of a solid: points that are no farther from the nearest one are at its place
 CLOSED = 1e-5  # of the size of a solid: gaps that differ less have one place in the order of points
 FLUSH = 0.9998  # cosine of the angle of two faces that lie on each other
 MOST_PRISMS = 4096  # that are kept
-TINY = 1e-12  # relative to the size of the field: distance of a centre from the surface that has no direction
+CENTRE_DISTANCE = 1e-12  # relative to the size of the field: distance of a centre from the surface that has no direction
 
 
 class BallOnTerrain:
@@ -42,7 +42,7 @@ class BallOnTerrain:
         """Contact points nearer than ``reach`` [m]: places on the field, normals out of it."""
         terrain, centre = self.terrain, other.R.T @ (one.x - other.x)
         depth = terrain.height(centre) - centre[2]
-        far = max(self.radius + reach, depth * (1.0 + SAME))
+        far = max(self.radius + reach, depth * (1.0 + PLANE_TOLERANCE))
         near = terrain.under(centre - far, centre + far)
         if not len(near.corners):
             return []
@@ -51,14 +51,14 @@ class BallOnTerrain:
         distances = np.linalg.norm(out, axis=1)
         if depth > 0.0:
             k = int(np.argmin(distances))
-            up = -out[k] / distances[k] if distances[k] > TINY * terrain.size else near.normals[k]
+            up = -out[k] / distances[k] if distances[k] > CENTRE_DISTANCE * terrain.size else near.normals[k]
             deepest = ContactPoint(-float(distances[k]) - self.radius, other.x + other.R @ places[k], other.R @ up)
             return [deepest] if terrain.margin(centre) > distances[k] else []
         found: dict[tuple, ContactPoint] = {}
         for k in np.flatnonzero(distances <= far).tolist():
-            up = out[k] / distances[k] if distances[k] > TINY * terrain.size else near.normals[k]
+            up = out[k] / distances[k] if distances[k] > CENTRE_DISTANCE * terrain.size else near.normals[k]
             if terrain.has_normal(near.corners[k], near.points[k], near.normals[k], places[k], up):
-                key = tuple(np.rint(places[k] / (SAME * (self.radius or terrain.size))).tolist())
+                key = tuple(np.rint(places[k] / (PLANE_TOLERANCE * (self.radius or terrain.size))).tolist())
                 gap = float(distances[k]) - self.radius
                 found.setdefault(key, ContactPoint(gap, other.x + other.R @ places[k], other.R @ up))
         return _chosen(list(found.values()), self.radius or terrain.size, other.R)
@@ -113,7 +113,7 @@ class SolidOnTerrain:
                 continue
             place, direction = other.R.T @ (nearest.place - other.x), other.R.T @ nearest.normal
             if self.terrain.has_normal(corners, points, normal, place, direction):
-                found += _beside(pair.around(nearest, one, pose, reach), nearest, min(reach, BESIDE * self.first.size))
+                found += _beside(pair.around(nearest, one, pose, reach), nearest, min(reach, DISTANCE * self.first.size))
             elif nearest.gap > 0.0:  # another triangle is nearer; the faces that meet here may touch next
                 patch = pair.patch(one, pose, nearest.normal, reach)[0]
                 found += [
@@ -127,7 +127,7 @@ class SolidOnTerrain:
                 within += pair.patch(one, pose, other.R @ normal, reach)[0]
         if all(point.gap > 0.0 for point in found):
             found += within
-        return _chosen(_outlines(found, SAME * self.first.size), self.first.size, other.R)
+        return _chosen(_outlines(found, PLANE_TOLERANCE * self.first.size), self.first.size, other.R)
 
     def _prism(self, corners: np.ndarray, points: np.ndarray) -> tuple[SolidPair, np.ndarray]:
         """Solid and prism under a triangle, and the middle of the prism."""
@@ -178,7 +178,7 @@ def _outlines(points: list[ContactPoint], near: float) -> list[ContactPoint]:
     """Points without those that lie, in a plane of contact, between others of it: distances are linear there."""
     planes: dict[tuple, dict[tuple, ContactPoint]] = {}
     for point in points:
-        key = *np.rint(point.normal / SAME).tolist(), round(float(point.normal @ point.place) / near)
+        key = *np.rint(point.normal / PLANE_TOLERANCE).tolist(), round(float(point.normal @ point.place) / near)
         planes.setdefault(key, {}).setdefault(tuple(np.rint(point.place / near).tolist()), point)
     return [point for plane in planes.values() for point in _outline(list(plane.values()), near)]
 

@@ -23,7 +23,7 @@ TERM_ROUNDING = 1e-9  # relative to the terms of a number: below it the number i
 SAMPLES = 4
 SPREAD = 0.05  # units of the scene, of neighbouring states: on the same side of any singularity
 MOST_OPERATIONS = 2000  # of a hidden relation: its second derivative has ten to twenty times as many
-FAST = 1.0  # units of the scene: rates of neighbouring states
+NEIGHBOUR_RATES = 1.0  # units of the scene: rates of neighbouring states
 
 
 class RelationPlan(NamedTuple):
@@ -63,7 +63,7 @@ def neighbours(servo: Servo, state: State) -> list[State]:
     for _ in range(SAMPLES):
         q = retract(system, state.q, SPREAD * scale.coordinates * rng.standard_normal(system.n_v))
         t = state.t + SPREAD * scale.time * rng.random()
-        near = State(t, q, state.v + FAST * scale.rates * rng.standard_normal(system.n_v))
+        near = State(t, q, state.v + NEIGHBOUR_RATES * scale.rates * rng.standard_normal(system.n_v))
         found.append(dynamics.consistent(system, near, ()))
     return found
 

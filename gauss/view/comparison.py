@@ -9,7 +9,7 @@ from gauss.system import coordinate_rates, coordinate_units
 from gauss.view.plots import FLOOR, scalar_coordinates
 from gauss.view.style import check_format, legend, looks, saved
 
-MOST = 6  # coordinates of a figure when none are named
+MOST_COORDINATES = 6  # coordinates of a figure when none are named
 
 
 def plot_comparison(motions, coordinates=None, path=None, labels=None) -> Figure:
@@ -85,7 +85,7 @@ def plot_comparison(motions, coordinates=None, path=None, labels=None) -> Figure
 def _names(columns: list[dict], wanted) -> list[str]:
     """Coordinates that all motions have."""
     shared = [name for name in columns[0] if all(name in own for own in columns)]
-    names = shared[:MOST] if wanted is None else list(wanted)
+    names = shared[:MOST_COORDINATES] if wanted is None else list(wanted)
     missing = [name for name in names if name not in shared]
     if missing or not names:
         raise ArgumentError(f"plot_comparison: not a coordinate of all motions: {', '.join(missing) or 'any'}.")

@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7F7F7F", "#5D3A9B", "#994F00")
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
 ZERO = {"marker": "*", "markersize": 10, "markeredgewidth": 0.8, "linestyle": ""}  # of an error of zero
-WIDE = 3  # panels in a row
+PANELS_IN_ROW = 3  # panels in a row
 LETTERS, LINES = 40, 5  # of a reason: in a line, and lines
 LINE = 0.042  # height of a line of a reason, of that of the panel
 
@@ -32,7 +32,7 @@ def plot_precision(panels, path=None, title: str = "", note: str = "", uncertain
     uncertainties : dict, optional
         {name of the scene: how far its reference may be off [m]}, drawn as a band.
     """
-    columns = min(WIDE, len(panels))
+    columns = min(PANELS_IN_ROW, len(panels))
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(6.6 * columns + (1.4 if columns == 1 else 0), 3.9 * rows + 1.3), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False)

@@ -11,7 +11,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8
 LINES = ("-", "--", "-.", ":")
 INK = "#333333"
 NAMED = 12  # more curves than this need no legend: their colours repeat
-FLAT = 1e-9  # relative to a unit of the scene: what changes by less is rounding, and is drawn as a flat line
+FLAT_CHANGE = 1e-9  # relative to a unit of the scene: what changes by less is rounding, and is drawn as a flat line
 DPI = 150
 PAGE_DPI = 140  # of figures beside pages of results
 
@@ -67,5 +67,5 @@ def unit_sizes(system) -> dict[str, float]:
 def keep_flat(axes, size: float):
     """Widen the ordinate to a share of a size, if all curves are within it."""
     low, high = axes.get_ylim()
-    if high - low < 2 * FLAT * size:
-        axes.set_ylim((low + high) / 2 - FLAT * size, (low + high) / 2 + FLAT * size)
+    if high - low < 2 * FLAT_CHANGE * size:
+        axes.set_ylim((low + high) / 2 - FLAT_CHANGE * size, (low + high) / 2 + FLAT_CHANGE * size)

@@ -17,7 +17,7 @@ from scipy import io
 import gauss
 from gauss.backends import make
 from gauss.backends.programme import FORMS
-from gauss.bench.classes import FEW, compare_class, problems_of
+from gauss.bench.classes import QUICK_PROBLEMS, compare_class, problems_of
 from gauss.bench.export import TEST_SET, along, export, without_inequalities
 from gauss.bench.instances import FILE, of_arrays
 from gauss.bench.levels import POLICIES
@@ -187,7 +187,7 @@ def test_rows_of_other_settings_or_numbers_are_measured_again(tmp_path, monkeypa
 def test_classes_are_asked_at_high_and_a_few_of_their_problems_at_low_and_mid(tmp_path):
     table = compare_class(tmp_path, "infeasible", backends=["clarabel"], progress=False)
     count = Counter(row["level"] for row in table.rows.values())
-    assert count == {"high": len(problems_of("infeasible")), "low": FEW, "mid": FEW}
+    assert count == {"high": len(problems_of("infeasible")), "low": QUICK_PROBLEMS, "mid": QUICK_PROBLEMS}
     (form,) = {row["form"] for row in table.rows.values()}
     assert form == FILE and not {"qpax", "jaxopt_osqp"} & set(quick_backends())
 

@@ -11,7 +11,7 @@ from gauss.bench.contestants import contestants, everyone, ready, suits
 from gauss.bench.coulomb import projected
 from gauss.bench.folders import of_folder
 from gauss.bench.instances import FILE, of_selection
-from gauss.bench.measure import NOT_ASKED, TINY, measure
+from gauss.bench.measure import NOT_ASKED, TINY_PROGRAMMES, measure
 from gauss.bench.structured import CONES, COULOMB, ROWS, STAGES
 from gauss.bench.suite import export_suite, instances
 from gauss.bench.suite_instances import of_suite
@@ -44,9 +44,9 @@ def small() -> dict:
     return {instance.name: instance for kind, names in SMALL.items() for instance in of_suite(kind, [*names])}
 
 
-@pytest.mark.parametrize("kind", TINY)
+@pytest.mark.parametrize("kind", TINY_PROGRAMMES)
 def test_solvers_are_asked_what_they_take(kind):
-    instance = TINY[kind]
+    instance = TINY_PROGRAMMES[kind]
     asked = {solver for solver in everyone() if suits(solver, instance)}
     assert instance.structure.kind == kind and asked == set(contestants(kind)) and suits("mine:Solver", instance)
     assert ("daqp" in asked) == (kind in (ROWS, STAGES)) and ("newton" in asked) == (kind == COULOMB)

@@ -137,7 +137,7 @@ def test_other_sources_and_another_machine_have_other_keys(what, place, monkeypa
 
 
 def test_sources_changed_since_the_process_began_keep_nothing(place, monkeypatch):
-    monkeypatch.setattr(disk_cache, "BEGUN", 0)
+    monkeypatch.setattr(disk_cache, "LOADED_AT", 0)
     monkeypatch.setattr(disk_cache, "package_digest", disk_cache.package_digest.__wrapped__)
     assert made(1.5)[1] and made(1.5)[1] and not entries(place)
 

@@ -261,7 +261,7 @@ def test_a_line_appears_on_a_terminal_while_code_is_made_for_long(is_terminal, s
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(object_code, "UNIT_LENGTH", 1)  # a unit for each function
     notices = terminal_line
-    monkeypatch.setattr(notices, "SLOW", 0.0)
+    monkeypatch.setattr(notices, "LINE_DELAY", 0.0)
     inner = write(lambda x: x * x, 1, name="inner")
     outer = write(lambda x: inner(x) + 3.0, 1, name="outer")
     with one_tier(shown=shown), notices.compile_notice(), notices.compile_notice():
@@ -276,7 +276,7 @@ def test_a_line_appears_on_a_terminal_while_code_is_made_for_long(is_terminal, s
     said = [notices.TEXT, notices.WRITTEN.format(1), notices.WRITTEN.format(2), notices.COMPILING.format(functions)]
     said += [notices.PARTLY_COMPILED.format(done, functions) for done in (1, 2)]
     assert stream.getvalue() == (notices.CLEARED.join([*said, ""])) * lines
-    monkeypatch.setattr(notices, "SLOW", PATIENCE)
+    monkeypatch.setattr(notices, "LINE_DELAY", PATIENCE)
     with notices.compile_notice():
         object_code.quick_objects(str(writer.module))
     assert stream.getvalue().count(notices.TEXT) == 3 * lines  # those above: nothing is written before its time

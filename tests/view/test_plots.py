@@ -12,7 +12,7 @@ from gauss.errors import FileError, NonUniqueReactionWarning, StateError
 from gauss.scene import GROUND
 from gauss.system import coordinate_units
 from gauss.view.skeleton import lines, placed, skeleton
-from gauss.view.style import FLAT
+from gauss.view.style import FLAT_CHANGE
 
 ROUNDING = 1e-12  # of positions along a chain of rotations [m]
 FIGURES = {
@@ -81,7 +81,7 @@ def test_rounding_is_drawn_as_a_flat_line(motions):
     q = motion.q.copy()
     q[:, rail] = 1e-35 * np.sin(motion.t)
     moving, resting = view.plot_coordinates(replace(motion, q=q)).axes
-    assert np.ptp(resting.get_ylim()) == pytest.approx(2 * FLAT * motion.system.scale.length)
+    assert np.ptp(resting.get_ylim()) == pytest.approx(2 * FLAT_CHANGE * motion.system.scale.length)
     low, high = moving.get_ylim()
     assert np.ptp(motion.coordinate("pin")) <= high - low <= 1.2 * np.ptp(motion.coordinate("pin"))
 

@@ -34,7 +34,7 @@ LEAST, SMALL, LARGEST, FACTOR = (
     1e15,
     4.0,
 )  # regularisation, relative to the mean of the diagonal of Q_uu; small ones count as none
-SLOW = 1e-2  # relative reduction of the cost below which second derivatives pay: far from the optimum they mislead
+SLOW_REDUCTION = 1e-2  # relative reduction of the cost below which second derivatives pay: far from the optimum they mislead
 DOMINANT = 1.0  # regularisation from which steps are without feedback, which has kinks where inputs are at their limits
 
 
@@ -230,7 +230,7 @@ class _Ilqr:
                 return self._found(x, u, total, gains, costs)
             tried = self.searched(x, u, gains, total)
             if tried is not None:
-                curved = self.second_order and total - tried[2] < SLOW * abs(total)
+                curved = self.second_order and total - tried[2] < SLOW_REDUCTION * abs(total)
                 x, u, total, share = tried
                 costs.append(total)
                 regular = max(regular / (FACTOR**2 if share == 1.0 else FACTOR), LEAST)

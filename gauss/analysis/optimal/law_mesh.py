@@ -12,7 +12,7 @@ from gauss.simulation.passed_switching import smooth_timetable, warn_of_features
 from gauss.system import State, System
 
 MOST_PLACES = 20  # of an interval: more switching times and cells of a law are left to the check of the result
-NEAR = 0.01  # of an equal interval: a mesh point nearer to a switching time gives way to it
+MESH_DISTANCE = 0.01  # of an equal interval: a mesh point nearer to a switching time gives way to it
 
 
 def law_mesh(system: System, start: State, span: tuple[float, float], intervals: int) -> np.ndarray:
@@ -29,7 +29,7 @@ def law_mesh(system: System, start: State, span: tuple[float, float], intervals:
     if not places.size or places.size > MOST_PLACES * intervals:
         return equal
     inner = equal[1:-1]
-    far = np.abs(inner[:, None] - places).min(axis=1) > NEAR / intervals
+    far = np.abs(inner[:, None] - places).min(axis=1) > MESH_DISTANCE / intervals
     return distinct(np.concatenate([equal[[0, -1]], inner[far], places]))
 
 

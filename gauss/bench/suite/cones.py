@@ -14,7 +14,7 @@ from scipy import linalg, sparse
 from gauss.bench.suite.doubled import Doubled, joined, product, taken, wide, zeros
 from gauss.bench.suite.guess import guessed
 from gauss.bench.suite.instance import SuiteInstance, SuiteReference
-from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, speeds
+from gauss.bench.suite.optimality import LEAST_SIZE, largest_multiplier, residuals, speeds
 from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, STAGNATED, STEPS, held_rows
 from gauss.errors import BackendError
 
@@ -35,10 +35,10 @@ def refined_with_cones(instance: SuiteInstance) -> SuiteReference:
     before = last = np.inf
     for _ in range(STEPS):
         value, slope = equations.value(unknown), equations.slope(unknown.rounded())
-        scale = np.maximum(np.abs(slope).max(axis=1), TINY)
+        scale = np.maximum(np.abs(slope).max(axis=1), LEAST_SIZE)
         step = _solved(slope / scale[:, None], value.rounded() / scale)
         unknown = unknown - step
-        last = float(np.abs(step).max() / max(np.abs(unknown.hi).max(), TINY))
+        last = float(np.abs(step).max() / max(np.abs(unknown.hi).max(), LEAST_SIZE))
         if last <= CONVERGED or (last <= STAGNATED and last > before / 2):
             break
         before = last
@@ -89,11 +89,11 @@ def _states(instance: SuiteInstance, x: np.ndarray, z: np.ndarray) -> tuple[list
     for block in instance.blocks:
         own = slice(block.start - instance.orthant, block.stop - instance.orthant)
         a, w = s[own], z[own]
-        depth, height = (abs(part[0] - np.linalg.norm(part[1:])) / max(abs(part[0]), TINY) for part in (a, w))
-        off = {INSIDE: abs(w[0]) / most, APEX: abs(a[0]) / max(np.abs(s).max(), TINY), BOUNDARY: max(depth, height)}
+        depth, height = (abs(part[0] - np.linalg.norm(part[1:])) / max(abs(part[0]), LEAST_SIZE) for part in (a, w))
+        off = {INSIDE: abs(w[0]) / most, APEX: abs(a[0]) / max(np.abs(s).max(), LEAST_SIZE), BOUNDARY: max(depth, height)}
         states.append(min(off, key=off.__getitem__))
         if states[-1] == BOUNDARY:
-            factors.append(w[0] / max(a[0], TINY))
+            factors.append(w[0] / max(a[0], LEAST_SIZE))
     return states, np.array(factors)
 
 
@@ -181,7 +181,7 @@ class CoulombEquations:
         """Unknowns of a guess: u_t = −τ r_t."""
         u, at = self.instance.P @ x + self.instance.q, self.sliding
         rub = np.hypot(x[at + 1], x[at + 2])
-        return np.concatenate([x, np.hypot(u[at + 1], u[at + 2]) / np.maximum(rub, TINY)])
+        return np.concatenate([x, np.hypot(u[at + 1], u[at + 2]) / np.maximum(rub, LEAST_SIZE)])
 
     def value(self, unknown: Doubled) -> Doubled:
         """Residuals of the equations."""

@@ -13,7 +13,7 @@ from scipy import sparse
 from gauss.bench.suite.doubled import Doubled, product, taken, wide, zeros
 from gauss.bench.suite.instance import SuiteInstance
 
-TINY = 1e-300  # keeps 0/0 from being asked
+LEAST_SIZE = 1e-300  # keeps 0/0 from being asked
 SHARE = 1e-6  # of the largest root of P_kk x_k²: zeros that rows leave are noise of about 1e-32 of it
 
 
@@ -52,7 +52,7 @@ def residuals(instance: SuiteInstance, x, y, z, z_box) -> Residuals:
     primal = max(primal, _largest(Doubled(np.maximum(-slack, 0.0)), reach))
     most = largest_multiplier(instance, plain, terms)
     dual = float(np.maximum(-plain, 0.0).max(initial=0.0) / most)
-    both = np.minimum(np.abs(slack) / np.maximum(reach, TINY), np.abs(plain) / most)
+    both = np.minimum(np.abs(slack) / np.maximum(reach, LEAST_SIZE), np.abs(plain) / most)
     found = Residuals(stationarity, primal, dual, float(both.max(initial=0.0)))
     return Residuals(*map(max, found, _of_cones(instance, x, z, size, terms)))
 
@@ -67,9 +67,9 @@ def certificate_residual(instance: SuiteInstance, y, z, z_box) -> tuple[float, f
     plain = plain_multipliers(instance, z.rounded(), z_box.rounded())
     right = np.concatenate([instance.b, instance.plain_rows()[1]])
     all_multipliers = np.concatenate([y.rounded(), plain])
-    negative = np.maximum(-plain, 0.0).max(initial=0.0) / max(np.abs(all_multipliers).max(initial=0.0), TINY)
+    negative = np.maximum(-plain, 0.0).max(initial=0.0) / max(np.abs(all_multipliers).max(initial=0.0), LEAST_SIZE)
     value, magnitude = right @ all_multipliers, np.abs(right) @ np.abs(all_multipliers)
-    return max(_largest(abs(pull), terms), float(negative)), float(-value / max(magnitude, TINY))
+    return max(_largest(abs(pull), terms), float(negative)), float(-value / max(magnitude, LEAST_SIZE))
 
 
 def ray_residual(instance: SuiteInstance, ray) -> tuple[float, float]:
@@ -79,7 +79,7 @@ def ray_residual(instance: SuiteInstance, ray) -> tuple[float, float]:
     bent = _largest(abs(product(instance.P, ray)), abs(instance.P) @ size)
     held = _largest(abs(product(instance.A, ray)), abs(instance.A) @ size)
     crossed = _largest(Doubled(np.maximum(product(rows, ray).rounded(), 0.0)), abs(rows) @ size)
-    return max(bent, held, crossed), float(-(instance.q @ ray.hi) / max(np.abs(instance.q) @ size, TINY))
+    return max(bent, held, crossed), float(-(instance.q @ ray.hi) / max(np.abs(instance.q) @ size, LEAST_SIZE))
 
 
 def plain_multipliers(instance: SuiteInstance, z: np.ndarray, z_box: np.ndarray) -> np.ndarray:
@@ -102,7 +102,7 @@ def sizes(instance: SuiteInstance, x: np.ndarray) -> np.ndarray:
 def largest_multiplier(instance: SuiteInstance, z: np.ndarray, terms: np.ndarray) -> float:
     """Size that multipliers are compared with: that of the largest, or a small share of what stationarity adds up."""
     largest = np.abs(instance.G.data).max(initial=0.0) or 1.0
-    return max(float(np.abs(z).max(initial=0.0)), SHARE * float(terms.max(initial=0.0)) / largest, TINY)
+    return max(float(np.abs(z).max(initial=0.0)), SHARE * float(terms.max(initial=0.0)) / largest, LEAST_SIZE)
 
 
 def _with_sliding(instance: SuiteInstance, u: Doubled, terms: np.ndarray) -> tuple[Doubled, np.ndarray]:
@@ -134,7 +134,7 @@ def _of_cones(instance: SuiteInstance, x: Doubled, z: Doubled, size: np.ndarray,
     reach = abs(sparse.csr_array(instance.G)) @ size + np.abs(instance.h)
     for block in instance.blocks:
         s, w = taken(slack, block), taken(z, block)
-        scale = max(reach[block].max(), TINY)
+        scale = max(reach[block].max(), LEAST_SIZE)
         both = sums_of(s * w)
         found = (0.0, _outside(s) / scale, _outside(w) / most, abs(both) / (scale * most))
         worst = Residuals(*map(max, worst, found))
@@ -158,4 +158,4 @@ def _outside(s: Doubled) -> float:
 
 
 def _largest(part: Doubled, size: np.ndarray) -> float:
-    return float((np.abs(part.rounded()) / np.maximum(size, TINY)).max(initial=0.0))
+    return float((np.abs(part.rounded()) / np.maximum(size, LEAST_SIZE)).max(initial=0.0))

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 from gauss.bench.suite.doubled import Doubled, product, taken, zeros
 from gauss.bench.suite.guess import guessed
 from gauss.bench.suite.instance import SuiteInstance, SuiteReference
-from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, sizes
+from gauss.bench.suite.optimality import LEAST_SIZE, largest_multiplier, residuals, sizes
 from gauss.errors import BackendError
 
 ACTIVE = 1e-7  # relative: slack of the guess below which a row may be active, multiplier of it below which it may not
@@ -47,7 +47,7 @@ def refined(instance: SuiteInstance) -> SuiteReference:
     """
     rows, right = instance.plain_rows()
     x, _, plain, _ = guessed(instance) if right.size else (np.zeros(instance.n), None, np.zeros(0), None)
-    share = np.abs(right - rows @ x) / np.maximum(abs(rows) @ sizes(instance, x) + np.abs(right), TINY)
+    share = np.abs(right - rows @ x) / np.maximum(abs(rows) @ sizes(instance, x) + np.abs(right), LEAST_SIZE)
     push = plain / largest_multiplier(instance, plain, abs(instance.P) @ np.abs(x) + np.abs(instance.q))
     equal, nothing = np.arange(instance.b.size), np.zeros(0, dtype=int)
     if not _is_regular(instance, equal, nothing):
@@ -65,9 +65,9 @@ def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -
     for changes in range(CHANGES):
         held = hold(instance, equal, active)
         reach = abs(rows) @ sizes(instance, held.x.hi) + np.abs(right)
-        crossing = -(right - product(rows, held.x)).rounded() / np.maximum(reach, TINY)
+        crossing = -(right - product(rows, held.x)).rounded() / np.maximum(reach, LEAST_SIZE)
         crossing[active] = 0.0
-        pull = -held.plain.rounded() / max(np.abs(held.plain.hi).max(initial=0.0), TINY)
+        pull = -held.plain.rounded() / max(np.abs(held.plain.hi).max(initial=0.0), LEAST_SIZE)
         worst = max(pull.max(initial=0.0), crossing.max(initial=0.0))
         if worst <= STRICT:
             return held
@@ -186,7 +186,7 @@ def _pushing(instance: SuiteInstance, equal, rows, candidates, x: np.ndarray) ->
     if equal.size:  # the part in their span is balanced by the equality rows
         Q = linalg.qr(A.T, mode="economic")[0]
         R, need = R - (R @ Q) @ Q.T, need - Q @ (Q.T @ need)
-    lengths = np.maximum(np.linalg.norm(R, axis=1), TINY)
+    lengths = np.maximum(np.linalg.norm(R, axis=1), LEAST_SIZE)
     if not np.abs(need).max(initial=0.0) or not R.any():
         return candidates[:0]
     push = optimize.nnls((R / lengths[:, None]).T, need, maxiter=30 * candidates.size)[0]

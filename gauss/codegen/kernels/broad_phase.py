@@ -17,7 +17,7 @@ CELLS = 2.0 + 1e-6  # edge of a cell over the largest half edge of boxes in it; 
 OUTLIER = 4.0  # times the mean size: larger boxes are compared with all others
 FARTHEST = 2.0**31  # cells from the origin: farther ones count as the last
 HASH = 73856093, 19349663, 83492791  # primes, of Teschner et al.
-AROUND = list(product((-1, 0, 1), repeat=3))
+NEIGHBOURING_CELLS = list(product((-1, 0, 1), repeat=3))
 TABLE, NONE = 1, -1  # first entry of the hash table in its array, end of a list
 
 
@@ -127,7 +127,7 @@ class GridWriter:
     def _look_around(self, first: Value):
         """Compare a part with those of the cells around it."""
         r, own, place = self.r, [self.cell[first * 3 + i] for i in range(3)], self.r.variable(NONE, INTEGER)
-        for shift in AROUND:
+        for shift in NEIGHBOURING_CELLS:
             cell = [number + step for number, step in zip(own, shift, strict=True)]
             place[0] = self.table[self._hash(cell)]
             with r.loop() as leave_if:

@@ -23,10 +23,10 @@ FOUND, INSIDE, FAR, LEFT, PLACELESS = (
 )  # states of the search, 0 while it goes on; the last: a depth without a place
 NEAREST = 7  # distance, normal out of the second hull (3), point on it (3)
 ROUNDS = 64
-CLOSE = 1e-14  # relative to the size of both hulls: difference of both bounds that is rounding
+BOUND_GAP = 1e-14  # relative to the size of both hulls: difference of both bounds that is rounding
 ACCEPTED = 1e-12  # the same, where no better corner is found
 TOUCHING = 4e-15  # the same: distance that has no direction
-WIDE = 1e-4  # relative to the square of the size: twice the area of a triangle
+LEAST_TRIANGLE = 1e-4  # relative to the square of the size: twice the area of a triangle
 ODD = (
     0.11,
     0.17,
@@ -42,7 +42,7 @@ class _DistanceWriter:
         self.records, (self.pose, self.reach, self.result, self.status) = r.arrays[:2], r.arrays[2:]
         self.first, self.second = (Hull(r, record) for record in self.records)
         self.farthest, self.nearest = write_farthest(module), write_nearest(module)
-        self.penetration = write_penetration(module, (FOUND, PLACELESS, LEFT), CLOSE, ACCEPTED)
+        self.penetration = write_penetration(module, (FOUND, PLACELESS, LEFT), BOUND_GAP, ACCEPTED)
         self.corners, self.vertices, self.shares = r.buffer(12), r.buffer(8, INTEGER), r.buffer(4)
         self.v, self.count = r.buffer(3), r.variable(0, INTEGER)
         self.direction, self.tried, self.tried_shares = r.buffer(3), r.buffer(3), r.buffer(3)
@@ -117,7 +117,7 @@ class _DistanceWriter:
         for direction in (cross(edge, sign * axis) for sign in (1.0, -1.0) for axis in np.eye(3)):
             with r.when(self.count[0] < 3):
                 self._search(direction, 2)
-                beside, least = cross(vector(self.corners, 6) - a, edge), self.scale[0] * self.scale[0] * WIDE
+                beside, least = cross(vector(self.corners, 6) - a, edge), self.scale[0] * self.scale[0] * LEAST_TRIANGLE
                 with r.when(beside @ beside > least * least):
                     self.shares[2], self.count[0] = 0.0, 3
 
@@ -137,7 +137,7 @@ class _DistanceWriter:
             ]
             is_known[0] = is_known[0] + r.as_integer(same[0] & same[1])
         between = length - low
-        is_found = (between <= self.scale[0] * CLOSE) | ((is_known[0] > 0) & (between <= self.scale[0] * ACCEPTED))
+        is_found = (between <= self.scale[0] * BOUND_GAP) | ((is_known[0] > 0) & (between <= self.scale[0] * ACCEPTED))
         with r.when(is_found & (self.status[0] < 1)):
             self._write(length, v / length)
         self._end(is_known[0] > 0, LEFT)

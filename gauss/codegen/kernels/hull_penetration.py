@@ -14,7 +14,7 @@ from gauss.codegen.kernels.arrays import INTEGERS, Array, Value, subroutine
 from gauss.codegen.kernels.hull_points import Hull, cross, put, vector, write_farthest, write_nearest
 
 MOST_POINTS, MOST_FACES, MOST_EDGES = 48, 256, 192
-FLAT = 1e-13  # relative to the square of the size: twice the area of a face without a normal
+LEAST_FACE = 1e-13  # relative to the square of the size: twice the area of a face without a normal
 SIDES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (0, 2, 3))  # of a tetrahedron, counterclockwise from outside
 
 
@@ -78,7 +78,7 @@ class _PenetrationWriter:
         a, b, c = (vector(self.points, corner * 3) for corner in (i, j, k))
         across = cross(b - a, c - a)
         size = r.square_root(across @ across)
-        is_flat = ~(size > self.scale[0] * self.scale[0] * FLAT)
+        is_flat = ~(size > self.scale[0] * self.scale[0] * LEAST_FACE)
         normal = np.array([r.choose(is_flat, 0.0, x) for x in across / size])
         distance = r.choose(is_flat, np.inf, normal @ a)
         put(self.faces, [i, j, k], place * 3)

@@ -27,7 +27,7 @@ from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps
 from gauss.dynamics.contact.paradox import (
-    MOST,
+    MOST_CONTACTS,
     NEGATIVE,
     Paradox,
     sliding,
@@ -256,7 +256,7 @@ class MoreauStepper:
         return ContactForces(
             *(laws.normal.size, self.system.n_v, laws.under, laws.friction, laws.limit, contact_solver()),
             write(lambda x: [with_sliding_friction(*x)], 6, name="rubbed"),
-            *(NEGATIVE, MOST),
+            *(NEGATIVE, MOST_CONTACTS),
         )
 
     def forbids(self, at: State, response) -> Scalar:

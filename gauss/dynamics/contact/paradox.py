@@ -21,7 +21,7 @@ from gauss.system import State, System
 
 SLIDING = 1e-6  # of the fastest rate, in lengths of the scene: a contact that slides more slowly may stick
 NEGATIVE = 1e-9  # of the product of the diagonal without friction: a minor is negative below minus this
-MOST = 6  # contacts in one problem
+MOST_CONTACTS = 6  # contacts in one problem
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ def _of_motion(motion: Kinematics, problem: Compulsion, touching: np.ndarray) ->
 
 
 def sliding(rates: np.ndarray, touching: np.ndarray, slow: float) -> np.ndarray:
-    """Contacts with friction that touch and slide faster than ``slow``, at most ``MOST``; rates are (k, 2)."""
-    return np.flatnonzero((np.hypot(*rates.T) > slow) & touching)[:MOST]
+    """Contacts with friction that touch and slide faster than ``slow``, at most ``MOST_CONTACTS``; rates are (k, 2)."""
+    return np.flatnonzero((np.hypot(*rates.T) > slow) & touching)[:MOST_CONTACTS]
 
 
 def sliding_above(system: System, v):

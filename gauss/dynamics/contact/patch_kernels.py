@@ -95,7 +95,7 @@ def hull_distances(on_plane: bool) -> Kernel:
 def terrain_distances(is_ball: bool) -> Kernel:
     """Machine code of the distances of a hull, or of a ball, and terrain, made once on a machine."""
     laws = TerrainLaws(
-        same=terrain_contact.SAME,
+        same=terrain_contact.PLANE_TOLERANCE,
         tiny=terrain_contact.TINY,
         least_depth=terrain_contact.LEAST_DEPTH,
         near_side=terrain_contact.NEAR_SIDE,

@@ -12,7 +12,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.scene.values import ConstantLaw
 from gauss.system import State, System
 
-BESIDE = np.array([-2.0, -1.0, 1.0, 2.0])  # places of samples beside a switching time, in distances of ends of steps
+SAMPLE_PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # places of samples beside a switching time, in distances of ends of steps
 TOGETHER = 32  # switching times: all operations of a law are kept for each
 
 
@@ -31,7 +31,7 @@ def _traced(system: System, laws: Laws, start: State, times: np.ndarray, apart: 
     states = start, generic_state(system, start)
     for first in range(0, times.size, TOGETHER):
         part = times[first : first + TOGETHER]
-        found = np.any([_jumps(_values(laws, state, part[:, None] + apart * BESIDE)) for state in states], axis=0)
+        found = np.any([_jumps(_values(laws, state, part[:, None] + apart * SAMPLE_PLACES)) for state in states], axis=0)
         if found.any():
             return float(part[found][0])
     return np.inf
@@ -47,7 +47,7 @@ def _opaque(system: System, laws: Laws, start: State, end: float, apart: float) 
         motion = motion or kinematics(system, start)
         found = (law_of_time(law, motion) for law in bound.laws if not isinstance(law, ConstantLaw))
         for law in [one for one in found if one is not None]:
-            values = law(np.ravel(times[:, None] + apart * BESIDE)).T.reshape(-1, times.size, BESIDE.size)
+            values = law(np.ravel(times[:, None] + apart * SAMPLE_PLACES)).T.reshape(-1, times.size, SAMPLE_PLACES.size)
             first = min(first, times[_jumps(values)].min(initial=np.inf))
     return float(first)
 

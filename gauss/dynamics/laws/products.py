@@ -19,7 +19,7 @@ PEAK = 2.5  # rise of ln |f| within a subinterval that stages may not resolve
 HIGH = 6.0  # power of a base from which on its product is flat near zeros of the base and narrow at its top
 FLAT = -50.0  # exponent of a negligible value
 FACTORED = ("mul", "div", "neg", "sqrt")  # operations that multiply powers
-LEAST = 1.0 / UNBOUNDED  # least magnitude of a base
+LEAST_BASE = 1.0 / UNBOUNDED  # least magnitude of a base
 
 Power = tuple[int, bool, float]  # position of a base, whether it is an exponent, and its power
 
@@ -246,10 +246,10 @@ def _rises(before: list, after: list, bounds: list[Interval], powers: list[Power
     (k, grows, p), *others = powers
     if grows or others:
         return _top(bounds, powers) > math.minimum(_heights(before, powers), _heights(after, powers)) + rise
-    one, other = (math.maximum(math.abs(x[k]), LEAST) for x in (before, after))  # one power needs no logarithm
+    one, other = (math.maximum(math.abs(x[k]), LEAST_BASE) for x in (before, after))  # one power needs no logarithm
     factor = float(np.exp(rise / p))
     if p < 0.0:
-        return math.maximum(bounds[k].low, LEAST) < factor * math.maximum(one, other)
+        return math.maximum(bounds[k].low, LEAST_BASE) < factor * math.maximum(one, other)
     return bounds[k].high > factor * math.minimum(one, other)
 
 
@@ -260,7 +260,7 @@ def _top(bounds: list[Interval], powers: list[Power]) -> Scalar:
 
 def _height(x: Scalar, grows: bool, power: float) -> Scalar:
     """Summand of ln |f|."""
-    return math.maximum(power * x, FLAT) if grows else power * np.log(math.maximum(math.abs(x), LEAST))
+    return math.maximum(power * x, FLAT) if grows else power * np.log(math.maximum(math.abs(x), LEAST_BASE))
 
 
 def _regular(before: list, after: list, powers: list[Power]) -> Scalar:

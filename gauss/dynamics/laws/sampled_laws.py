@@ -12,7 +12,7 @@ import numpy as np
 from gauss.dynamics.laws.known_searches import KnownSearch
 from gauss.dynamics.laws.recorded_time import KinematicsAtTime, reads_time
 from gauss.dynamics.laws.step_sampling import LawOfTime
-from gauss.dynamics.laws.switching_times import CLOSE, NO_TIMES, Timetable
+from gauss.dynamics.laws.switching_times import EQUAL_TIMES, NO_TIMES, Timetable
 from gauss.scene.stateful_laws import preserved
 
 SAMPLES = 32_768  # of a law over a motion: resolves a millisecond in twenty seconds
@@ -135,7 +135,7 @@ def _located(values_at, begin: float, end: float, what: str, count: int, constan
     jumps = np.flatnonzero(moves & ((change > JUMP_RATIO * beside) | _isolated(moves)))
     if len(jumps) > MOST_JUMPS:
         return Timetable(NO_TIMES.switches, NO_TIMES.mesh)
-    close = CLOSE * max(abs(begin), abs(end))
+    close = EQUAL_TIMES * max(abs(begin), abs(end))
     switches = [_bisected(values_at, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
     inside = _cells(times, moves)
     return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])

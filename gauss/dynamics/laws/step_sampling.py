@@ -16,7 +16,7 @@ LawOfTime = Callable[[np.ndarray], np.ndarray]  # times (k,) → values (k, m)
 EXAMINED_STEPS = 512  # at most, spread over the interval: a fast oscillation lasts, and isolated peaks are found otherwise
 PLACES = np.array([0.127, 0.353, 0.618, 0.871])  # relative to the step; no period coincides with all of them
 LARGEST_DEFECT = 0.05  # of a law that steps resolve, relative to its range: 2.7 steps a period, then
-BESIDE = 1e-6  # of a step
+SAMPLE_DISTANCE = 1e-6  # of a step
 LEAST_RANGE = 1e-6  # of a law, relative to its size: less does not count
 
 
@@ -62,7 +62,7 @@ def coarse_steps(law: LawOfTime, begin: float, end: float, step: float, switches
     count = max(1, round((end - begin) / step))
     which = np.unique(np.linspace(0, count - 1, min(count, EXAMINED_STEPS)).astype(int))
     starts = begin + which * step
-    beside = BESIDE * step  # where a switching time is an end of a step, values there may be those of either side
+    beside = SAMPLE_DISTANCE * step  # where a switching time is an end of a step, values there may be those of either side
     whole = np.searchsorted(switches, starts - beside) == np.searchsorted(switches, starts + step + beside)
     starts = starts[whole & (starts + step <= end + beside)]
     if not starts.size:

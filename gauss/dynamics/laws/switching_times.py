@@ -22,7 +22,7 @@ CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # operatio
 CELLS, PARTS = 64, 8  # initial cells of the bisection, and parts into which it divides one
 MOST_CELLS = 400_000  # of the bisection at one level: about twice as many as switching times that it resolves
 MOST_STEPS = 50_000  # cells of the mesh, each of which costs a step
-CLOSE = 4.0 * np.finfo(float).eps  # relative to the largest time: closer times are one
+EQUAL_TIMES = 4.0 * np.finfo(float).eps  # relative to the largest time: closer times are one
 APART = 16.0 * np.finfo(float).eps  # relative to the largest time: distance of ends of steps from a switching time
 STEEPEST = 12  # degree of a polynomial that the stages of a step resolve
 PIECES = 8  # of a cell of the mesh: the stages of a step lie closer than two of them
@@ -187,7 +187,7 @@ def _condition(node: Expression) -> Expression:
 
 def _changes(conditions, clock: Expression, begin: float, end: float, limitations: list[str]) -> np.ndarray:
     """Times in an interval at which a condition changes, to rounding; ``limitations`` reports where they are too many."""
-    close = CLOSE * max(abs(begin), abs(end))
+    close = EQUAL_TIMES * max(abs(begin), abs(end))
     known, others = affine_changes(conditions, clock, begin, end, 2.0 * close)
     times = np.sort(np.append(known, _searched(others, clock, begin, end, limitations)))
     if not times.size:
@@ -199,7 +199,7 @@ def _changes(conditions, clock: Expression, begin: float, end: float, limitation
 
 def _searched(conditions, clock: Expression, begin: float, end: float, limitations: list[str]) -> np.ndarray:
     """Times at which a condition changes, by bisection."""
-    ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
+    ends, close = np.linspace(begin, end, CELLS + 1), EQUAL_TIMES * max(abs(begin), abs(end))
     low, high = (ends[:-1], ends[1:]) if conditions else (ends[:0], ends[:0])
     while 0 < low.size <= MOST_CELLS:
         values = enclose(conditions, {clock.index: Interval(low, high)})
@@ -231,7 +231,7 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, limitations: 
     values = enclose(conditions, {clock.index: Interval.point(0.5 * (edges[:-1] + edges[1:]))})
     fixed = [np.broadcast_to(value.low, edges[:-1].shape) for value in values]
     slopes, finest = _slopes(nodes, clock), FINEST * (edges[-1] - edges[0])
-    margin = 4.0 * CLOSE * np.abs(edges).max()
+    margin = 4.0 * EQUAL_TIMES * np.abs(edges).max()
     cells = np.array([edges[:-1] + margin, edges[1:] - margin])
 
     def examined(cells):

@@ -16,7 +16,7 @@ from gauss.system import BoundLoad, State, System, retract
 PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # times of comparison, in the time of the scene
 AGREEMENT = 1e-6  # relative: traced functions may have other round-off
 PROBE_ROUNDOFF = 1e-12  # of the values at all probes, relative to the largest: poses at the end of a chain sum up round-off
-ASIDE = 0.3  # distance of another state from the reference, in units of the coordinates
+TRIAL_DISTANCE = 0.3  # distance of another state from the reference, in units of the coordinates
 UNTRACEABLE = ("TypeError: ", "TracerError: ")
 Probe = Callable[[State], Kinematics]  # kinematics of a state at which laws are compared
 
@@ -152,7 +152,7 @@ def _agrees(law, traced: Function, motion: Kinematics, probe: Probe) -> bool:
     system, pairs = motion.system, []
     states = [replace(system.reference, t=float(t)) for t in PROBES * system.scale.time]
     if arguments(law) > 1:
-        step = ASIDE * system.scale.coordinates * np.random.default_rng(0).uniform(-1.0, 1.0, system.n_v)
+        step = TRIAL_DISTANCE * system.scale.coordinates * np.random.default_rng(0).uniform(-1.0, 1.0, system.n_v)
         q, v = retract(system, system.reference.q, step), step / system.scale.time
         states.append(replace(states[1], q=q, v=v))
     try:

@@ -20,7 +20,7 @@ from gauss import math
 Number = Any  # number or symbol
 KINDS = ("INTEGRATOR", "FILTER", "FILTEREXACT", "MUSCLE")
 INTEGRATOR, FILTER, EXACT, MUSCLE = (int(getattr(mujoco.mjtDyn, f"mjDYN_{name}")) for name in KINDS)
-KNOWN = INTEGRATOR, FILTER, EXACT, MUSCLE
+KNOWN_TYPES = INTEGRATOR, FILTER, EXACT, MUSCLE
 MUSCLE_GAIN, MUSCLE_BIAS = int(mujoco.mjtGain.mjGAIN_MUSCLE), int(mujoco.mjtBias.mjBIAS_MUSCLE)
 LEAST = mujoco.mjMINVAL  # s, m, N: least divisor
 

@@ -8,7 +8,7 @@ is 0, clamped to its range as MuJoCo clamps it.
 import mujoco
 import numpy as np
 
-from gauss.io.mjcf.activations import KNOWN, MUSCLE_BIAS, MUSCLE_GAIN
+from gauss.io.mjcf.activations import KNOWN_TYPES, MUSCLE_BIAS, MUSCLE_GAIN
 from gauss.io.mjcf.switches import is_off
 
 COUNT = (
@@ -88,7 +88,7 @@ def acts_early(model, i: int) -> bool:
 
 def has_known_state(model, i: int) -> bool:
     """Whether it has no activation, or one whose law is known."""
-    return not has_state(model, i) or (int(model.actuator_dyntype[i]) in KNOWN and int(model.actuator_actnum[i]) == 1)
+    return not has_state(model, i) or (int(model.actuator_dyntype[i]) in KNOWN_TYPES and int(model.actuator_actnum[i]) == 1)
 
 
 def state_name(model, i: int) -> str:

@@ -11,7 +11,7 @@ from gauss.system import System
 from gauss.system.frames import relative
 
 TAKEN = 1e-15  # kg, kg m²: MuJoCo refuses moving bodies with less
-LEAST = 1e-14  # kg, kg m²: written in place of what it refuses
+LEAST_INERTIA = 1e-14  # kg, kg m²: written in place of what it refuses
 ROUNDING = 1e-14  # of the largest moment: the least one is zero but for rounding
 NEGLIGIBLE = 1e-9  # of the mass of the scene, and of its moments: what is written in place of nothing must not show
 PARALLEL = 1e-12  # sine of the angle between axes that are parallel but for rounding
@@ -39,24 +39,24 @@ def inertial(system: System, limbs: list[Limb], limb: Limb, strict: bool = True)
     if not mass and not _carries(scene, limbs, body.name):
         raise FileError(f"body {body.name!r}: neither it nor what hangs on it has mass; MuJoCo cannot move it.")
     if _is_replaced(body, mass, scale.mass, "kg", strict):
-        mass = LEAST
-        remarks.append(f"{LEAST:g} kg instead of no mass")
+        mass = LEAST_INERTIA
+        remarks.append(f"{LEAST_INERTIA:g} kg instead of no mass")
     if not _is_triangle(J):
         J, remark = _completed(scene, limbs, body, J, R)
         remarks.append(remark)
     least = J.min() if J.min() > ROUNDING * J.max() else 0.0
     if _is_replaced(body, least, scale.mass * scale.length**2, "kg m²", strict):
-        J = np.maximum(J, LEAST)
-        remarks.append(f"{LEAST:g} kg m² instead of no moment of inertia")
+        J = np.maximum(J, LEAST_INERTIA)
+        remarks.append(f"{LEAST_INERTIA:g} kg m² instead of no moment of inertia")
     return {"pos": body.com, "mass": mass, "diaginertia": J, "quat": rotations.to_quaternion(R)}, ", ".join(remarks)
 
 
 def _is_replaced(body: Body, value: float, whole: float, unit: str, strict: bool) -> bool:
-    """Whether a mass or moment is zero, and :data:`LEAST` stands in its place, which does not show in the scene.
+    """Whether a mass or moment is zero, and :data:`LEAST_INERTIA` stands in its place, which does not show in the scene.
 
     FileError if it would show, or a value that is not zero is less than MuJoCo takes.
     """
-    if not value and LEAST <= NEGLIGIBLE * whole:
+    if not value and LEAST_INERTIA <= NEGLIGIBLE * whole:
         return True
     if strict and value < TAKEN:
         what = "mass" if unit == "kg" else "least moment of inertia"

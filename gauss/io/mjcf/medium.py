@@ -19,14 +19,14 @@ from gauss.io.mjcf.names import Named
 from gauss.rotations import cross
 from gauss.scene import Scene
 
-LEAST = mujoco.mjMINVAL  # kg, kg m², m²/s² …: taken by MuJoCo in place of a smaller divisor
+LEAST_DIVISOR = mujoco.mjMINVAL  # kg, kg m², m²/s² …: taken by MuJoCo in place of a smaller divisor
 Law = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # (v, ω) → (F, M)
 
 
 def add_medium(scene: Scene, named: Named, i: int):
     """Forces of the medium on a body."""
     model = named.model
-    if not (model.opt.density or model.opt.viscosity) or model.body_mass[i] < LEAST:
+    if not (model.opt.density or model.opt.viscosity) or model.body_mass[i] < LEAST_DIVISOR:
         return
     geoms = range(model.body_geomadr[i], model.body_geomadr[i] + model.body_geomnum[i])
     ellipsoids = [g for g in geoms if model.geom_fluid[g].ravel()[0] > 0]
@@ -54,7 +54,7 @@ def _on_box(model, i: int) -> Law:
     """Viscous resistance of a sphere and drag of the box of the inertia of a body."""
     rho, mu = float(model.opt.density), float(model.opt.viscosity)
     J = model.body_inertia[i]
-    b = np.sqrt(np.maximum(LEAST, J.sum() - 2.0 * J) / model.body_mass[i] * 6.0)
+    b = np.sqrt(np.maximum(LEAST_DIVISOR, J.sum() - 2.0 * J) / model.body_mass[i] * 6.0)
     d, faces = b.mean(), np.prod(b) / b
     vanes = b * (np.sum(b**4) - b**4)
 
@@ -90,8 +90,8 @@ def _on_ellipsoid(model, g: int) -> Law:
     def law(v, omega):
         p, h = virtual_mass * v, virtual_inertia * omega
         speed, (numerator, denominator) = _norm(v), ((faces * v) @ (faces * v), (faces**2 * v) @ (faces**2 * v))
-        shown = pi * np.sqrt(math.maximum(denominator, LEAST**2) / math.maximum(numerator, LEAST))
-        lean = numerator / math.maximum(speed * denominator, LEAST**2)
+        shown = pi * np.sqrt(math.maximum(denominator, LEAST_DIVISOR**2) / math.maximum(numerator, LEAST_DIVISOR))
+        lean = numerator / math.maximum(speed * denominator, LEAST_DIVISOR**2)
         circulation = c.kutta * rho * lean * shown * cross(faces**2 * v, v)
         drag = 3.0 * pi * mean * mu + rho * speed * (shown * c.blunt + c.slender * (greatest_face - shown))
         lift = c.magnus * rho * volume * cross(omega, v) + cross(circulation, v)
@@ -115,4 +115,4 @@ def _semiaxes(model, g: int) -> np.ndarray:
 
 
 def _norm(vector):
-    return np.sqrt(math.maximum(vector @ vector, LEAST**2))
+    return np.sqrt(math.maximum(vector @ vector, LEAST_DIVISOR**2))

@@ -46,7 +46,7 @@ PLACES = {  # what MuJoCo measures a point of, and where a model has the body, t
     "GEOM": ("geom_bodyid", "geom_pos", "geom_quat"),
     "SITE": ("site_bodyid", "site_pos", "site_quat"),
 }
-SAME = 1e-12  # of an entry of a rotation: axes that are those of the body
+EQUAL_AXES = 1e-12  # of an entry of a rotation: axes that are those of the body
 
 
 def add_sensors(scene: Scene, named: Named) -> list[str]:
@@ -126,7 +126,7 @@ def _add_of_point(scene: Scene, named: Named, i: int, name: str, kind: str):
     what, *base = _seen(named.model, i)
     body, at, R = _place(named, what, int(named.model.sensor_objid[i]))
     seen_from = _framed(scene, named, base[0], int(named.model.sensor_refid[i])) if base else ""
-    if kind in WITHOUT_AXES or abs(R - np.eye(3)).max() <= SAME:
+    if kind in WITHOUT_AXES or abs(R - np.eye(3)).max() <= EQUAL_AXES:
         scene.output(name, kind, body, tuple(at), seen_from)
         return
     scene.output(name, kind, _framed(scene, named, what, int(named.model.sensor_objid[i])), relative_to=seen_from)
@@ -144,7 +144,7 @@ def _place(named: Named, what: str, number: int) -> tuple[str, np.ndarray, np.nd
 def _framed(scene: Scene, named: Named, what: str, number: int) -> str:
     """Name of a frame at a place: of its body where it is that of the body, else of the site or geom."""
     body, at, R = _place(named, what, number)
-    if not at.any() and abs(R - np.eye(3)).max() <= SAME:
+    if not at.any() and abs(R - np.eye(3)).max() <= EQUAL_AXES:
         return body
     called = f"inertial frame of {body}" if what == "BODY" else named.name(what.lower(), number)
     return _frame(scene, called, what.lower(), body, tuple(at), tuple(R.ravel()))

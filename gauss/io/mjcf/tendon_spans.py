@@ -15,7 +15,7 @@ from gauss import math
 from gauss.io.mjcf.wrap_circle import LEAST, PlanePath, around, holds, through
 from gauss.scene import GROUND, Force
 
-TINY = 1e-30  # m², below which the root of a squared length is not taken: the points meet but for rounding
+LEAST_SQUARE = 1e-30  # m², below which the root of a squared length is not taken: the points meet but for rounding
 Law = Callable  # (t, motion) → number
 
 
@@ -162,4 +162,4 @@ def _cross(a, b) -> np.ndarray:
 
 
 def _length(vector):
-    return np.sqrt(math.maximum(vector @ vector, TINY))
+    return np.sqrt(math.maximum(vector @ vector, LEAST_SQUARE))

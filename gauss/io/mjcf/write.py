@@ -30,7 +30,7 @@ AT_WORLD = "origin of the world"  # a mark
 WORLD = "world"  # MuJoCo's name of the ground
 TIMESTEP = 1e-3  # s
 DEEPEST_BODY = 496  # bodies inside bodies: the parser of MuJoCo takes 499 elements, of which three are others
-STIFF = {"solref": f"{2 * TIMESTEP:g} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}  # the hardest that MuJoCo takes
+STIFFEST = {"solref": f"{2 * TIMESTEP:g} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}  # the hardest that MuJoCo takes
 
 
 @dataclass
@@ -168,7 +168,7 @@ def _write_head(document: MjcfDocument):
     root.set("model", document.scene.name)
     document.add(root, "compiler", angle="radian", inertiafromgeom="false")
     document.add(root, "option", gravity=document.scene.gravity, timestep=TIMESTEP, integrator="RK4")
-    document.add(document.section("default"), "equality", **STIFF)
+    document.add(document.section("default"), "equality", **STIFFEST)
     document.bodies[GROUND] = document.section("worldbody")
 
 

@@ -19,9 +19,9 @@ READ = {
     "mimic": {"multiplier", "offset", "reference"},
 }
 READ["axis2"] = READ["axis"]
-STILL = {"visual", "sensor", "light", "self_collide", "enable_wind", "must_be_base_link", "allow_auto_disable", "density"}
-STILL |= {"audio_sink", "audio_source", "projector", "particle_emitter", "material", "gripper", "initial_position"}
-STILL |= {"scene", "gui", "audio", "atmosphere", "magnetic_field", "spherical_coordinates", "road"}
+IGNORED = {"visual", "sensor", "light", "self_collide", "enable_wind", "must_be_base_link", "allow_auto_disable", "density"}
+IGNORED |= {"audio_sink", "audio_source", "projector", "particle_emitter", "material", "gripper", "initial_position"}
+IGNORED |= {"scene", "gui", "audio", "atmosphere", "magnetic_field", "spherical_coordinates", "road"}
 WARNED = {"collision": "collisions", "plugin": "plugins", "physics": "settings of a solver"}
 WARNED |= {"ball": "damping and friction of ball joints, which have no axis", "wind": "wind"}
 WARNED |= {"contact": "contact coefficients of links"}  # of pybullet
@@ -51,7 +51,7 @@ def check(source: Source, element: Element, left: set[str]):
             raise FileError(f"{source.place(child)}: <{child.tag}> stands twice in {named}; keep one.")
         if child.tag in WARNED:
             left.add(child.tag)
-        elif child.tag not in READ[element.tag] | STILL and ":" not in child.tag:
+        elif child.tag not in READ[element.tag] | IGNORED and ":" not in child.tag:
             what = f"<{child.tag}> of {element.tag} {element.get('name', '')!r}"
             raise FileError(f"{source.place(child)}: {what} is not modelled; remove it.")
         elif child.tag in READ:

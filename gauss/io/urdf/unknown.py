@@ -39,7 +39,7 @@ FORCED = {
 }  # children of a link, and the values that move it otherwise
 SPRINGS = ("springStiffness", "springReference")
 ONCE = {"inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"}
-ALIKE = 0.75  # how alike a misspelt name is to what was meant
+SIMILARITY = 0.75  # how alike a misspelt name is to what was meant
 
 
 def refuse_couplings(source: Source):
@@ -71,7 +71,7 @@ def _require_known_children(source: Source, element: Element):
     for child in element:
         if child.tag in ONCE and child is not element.find(child.tag):
             raise FileError(f"{source.place(child)}: <{child.tag}> stands twice in one <{element.tag}>; keep one.")
-        meant = get_close_matches(child.tag.lower(), names, n=1, cutoff=ALIKE) if child.tag not in names else []
+        meant = get_close_matches(child.tag.lower(), names, n=1, cutoff=SIMILARITY) if child.tag not in names else []
         if meant:
             raise FileError(f"{source.place(child)}: <{child.tag}> of <{element.tag}>: did you mean <{meant[0]}>?")
 

@@ -30,7 +30,7 @@ from gauss.system import System
 from gauss.system.frames import relative
 
 ROOT = "world"
-FAR = 1e9  # rad, m, N m, N, rad/s, m/s: limits that URDF wants where a scene has none
+NO_LIMIT = 1e9  # rad, m, N m, N, rad/s, m/s: limits that URDF wants where a scene has none
 TYPES = {"hinge": "continuous", "slide": "prismatic"}
 
 
@@ -154,13 +154,13 @@ def _floats(scene: Scene, one: Limb) -> bool:
 
 def _write_step(document: UrdfDocument, one: Limb, step: ElementaryJoint, on: str, child: str, R, p):
     """Hinge or slide with its limits."""
-    limits, kind = (-FAR, FAR), TYPES[step.kind]
+    limits, kind = (-NO_LIMIT, NO_LIMIT), TYPES[step.kind]
     if one.joint.limits is not None and step.name == one.joint.name:
         limits, kind = one.joint.limits, "revolute" if step.kind == "hinge" else kind
     joint = _joint(document, step.name, kind, on, child, R, p)
     SubElement(joint, "axis", xyz=text_of(step.axis))
     if kind != "continuous":
-        ends = {"lower": limits[0], "upper": limits[1], "effort": FAR, "velocity": FAR}
+        ends = {"lower": limits[0], "upper": limits[1], "effort": NO_LIMIT, "velocity": NO_LIMIT}
         SubElement(joint, "limit", {key: text_of(value) for key, value in ends.items()})
     document.mimics[step.name] = joint
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from gauss.view.viewer.framing import FIELD, VIEW, Framing
 
-ASIDE = 0.2  # of the reach of the motion: half the width of the controls
-ABOVE = 0.6  # of half an upright picture: height of what is seen, above controls that cover its lower part
+SIDE_SHARE = 0.2  # of the reach of the motion: half the width of the controls
+SHOWN_HEIGHT = 0.6  # of half an upright picture: height of what is seen, above controls that cover its lower part
 
 CAMERAS = {  # from what is seen to the eye: right, away, up
     "oblique": VIEW,
@@ -33,12 +33,12 @@ def placed_camera(view: Framing, camera: str, aspect: float) -> tuple[np.ndarray
     ahead = (aim - place) / aspect
     distance = np.linalg.norm(ahead)
     up = view.up - (view.up @ ahead) / distance**2 * ahead
-    lower = ABOVE * np.tan(FIELD / 2) * distance / np.linalg.norm(up) * up
+    lower = SHOWN_HEIGHT * np.tan(FIELD / 2) * distance / np.linalg.norm(up) * up
     level = CAMERAS[camera][2] == 0.0  # lower, it would stand under the floor: it looks down instead
     return aim - ahead - (0.0 if level else lower), aim - lower
 
 
-def shifted(view: Framing, place: np.ndarray, aim: np.ndarray, share: float = ASIDE) -> tuple[np.ndarray, np.ndarray]:
+def shifted(view: Framing, place: np.ndarray, aim: np.ndarray, share: float = SIDE_SHARE) -> tuple[np.ndarray, np.ndarray]:
     """Camera and what it looks at, moved to the right by a share of the size of what is seen."""
     right = np.cross(aim - place, view.up)
     shift = share * view.reach * right / np.linalg.norm(right)

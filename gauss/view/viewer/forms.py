@@ -16,7 +16,7 @@ HINGE = 2.2  # length of a hinge over its diameter
 ROOM = 8  # distance between bearings over the size that they are drawn for
 UNMARKED = ("free", "planar")  # joints that are nowhere
 SIDES = 20  # of what is round
-FLAT = 1e-6  # of their extent: points that are no farther from a plane enclose nothing
+FLAT_EXTENT = 1e-6  # of their extent: points that are no farther from a plane enclose nothing
 DOT = 0.02  # m: radius of points that enclose nothing
 
 
@@ -159,7 +159,7 @@ def _solid(shape, com=(0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
         return _curved(shape).apply_transform(_pose(shape.axes, shape.at))
     if isinstance(shape, Points):
         corners = np.vstack([shape.corners, com])
-        if np.linalg.matrix_rank(corners - corners[0], tol=FLAT * np.ptp(corners, axis=0).max()) == 3:
+        if np.linalg.matrix_rank(corners - corners[0], tol=FLAT_EXTENT * np.ptp(corners, axis=0).max()) == 3:
             return trimesh.convex.convex_hull(corners)
         return _joined([_ball(shape.radius or DOT, corner) for corner in shape.corners])
     return None

@@ -19,7 +19,7 @@ from gauss.view.viewer.stage import ViewerStage
 
 WIDTH, HEIGHT = 3.3, 1.5  # of the axes of one quantity [inch]
 LEFT, RIGHT = 0.17, 0.97  # ends of all time axes, of the width
-MOST = 500  # points of a curve
+MOST_POINTS = 500  # points of a curve
 SIDES = (", left", ", right")  # where two motions are beside each other
 INK = {False: "#333333", True: "#dfe3e8"}  # on light and on dark
 LAYERS = {"link": "links", "joint": "joints", "contact": "shapes", "frame": "frames", "path": "paths"}
@@ -77,7 +77,7 @@ def _layers(stages: list[ViewerStage]) -> dict[str, dict]:
 def _curves(trajectory: Trajectory, end: float, dark: bool, side: str) -> str:
     """Coordinates, rates and energies against time, as SVG."""
     found, ink, sizes = _quantities(trajectory), INK[dark], unit_sizes(trajectory.system)
-    kept = np.unique(np.linspace(0, len(trajectory) - 1, MOST).astype(int))
+    kept = np.unique(np.linspace(0, len(trajectory) - 1, MOST_POINTS).astype(int))
     style: Any = {"svg.fonttype": "none", "font.size": 7, "text.color": ink, "axes.edgecolor": ink, "axes.labelcolor": ink}
     with rc_context(style | {"xtick.color": ink, "ytick.color": ink}):
         high = HEIGHT * len(found)

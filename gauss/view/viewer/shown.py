@@ -12,7 +12,7 @@ from gauss.simulation.motion_records import Stats
 from gauss.system import coordinate_rates
 
 FRAMES = 30  # per second
-MOST = 1800  # pictures of a file; a longer motion has fewer per second
+MOST_PICTURES = 1800  # pictures of a file; a longer motion has fewer per second
 NOT_SIMULATED = Stats(0, 0, 0, 0, 0.0, 0.0, "not simulated")
 
 
@@ -42,7 +42,7 @@ def shown(thing: Scene | Trajectory, frames: int, visuals=(), joints=(), traces=
         )
     else:
         span = float(thing.t[-1] - thing.t[0])
-        motion, pictures = thing, resampled(thing, max(1, min(MOST, 1 + round(span * frames))))
+        motion, pictures = thing, resampled(thing, max(1, min(MOST_PICTURES, 1 + round(span * frames))))
     system = motion.system
     places = [*system.structure.bodies, *system.scene.frames]
     for name in traces or ():

@@ -8,7 +8,7 @@ from gauss.analysis import reactions
 from gauss.dynamics.kinematics import kinematics
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS
-from gauss.view.viewer.cameras import ASIDE, shifted
+from gauss.view.viewer.cameras import SIDE_SHARE, shifted
 from gauss.view.viewer.forms import BodyMesh, forms, size
 from gauss.view.viewer.framing import FIELD, framing, joined
 from gauss.view.viewer.ground import ground, sky
@@ -100,7 +100,7 @@ class ViewerStage:
         apart = (one.reach + view.reach) / 2 * one.right
         return one.middle + apart - view.middle + ((one.floor - view.floor - one.middle + view.middle) @ one.up) * one.up
 
-    def make_room(self, beside: "ViewerStage | None", aside: float = ASIDE):
+    def make_room(self, beside: "ViewerStage | None", aside: float = SIDE_SHARE):
         """Look at both stages, and a little to the right of the middle, where controls cover the picture."""
         if beside is not None:
             self.framing = joined(self.framing, beside.framing, self.place_beside(beside))
