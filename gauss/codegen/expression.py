@@ -21,7 +21,6 @@ INDEX_OF, OPERANDS_OF = attrgetter("index"), attrgetter("operands")  # of a node
 
 def _operation(op: str, swapped: bool = False) -> Callable:
     """Method for an operation of two operands: one call less than by a common method, for it is most of tracing."""
-
     keeps_zero = op in ("add", "sub", "mul")
 
     def operate(self, other):
