@@ -148,20 +148,26 @@ class Graph:
 
     def binary(self, op: str, x: Expression, y: Expression) -> Expression:
         """Return op(x, y), folded."""
-        zero = self.zero  # two of three operations of a mechanism have an operand that is zero
-        if (x is zero or y is zero) and (simple := WITH_ZERO.get(op)) is not None:
-            if (folded := simple(zero, x, y)) is not None:
+        zero = self.zero  # an operand of two in three operations of a mechanism
+        if x is zero or y is zero:
+            folded = WITH_ZERO.get(op, _nothing)(zero, x, y)
+            if folded is not None:
                 return folded
         if x.op in SIMPLIFIED or y.op in SIMPLIFIED or x is y:  # no rule looks at other operands
-            if x.is_constant and y.is_constant:
-                value = BINARY[op](x.value, y.value)  # most often zero with zero
-                return x if value == x.value else y if value == y.value else self.constant(value)
-            simplified = SIMPLER.get(op)
-            if simplified is not None and (simpler := simplified(self, x, y)) is not None:
-                return simpler
+            folded = self._folded(op, x, y)
+            if folded is not None:
+                return folded
         if x.index > y.index and op in COMMUTATIVE:
             x, y = y, x
         return self._make(op, (x, y))
+
+    def _folded(self, op: str, x: Expression, y: Expression) -> Expression | None:
+        """Result of an operation on constants, or the simpler expression of a rule; else None."""
+        if x.is_constant and y.is_constant:
+            value = BINARY[op](x.value, y.value)
+            return x if value == x.value else y if value == y.value else self.constant(value)
+        simplified = SIMPLER.get(op)
+        return None if simplified is None else simplified(self, x, y)
 
     def select(self, condition: Expression, x, y) -> Expression:
         """Return x where the condition holds, else y."""
@@ -227,6 +233,10 @@ class Graph:
         node = Expression(self, op, operands, value, len(self.nodes))
         self.nodes.append(node)
         return node
+
+
+def _nothing(zero: Expression, x: Expression, y: Expression) -> None:
+    """No simpler expression, for operations on zero that are not of :data:`WITH_ZERO`."""
 
 
 def _passed(operands: list[Expression]) -> tuple[Expression, ...]:
