@@ -72,7 +72,6 @@ class LoadForces:
         self.is_of_time = bool(self._timed)
         self._rooms: list[tuple[np.ndarray, int]] = []  # that no call uses now
         self._posed = bool(self._loaded) or any(needs_poses(bound.load) for bound in self.called)
-        self._places = system.structure.n_bodies + 1  # with the ground
         self.n_q, self.n_in = 1 + system.n_q, 1 + system.n_q + system.n_v
         self._size = self.n_in + sum(size for *_, size in self._values)
 

@@ -291,9 +291,7 @@ def arguments(function) -> int:
     if isinstance(function, np.ufunc):
         return function.nin
     if type(function) is FunctionType and vars(function).keys().isdisjoint(OF_SIGNATURE):  # the usual case, quickly
-        code = function.__code__
-        has_places = code.co_argcount or code.co_flags & inspect.CO_VARARGS
-        return max(code.co_argcount - len(function.__defaults__ or ()), 1) if has_places else 0
+        return _arguments_of_code(function)
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):  # a builtin that hides its signature
@@ -301,6 +299,13 @@ def arguments(function) -> int:
     places = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD, p.VAR_POSITIONAL)]
     required = sum(p.default is p.empty and p.kind is not p.VAR_POSITIONAL for p in places)
     return max(required, 1) if places else 0
+
+
+def _arguments_of_code(function: FunctionType) -> int:
+    """The same of a function that is written in Python, and no decorator says otherwise."""
+    code = function.__code__
+    has_places = code.co_argcount or code.co_flags & inspect.CO_VARARGS
+    return max(code.co_argcount - len(function.__defaults__ or ()), 1) if has_places else 0
 
 
 def kind(element) -> str:
