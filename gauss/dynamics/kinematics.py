@@ -57,6 +57,8 @@ class _Poses:
 
 
 FOUND = frozenset(("R", "x", "W", "u", "joints"))  # attributes computed on first access
+BLOCKS = {"R": (0, 9, (3, 3)), "x": (9, 12, (3,)), "W": (12, 15, (3,)), "u": (15, 18, (3,))}  # of poses in one array
+NUMBERS = 18  # of a body in that array
 
 
 class Kinematics(View):
@@ -130,18 +132,21 @@ class KinematicsOnAccess(Kinematics):
     ----------
     poses : callable
         () → rotations (n + 1, 3, 3), centres of mass, angular velocities and velocities (n + 1, 3) of the bodies, then of
-        the ground.
+        the ground, as one array.
     """
 
-    def __init__(self, system: System, state: State, poses: Callable[[], tuple[np.ndarray, ...]]):
+    def __init__(self, system: System, state: State, poses: Callable[[], np.ndarray]):
         self.system, self.state, self._bodies = system, state, poses
 
     def __getattr__(self, name: str):
         if name not in FOUND:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        R, x, W, u = self._bodies()
-        self.__dict__.update(R=R, x=x, W=W, u=u, joints=[None] * len(self.system.joints))
-        return self.__dict__[name]
+        if name not in BLOCKS:
+            return self.__dict__.setdefault(name, [None] * len(self.system.joints))
+        known = self.__dict__
+        numbers = known["_numbers"] if "_numbers" in known else known.setdefault("_numbers", self._bodies())
+        (first, last, shape), n = BLOCKS[name], numbers.size // NUMBERS
+        return known.setdefault(name, numbers[first * n : last * n].reshape(n, *shape))
 
 
 def _of_bodies(system: System, state: State, R, x, W, u) -> _Poses:

@@ -8,7 +8,7 @@ where a law asks for them.
 
 import ctypes
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied, values_of_laws
 from gauss.dynamics.store import cached_on_disk
 from gauss.scene import GROUND, Drive, Force
-from gauss.scene.values import ConstantLaw, evaluated
+from gauss.scene.values import ConstantLaw, law_of_time_alone, put
 from gauss.system import BoundLoad, State, System
 
 ENDS = "body", "other"  # fields of loads on bodies that name these
@@ -65,8 +65,11 @@ class LoadForces:
         self._asked = [bound for bound in self.called if isinstance(bound.load, ASKED)]
         self._applied = [bound for bound in self.called if not isinstance(bound.load, ASKED)]
         self._values, self._loaded = _values(system, self._asked), _loaded(system, self._applied)
+        alone = not self._applied and self._traced is None
+        self._timed = _of_time(self._values) if alone else []
+        self.is_of_time = bool(self._timed)
+        self._rooms: list[tuple[np.ndarray, int]] = []  # that no call uses now
         self._posed = bool(self._loaded) or any(needs_poses(bound.load) for bound in self.called)
-        self._places = system.structure.n_bodies + 1  # with the ground
         self.n_q, self.n_in = 1 + system.n_q, 1 + system.n_q + system.n_v
         self._size = self.n_in + sum(size for *_, size in self._values)
 
@@ -93,10 +96,10 @@ class LoadForces:
         """
         motion = None
         if self.called:
-            motion = self._placed(state, numbers) if self._posed else Kinematics(self.system, state)
+            motion = self._placed(state, numbers, place) if self._posed else Kinematics(self.system, state)
             given, end = (state.t, motion), self.n_in
             for law, what, size in self._values:
-                numbers[end : end + size] = evaluated(law, given, what, size)
+                put(law, given, what, size, numbers, end)
                 end += size
         if self._asked and not self._applied and self._traced is None:  # the usual case, quickly
             self._of_values.at(place, found)
@@ -109,6 +112,21 @@ class LoadForces:
         total = parts[0] if len(parts) == 1 else sum(parts, np.zeros(self.system.n_v + 3))
         ctypes.memmove(found, address(total), total.nbytes)
 
+    def write_of_time(self, given: int, found: int):
+        """The same of laws of the time alone, for a state at an address: they need no objects of it."""
+        numbers, place = self._rooms.pop() if self._rooms else self._new_room()
+        ctypes.memmove(place, given, 8 * self.n_in)
+        t, end = (numbers.item(0),), self.n_in
+        for law, what, size in self._timed:
+            put(law, t, what, size, numbers, end)
+            end += size
+        self._of_values.at(place, found)
+        self._rooms.append((numbers, place))
+
+    def _new_room(self) -> tuple[np.ndarray, int]:
+        numbers = self.room()
+        return numbers, address(numbers)
+
     def _of_others(self, motion: Kinematics, inputs: np.ndarray) -> np.ndarray:
         """The same of loads that are neither drives nor forces."""
         applied = Applied(motion, self._applied)
@@ -118,15 +136,9 @@ class LoadForces:
             Q = Q + _at(self._transposed, address(given))
         return np.concatenate([Q, [applied.driven, applied.loaded, applied.dissipated]])
 
-    def _placed(self, state: State, numbers: np.ndarray) -> Kinematics:
+    def _placed(self, state: State, numbers: np.ndarray, place: int) -> Kinematics:
         """Kinematics with poses by machine code, at the first access: many laws need coordinates and rates only."""
-
-        def poses() -> tuple[np.ndarray, ...]:
-            found, n = _at(self._poses, address(numbers)), self._places
-            R, x, W, u = found[: 9 * n], found[9 * n : 12 * n], found[12 * n : 15 * n], found[15 * n :]
-            return R.reshape(n, 3, 3), x.reshape(n, 3), W.reshape(n, 3), u.reshape(n, 3)
-
-        return KinematicsOnAccess(self.system, state, poses)
+        return KinematicsOnAccess(self.system, state, partial(_at, self._poses, place, numbers))
 
     @cached_property
     def _poses(self) -> Kernel:
@@ -182,13 +194,19 @@ def _values(system: System, asked: Sequence[BoundLoad]) -> list[tuple[Callable, 
     return [(law, *values_of_laws(system, one.load)) for one in asked for law in one.laws if _varies(law)]
 
 
+def _of_time(values: list[tuple[Callable, str, int]]) -> list[tuple[Callable, str, int]]:
+    """The same laws as functions of the time; none if one takes the motion."""
+    found = [(law_of_time_alone(law), what, size) for law, what, size in values]
+    return [(law, what, size) for law, what, size in found if law is not None] if all(law for law, *_ in found) else []
+
+
 def _loaded(system: System, applied: Sequence[BoundLoad]) -> list[int]:
     """Bodies that loads may act on."""
     return sorted({body for one in applied if not one.on_coordinates for body in _bodies(system, one)})
 
 
-def _at(kernel: Kernel, place: int) -> np.ndarray:
-    """Outputs of a kernel for the inputs at an address, without the checks of its arguments."""
+def _at(kernel: Kernel, place: int, _owner: np.ndarray | None = None) -> np.ndarray:
+    """Outputs of a kernel for the inputs at an address, without the checks of its arguments; their owner is kept for it."""
     found = np.empty(kernel.n_out)
     kernel.at(place, address(found))
     return found

@@ -26,6 +26,9 @@ class LoadReceiver(Receiver):
 
     def __call__(self, given: int, found: int):
         """Evaluate the loads of a state."""
+        if self.forces.is_of_time:
+            self.forces.write_of_time(given, found)
+            return
         numbers = self.forces.room()  # new, for a law may keep it
         place = address(numbers)
         ctypes.memmove(place, given, self.size)

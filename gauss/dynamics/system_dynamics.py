@@ -12,7 +12,7 @@ from gauss.backends.compulsion import Compulsion
 from gauss.codegen import count, made_from, write
 from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.consistent_states import consistent
-from gauss.dynamics.evaluation_cost import CALL, evaluation_cost, slowdown
+from gauss.dynamics.evaluation_cost import evaluation_cost, slowdown
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import ACCELERATIONS, motion_plan
@@ -66,11 +66,12 @@ class SystemDynamics(Store):
 
     def called(self, system: System) -> dict[str, str]:
         """Loads with opaque laws: what a call costs, and why they are opaque."""
+        from gauss.dynamics.call_cost import call_costs
         from gauss.dynamics.laws.sampled_laws import SAMPLES
 
-        sampled = f"up to {SAMPLES} times before the first motion if it is a law of time"
-        text = f"about {1e6 * CALL:.0f} µs (estimated), and {sampled}"
-        return {name: f"{text}; {why}" for name, why in Laws(system).reasons.items()}
+        laws = Laws(system)
+        sampled, costs = f"up to {SAMPLES} times before the first motion if it is a law of time", call_costs(system, laws)
+        return {name: f"{costs[name]}, and {sampled}; {why}" for name, why in laws.reasons.items()}
 
     def operations(self, system: System, subsystems: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of subsystems; None for large trees, which are not traced."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from numbers import Real
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from gauss.math import piecewise
 UNIT_TOLERANCE = 1e-6  # error of the length of a quaternion, or of an orthonormal matrix, that is typed with 7 digits
 ORTHONORMAL = 1e-15  # error of the same at round-off: nothing to normalise
 FLOATS = float, np.float64  # kinds of numbers that laws return
+OF_SIGNATURE = {"__wrapped__", "__signature__", "__text_signature__"}  # attributes of functions that say another signature
 
 
 def keep(element, **checked):
@@ -128,7 +130,25 @@ def evaluated(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
 
     SceneError as :func:`returned`, or if it returns numbers that are not finite.
     """
-    entries = returned(law, given, what, size)
+    return _finite(_checked(_asked(law, given, what), given, what, size), given, what, size)
+
+
+def put(law: Callable, given: tuple, what: str, size: int, numbers: np.ndarray, first: int):
+    """Write the value of an opaque law to an array of floats, from a place on; as :func:`evaluated`."""
+    try:
+        value = law(*given)
+    except Exception as error:  # a law may fail in any way
+        raise _raised(error, given, what) from error
+    kind = type(value)
+    if size == 1 and kind in FLOATS and math.isfinite(value):  # the usual cases, quickly
+        numbers[first] = value
+    elif kind is tuple and len(value) == size and all(type(x) in FLOATS and math.isfinite(x) for x in value):
+        numbers[first : first + size] = value
+    else:
+        numbers[first : first + size] = _finite(_checked(value, given, what, size), given, what, size)
+
+
+def _finite(entries: np.ndarray, given: tuple, what: str, size: int) -> np.ndarray:
     if entries.dtype == float and not (math.isfinite(entries[0]) if size == 1 else np.isfinite(entries).all()):
         raise _refused(what, given[0], entries.tolist(), size)
     return entries
@@ -150,10 +170,23 @@ def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
     size : int
         Number of values that it must return.
     """
+    return _checked(_asked(law, given, what), given, what, size)
+
+
+def _asked(law: Callable, given: tuple, what: str):
+    """What a law returns."""
     try:
-        value = branches(lambda: law(*given)) if isinstance(given[0], Expression) else law(*given)
+        return branches(lambda: law(*given)) if isinstance(given[0], Expression) else law(*given)
     except Exception as error:  # a law may fail in any way
-        raise SceneError(f"{what}: at {_when(given[0])} its law raised {type(error).__name__}: {error}") from error
+        raise _raised(error, given, what) from error
+
+
+def _raised(error: Exception, given: tuple, what: str) -> SceneError:
+    return SceneError(f"{what}: at {_when(given[0])} its law raised {type(error).__name__}: {error}")
+
+
+def _checked(value, given: tuple, what: str, size: int) -> np.ndarray:
+    """What a law has returned, as an array (size,) of floats, or of objects where it is traced."""
     if size == 1 and type(value) in FLOATS:  # the usual case, quickly
         return np.array([value])
     entries = _entries(value)
@@ -201,9 +234,19 @@ def as_function(law_or_constant) -> Callable:
     """Function of (t, motion), whatever form the law was given in."""
     if not callable(law_or_constant):
         return ConstantLaw(law_or_constant)
-    if arguments(law_or_constant) == 1:
-        return lambda t, motion: law_or_constant(t)
-    return law_or_constant
+    return _of_time(law_or_constant) if arguments(law_or_constant) == 1 else law_or_constant
+
+
+def _of_time(law: Callable) -> Callable:
+    """Function of (t, motion) that asks a law of (t)."""
+    return lambda t, motion: law(t)
+
+
+def law_of_time_alone(function: Callable) -> Callable | None:
+    """Law of (t) behind a function of :func:`as_function`; None if that takes the motion."""
+    own = getattr(function, "__code__", None) in _of_time.__code__.co_consts
+    closure = getattr(function, "__closure__", None)
+    return closure[0].cell_contents if own and closure else None
 
 
 def smooth_law(value, what: str, unit: str, size: int = 1):
@@ -235,6 +278,8 @@ def arguments(function) -> int:
     """Number of arguments that a law is called with: those that it requires, and one if all of them have defaults."""
     if isinstance(function, np.ufunc):
         return function.nin
+    if type(function) is FunctionType and vars(function).keys().isdisjoint(OF_SIGNATURE):  # the usual case, quickly
+        return _arguments_of_code(function)
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):  # a builtin that hides its signature
@@ -242,6 +287,13 @@ def arguments(function) -> int:
     places = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD, p.VAR_POSITIONAL)]
     required = sum(p.default is p.empty and p.kind is not p.VAR_POSITIONAL for p in places)
     return max(required, 1) if places else 0
+
+
+def _arguments_of_code(function: FunctionType) -> int:
+    """The same of a function that is written in Python, and no decorator says otherwise."""
+    code = function.__code__
+    has_places = code.co_argcount or code.co_flags & inspect.CO_VARARGS
+    return max(code.co_argcount - len(function.__defaults__ or ()), 1) if has_places else 0
 
 
 def kind(element) -> str:

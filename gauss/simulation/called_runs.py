@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.codegen.kernels import LAST_STEP_SHARE, CallingLoop, Control, Loop, LoopStatus
+from gauss.codegen.kernels import LAST_STEP_SHARE, Control, Loop, LoopStatus
 from gauss.codegen.tiers import EntryPoint
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT
 from gauss.dynamics.load_forces import LoadForces
@@ -26,6 +26,7 @@ from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.undetected_switching import (
     REJECTED_SHARE,
     RESOLVED_STEP,
+    SHIFTS,
     SPARSE_STEP,
     defect_is_large,
     defect_times,
@@ -64,7 +65,7 @@ class CalledRun(CompiledRun):
             return super().evaluated(state)
 
     def _loop_of(self, kind: Hashable, make) -> Loop:
-        self.loop = CallingLoop(super()._loop_of(kind, make))
+        self.loop = super()._loop_of(kind, make).calling
         return self.loop
 
     def _called(self, run: Callable[[], None]):
@@ -185,7 +186,7 @@ class CalledAdaptiveRun(CalledRun, CompiledAdaptiveRun):
         rows = self._attempted(times, across)
         if rows is None:
             return
-        if looks and self._is_unresolved(t, tried, dict(zip(times[due.size :], rows[due.size :], strict=True))):
+        if looks and self._is_unresolved(tried, times[due.size :], rows[due.size :]):
             self._reject(*before, tried)
             return
         if across:
@@ -213,14 +214,21 @@ class CalledAdaptiveRun(CalledRun, CompiledAdaptiveRun):
         rows[order] = ordered[: times.size]
         return rows if control.steps > kept.steps else None
 
-    def _is_unresolved(self, t: float, h: float, rows: dict[float, np.ndarray]) -> bool:
+    def _is_unresolved(self, h: float, times: np.ndarray, rows: np.ndarray) -> bool:
         """Whether the defect of the dense output shows that a law switches within a step."""
         n_q, n_v = 1 + self.layout.n_q, self.layout.n_v
-        dense = lambda time: (State(time, rows[time][1:n_q], rows[time][n_q : n_q + n_v]), rows[time][n_q + n_v :])  # noqa: E731
         reached = State(float(self.point[0]), self.point[1:n_q], self.point[n_q : n_q + n_v])
         allowed = self.problem.tolerance.scale(self.system, reached)[n_v:]
-        self.control.evaluations += len(rows) // 3
-        return defect_is_large(self.evaluated, dense, t, h, allowed)
+        count = len(SHIFTS)
+        self.control.evaluations += len(rows) // count
+        asked, places = rows[:, : n_q + n_v], range(0, len(rows), count)
+        rates, listed = asked[:, n_q:], times.tolist()
+        samples = ((listed[k : k + count], rates[k : k + count], self._accelerations(asked[k + count // 2])) for k in places)
+        return defect_is_large(samples, h, allowed)
+
+    def _accelerations(self, numbers: np.ndarray) -> np.ndarray:
+        """Accelerations (n_v,) of a time, coordinates and rates (n,), by machine code."""
+        return self.loop.evaluate("rates", np.concatenate([numbers, self.inputs]))[: self.layout.n_v]
 
     def _reject(self, control: bytes, point: np.ndarray, confirmed: np.ndarray, h: float):
         """Return to the begin of a step, of which a share is tried next."""

@@ -41,7 +41,15 @@ from gauss.simulation.step_limits import (
     too_small,
 )
 from gauss.simulation.trajectory import Trajectory
-from gauss.simulation.undetected_switching import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
+from gauss.simulation.undetected_switching import (
+    REJECTED_SHARE,
+    RESOLVED_STEP,
+    SHIFTS,
+    SPARSE_STEP,
+    Sample,
+    defect_is_large,
+    defect_times,
+)
 from gauss.system import State, System
 
 SLIDING_PROGRESS = 1e-3  # relative to the duration, per PROGRESS_TRIALS, below which a sliding motion is refused
@@ -206,7 +214,13 @@ class PythonRun:
             return 1.0
         allowed = self.tolerance.scale(self.system, trial.point.state)[self.system.n_v :]
         dense = self._dense(method, begin, h, trial.kept)
-        return REJECTED_SHARE if defect_is_large(self.evaluate, dense, begin.state.t, h, allowed) else 1.0
+        return REJECTED_SHARE if defect_is_large(self._defect_samples(dense, begin.state.t, h), h, allowed) else 1.0
+
+    def _defect_samples(self, dense: Callable, begin: float, h: float) -> Iterator[Sample]:
+        """Dense output and accelerations at the places of a step at which its defect is sampled."""
+        for times in defect_times(begin, h).reshape(-1, len(SHIFTS)).tolist():
+            states = [dense(t)[0] for t in times]
+            yield times, [state.v for state in states], self.evaluate(states[1]).acceleration
 
     def _handed_over(self, point: Point, method: Controlled, error: SimulationError) -> tuple[Point, float]:
         """Point and step from which the certified engine continues after a failure; the error if that engine failed.

@@ -6,15 +6,15 @@ law has switched within the step.
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from gauss.dynamics.laws.switching_times import Timetable
 from gauss.errors import SwitchingWarning, listed, user_level
-from gauss.integrators import FixedStep, Integrator, Library, Rates
+from gauss.integrators import FixedStep, Integrator, Library
 from gauss.simulation.trajectory import Trajectory
-from gauss.system import State, System
+from gauss.system import System
 
 PLACES = (0.187, 0.431, 0.569, 0.813)  # of the samples, relative to the step
 SHIFTS = -1e-4, 0.0, 1e-4  # of the samples of a difference for y', relative to the step
@@ -23,36 +23,29 @@ REJECTED_SHARE = 0.5  # of a step with a larger defect that is tried next
 RESOLVED_STEP = 1e-6  # relative to the duration: the defect of shorter steps is not sampled
 SPARSE_STEP = 0.01  # relative to the duration: longer steps with opaque laws may miss short features
 
+Sample = tuple[Sequence[float], Sequence[np.ndarray] | np.ndarray, np.ndarray]  # times and rates, and accelerations
+
 
 def defect_times(begin: float, h: float) -> np.ndarray:
     """Times (12,) at which :func:`defect_is_large` asks for dense output [s]."""
     return np.array([begin + (place + shift) * h for place in PLACES for shift in SHIFTS])
 
 
-def defect_is_large(
-    evaluate: Callable[[State], Rates],
-    dense: Callable[[float], tuple[State, np.ndarray]],
-    begin: float,
-    h: float,
-    allowed: np.ndarray,
-) -> bool:
+def defect_is_large(samples: Iterable[Sample], h: float, allowed: np.ndarray) -> bool:
     """Whether the defect of v' at a place in a step exceeds :data:`LARGEST_DEFECT` times the tolerance.
 
     Parameters
     ----------
-    evaluate : callable
-        Rates of a state.
-    dense : callable
-        Dense output of the step: t → (state, work).
-    begin, h : float
-        Begin and length of the step [s].
+    samples : iterable of tuple
+        For each place, the :func:`defect_times` there, the rates of the dense output at these, and the accelerations at the
+        middle one by the equations of motion; later places are not asked for after a large defect.
+    h : float
+        Length of the step [s].
     allowed : ndarray, shape (n_v,)
         Tolerance of the rates.
     """
-    for times in defect_times(begin, h).reshape(-1, len(SHIFTS)).tolist():
-        before, at, after = (dense(t)[0] for t in times)
-        defect = (after.v - before.v) / (after.t - before.t) - evaluate(at).acceleration
-        if (h * np.abs(defect) > LARGEST_DEFECT * allowed).any():
+    for (before, _, after), (v, _, v_after), accelerations in samples:
+        if (h * np.abs((v_after - v) / (after - before) - accelerations) > LARGEST_DEFECT * allowed).any():
             return True
     return False
 

@@ -2,6 +2,7 @@
 
 import ctypes
 from collections.abc import Callable, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -51,6 +52,11 @@ class Loop:
         ValueError if an array is not a contiguous one of doubles.
         """
         self._run.call(ctypes.byref(control), *_addresses((point, confirmed, grid, out)), budget)
+
+    @cached_property
+    def calling(self) -> "CallingLoop":
+        """The same loop, whose functions may call Python."""
+        return CallingLoop(self)
 
     @property
     def entry(self) -> EntryPoint:
