@@ -22,6 +22,7 @@ from gauss.errors import SimulationError, judged_later
 from gauss.system import State, Subsystem, System
 
 if TYPE_CHECKING:
+    from gauss.dynamics.contact.near_detection import CandidatePairs
     from gauss.dynamics.contact.sleepers import Sleepers
 
 
@@ -43,6 +44,12 @@ class SystemDynamics(Store):
         except SimulationError as refusal:  # of the default integrator: it says what to use
             motions = refusal
         return {"motions": motions, "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
+
+    def candidate_pairs(self, system: System) -> "CandidatePairs":
+        """Pairs of shapes that a step of time stepping looks at."""
+        from gauss.dynamics.contact.near_detection import candidate_pairs
+
+        return candidate_pairs(system)
 
     def sleepers(self, system: System) -> "Sleepers | SimulationError":
         """Bodies that may sleep in time stepping, and those that never do; where none may, the error with the reason."""

@@ -49,6 +49,9 @@ class Dynamics(Protocol):
     def plans(self, system: "System") -> dict:
         """Plans of its motions and of single states, {what: plan}, or the error that says what they need."""
 
+    def candidate_pairs(self, system: "System"):
+        """Pairs of shapes that a step of time stepping looks at: numbers of parts and pairs, and whether by a grid."""
+
     def sleepers(self, system: "System"):
         """Bodies that may sleep in time stepping, and those that never do; where none may, the error with the reason."""
 

@@ -47,10 +47,17 @@ def _one_sided(system) -> list[str]:
     return [f"  unilateral constraints: {words}{more}"]
 
 
-def _sleeping(system) -> list[str]:
-    """How many bodies may sleep in time stepping, of scenes with contacts of shapes."""
+def _steps_in_contact(system) -> list[str]:
+    """What a step of time stepping looks at, and how many bodies may sleep, of scenes with contacts of shapes."""
     if not system.scene.shapes or not system.scene.contacts or system.dynamics is None:
         return []
+    parts, pairs, by_grid = system.dynamics.candidate_pairs(system)
+    by = f"a grid finds the near ones: its work is that of {parts} parts" if by_grid else "tried one by one in each step"
+    return [f"  contacts of shapes: {pairs} pairs of {parts} convex parts, {by}", *_sleeping(system)]
+
+
+def _sleeping(system) -> list[str]:
+    """How many bodies may sleep in time stepping."""
     found = system.dynamics.sleepers(system)
     if isinstance(found, SimulationError):
         return [f"  sleeping in time stepping: no body, {found}"]
@@ -131,7 +138,7 @@ def explain(system) -> str:
         else f"  loop constraints, couplings, relations: {', '.join(loops)}",
         *_one_sided(system),
         *([f"  set-valued elements: {listed(system.scene.set_valued, MOST_LISTED)}"] if system.scene.set_valued else []),
-        *_sleeping(system),
+        *_steps_in_contact(system),
         *_method(system),
         *_reductions(system),
         "",

@@ -251,3 +251,18 @@ def test_the_report_of_a_system_counts_the_bodies_that_may_sleep():
     able, never = system.dynamics.sleepers(system)
     assert (able, never) == (("b", "b lid"), ("a", "a lid"))
     assert "2 of 4 moving bodies" in system.explain()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("balls", "by_grid"), [(5, False), (100, True)])
+def test_the_report_of_a_system_counts_the_pairs_of_shapes_of_a_step(balls, by_grid):
+    scene = floor("balls")
+    for k in range(balls):
+        free_body(scene, f"ball {k}", 0.4 * RADIUS**2, (0.0, 0.0, 3.0 * RADIUS * (k + 1)))
+        scene.sphere(f"shell {k}", f"ball {k}", RADIUS)
+    system = gauss.compile_scene(with_contacts(scene))
+    found = system.dynamics.candidate_pairs(system)
+    assert found == (balls + 1, balls * (balls + 1) // 2, by_grid)
+    listed = len(new_contact_stepper(system).detection.pair)
+    assert listed == (0 if by_grid else found.pairs)
+    assert f"{found.pairs} pairs" in system.explain()

@@ -10,6 +10,7 @@ from gauss.codegen.kernels.column_pivoting import Pivots
 from gauss.codegen.kernels.compiled_loop import CallingLoop, Loop, address
 from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
+from gauss.codegen.kernels.damped_compliance import DampedCompliance
 from gauss.codegen.kernels.energy_record import (
     ENERGY_RECORD,
     ENERGY_SAMPLE,
@@ -49,6 +50,7 @@ __all__ = [
     "CallingSteps",
     "CallRecorder",
     "ContactForces",
+    "DampedCompliance",
     "Control",
     "CorrectedRecursion",
     "Correction",

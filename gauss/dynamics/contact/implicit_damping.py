@@ -34,18 +34,26 @@ class ImplicitDamping:
     """
 
     def __init__(self, smooth: System):
-        self.d = damping_of_joints(smooth)
+        self.smooth, self.d = smooth, damping_of_joints(smooth)
         self.places = np.flatnonzero(self.d)
 
     def is_stiff(self, H: np.ndarray, h: float) -> bool:
         """Whether a step of length h makes it implicit, by the compliance without it."""
-        return bool(h * (self.d @ H.diagonal()) > STIFF_DAMPING)
+        return self.is_stiff_by(H.diagonal()[self.places], h)
+
+    def is_stiff_by(self, own: np.ndarray, h: float) -> bool:
+        """The same by the entries (s,) of the compliance on its diagonal, of damped coordinates."""
+        return bool(h * (self.d[self.places] @ own) > STIFF_DAMPING)
+
+    def inertias(self, own: np.ndarray, h: float) -> np.ndarray:
+        """Inertias θ h d (s,) that a step adds to those of the damped coordinates, from these."""
+        damped = h * self.d[self.places]
+        return np.array([implicit_inertia(M, hd, max) - M for M, hd in zip(own, damped, strict=True)])
 
     def added(self, terms: MechanismTerms, h: float) -> np.ndarray:
         """Inertias θ h d (n_v,) that a step adds to those of the mechanism."""
-        found, own = np.zeros(self.d.size), terms.M.diagonal()
-        for k in self.places:
-            found[k] = implicit_inertia(own[k], h * self.d[k], max) - own[k]
+        found = np.zeros(self.d.size)
+        found[self.places] = self.inertias(terms.M.diagonal()[self.places], h)
         return found
 
     def power_at(self, v: np.ndarray) -> np.ndarray:

@@ -22,9 +22,11 @@ from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import contact_scales, gap_scales
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, laws_of
+from gauss.dynamics.contact.damped_step import DampedResponses, DampedStep
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
+from gauss.dynamics.contact.implicit_damping import ImplicitDamping
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps
 from gauss.dynamics.contact.paradox import (
     MOST_CONTACTS,
@@ -110,6 +112,11 @@ class MoreauStepper:
         """Responses of the system without unilateral and set-valued elements."""
         return ForceResponses(self.smooth, self.backend)
 
+    @cached_property
+    def damping(self) -> ImplicitDamping:
+        """Damping of joints, which is implicit where it is stiff."""
+        return ImplicitDamping(self.smooth)
+
     def step(
         self, state: State, h: float, start: np.ndarray | None = None, last: bool = False, before: float = 0.0
     ) -> MoreauStep:
@@ -130,7 +137,8 @@ class MoreauStepper:
             at = advance_positions(self.system, state, h, share)
             touch = self.relative(self.kernel(at))
             pushed = force != 0.0 if before and share else np.zeros(force.size, dtype=bool)
-            free = self._free(at, h, share, touch.J[pushed].T @ force[pushed], last)
+            damped = DampedResponses(self.damping, self.responses, at, h)
+            free = self._free(at, h, share, touch.J[pushed].T @ force[pushed], last, damped)
             if not any(self.hits(touch, free.acceleration, h, rest, share)):
                 break
         self.overlaps.refuse(touch, state.t)
@@ -145,7 +153,7 @@ class MoreauStepper:
         active_gaps = (after[:m] < 0.0) | (force[:m] > 0.0)
         while True:
             rows, laws = self._rows(active_gaps)
-            responses = self._responses(at, touch.J, rows, active, responses)
+            responses = self._responses(damped, touch.J, rows, active, responses)
             active, W = rows, h * touch.J[rows] @ responses.T
             found, error = ContactProblem(0.5 * (W + W.T), after[rows], laws).solve(force[rows])
             acceleration = found @ responses
@@ -158,7 +166,7 @@ class MoreauStepper:
         force = np.zeros_like(force)
         force[rows] = found
         self._refuse_jam(state, at, rows[found != 0.0], responses[found != 0.0], after)
-        rates = self.over(at, touch, free, state.v, h, force, acceleration)
+        rates = self.over(at, touch, free, state.v, h, force, acceleration, damped.step)
         modes = self.modes.after(touch, free.acceleration, acceleration, force, state.v, h, rest, share).astype(float)
         paradoxes = self._paradoxes(state, touch, free, force, rows, W / h)
         return MoreauStep(*rates, force * self.unit, error, paradoxes, share, modes)
@@ -182,14 +190,17 @@ class MoreauStepper:
         """Tangential speed below which a contact may stick, for rates v, numbers or expressions; in units of the scene."""
         return sliding_above(self.system, v) * self.system.scale.time / self.system.scale.length
 
-    def _free(self, at: State, h: float, share: float, expected: np.ndarray, last: bool) -> Rates:
+    def _free(self, at: State, h: float, share: float, expected, last: bool, damped: DampedResponses) -> Rates:
         """Accelerations without contact forces, at the rates after the share, with the generalised forces expected."""
+        step, v = damped.step, at.v
         if share:
             acceleration = self.responses.free(at).acceleration
+            acceleration = acceleration if step is None else step.acceleration(acceleration)
             if expected.any():
-                acceleration = acceleration + self.responses.of(at, expected[None])[0]
+                acceleration = acceleration + damped.of(expected[None])[0]
             at = advance_rates(at, acceleration, h, share)
-        return self.responses.free(at, last)
+        found = self.responses.free(at, last)
+        return found if step is None else step.later(found, v, at.v)
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -267,7 +278,9 @@ class MoreauStepper:
         size = np.abs(response) / self.system.scale.coordinates
         return math.where(sum(forbidden, 0.0) > INCONSISTENT_RESPONSE * sum(size, 0.0), 1.0, 0.0)
 
-    def over(self, at: State, touch: ContactTerms, free: Rates, v, h, force, acceleration) -> Rates:
+    def over(
+        self, at: State, touch: ContactTerms, free: Rates, v, h, force, acceleration, damped: DampedStep | None = None
+    ) -> Rates:
         """Mean accelerations and powers over a step under forces (n,) and their accelerations.
 
         ``at`` is the place of the forces, with any rates.
@@ -276,7 +289,8 @@ class MoreauStepper:
         middle = v + 0.5 * h * total
         work = force * (touch.J @ middle)
         driven = work[~self.lossy].sum() + self._reacting_power(at, acceleration, middle, work)
-        return Rates(total, free.power + np.array([driven, 0.0, -work[self.lossy].sum()]))
+        power = free.power + np.array([driven, 0.0, -work[self.lossy].sum()])
+        return Rates(total, power if damped is None else power + damped.power_over(v, total, h))
 
     def _reacting_power(self, at: State, a, v, work) -> Scalar:
         """Power (M a − Kᵀ f) · v of constraints that prescribe velocities, by the forces f: all others have none."""
@@ -313,14 +327,14 @@ class MoreauStepper:
             self.patterns[key] = rows, laws_of(laws, rows)
         return self.patterns[key]
 
-    def _responses(self, state: State, J, rows, known, responses) -> np.ndarray:
+    def _responses(self, damped: DampedResponses, J, rows, known, responses) -> np.ndarray:
         """Accelerations (k, n_v) by unit forces in some rows; those of the rows ``known`` are given."""
         if not known.size:
-            return self.responses.of(state, J[rows])
+            return damped.of(J[rows])
         found = np.empty((rows.size, J.shape[1]))
         old = np.isin(rows, known)
         found[old] = responses[np.searchsorted(known, rows[old])]
-        found[~old] = self.responses.of(state, J[rows[~old]])
+        found[~old] = damped.of(J[rows[~old]])
         return found
 
     def _refuse_jam(self, state: State, at: State, rows, responses, after):

@@ -1,6 +1,7 @@
 """Near contacts by one call of machine code: :mod:`gauss.codegen.kernels.near_pairs` on a table of shapes."""
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,9 +22,33 @@ from gauss.scene import Collider, HalfSpace
 from gauss.scene.contact_pairs import RULES
 from gauss.scene.contact_patch import SLOTS
 from gauss.scene.patch_distances import patch_points
+from gauss.system import System
 
 FIRST_ROOM = 64  # contacts that there is room for at first
 MOST_LISTED = 4000  # pairs that are tried one by one; more are found by a grid
+
+
+class CandidatePairs(NamedTuple):
+    """Pairs of convex parts of shapes that a step with contacts looks at.
+
+    Attributes
+    ----------
+    parts, pairs : int
+        Convex parts of the shapes that take part in contacts, and their pairs.
+    by_grid : bool
+        Whether near pairs are found by a grid of cells; the work is then that of the parts, not that of the pairs.
+    """
+
+    parts: int
+    pairs: int
+    by_grid: bool
+
+
+def candidate_pairs(system: System) -> CandidatePairs:
+    """Pairs that the steps of a system look at."""
+    table = ShapeTable(system)
+    pairs = int(np.count_nonzero(np.triu(table.law)))
+    return CandidatePairs(len(table.parts), pairs, pairs > MOST_LISTED)
 
 
 class NearDetection:

@@ -12,6 +12,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import write
 from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop, Notes
+from gauss.dynamics.contact.damped_step import traced_damping
 from gauss.dynamics.contact.moreau_step import (
     MIDPOINT,
     MISSED_CLOSING_RATE,
@@ -49,14 +50,17 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         v, before = point.state.v, method_state[:n] * (1.0 / stepper.unit)
         state, rest = advance_positions(system, point.state, h, share), stepper.rest(v)
         touch, (mechanism, first) = stepper.relative(stepper.kernel.written(state)), program.instant(state)
-        H = stepper.compliance(mechanism)
+        H, damped = traced_damping(stepper.damping, state, stepper.compliance(mechanism), h)
         expected = H @ (touch.J.T @ before) * (method_state[n] * (1.0 / MIDPOINT))  # zero after an impact
-        _, free = program.instant(advance_rates(state, first.acceleration + expected, h, share))
+        still = first.acceleration if damped is None else damped.acceleration(first.acceleration)
+        later = advance_rates(state, still + expected, h, share)
+        _, free = program.instant(later)
+        free = free if damped is None else damped.later(free, v, later.v)
         after = stepper.without_forces(touch, free.acceleration, h, rest, share, before)
         limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
-        jam, rates = stepper.forbids(state, added), stepper.over(state, touch, free, v, h, force, added)
+        jam, rates = stepper.forbids(state, added), stepper.over(state, touch, free, v, h, force, added, damped)
         found, _ = time_step(KnownRates(system, rates, share), point, h)
         kept, losses = [*(force * stepper.unit), share, math.maximum(method_state[n + 1], error)], np.zeros(0)
         if noted:
