@@ -240,6 +240,7 @@ MISTAKES = {
 }
 
 
+@pytest.mark.disk  # only the folder is another one
 @pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_gets_one_clear_message(mistake, tmp_path, monkeypatch):

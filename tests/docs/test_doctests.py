@@ -9,7 +9,7 @@ import pytest
 from gauss.docs import reference
 from gauss.docs.groups import GROUPS
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.disk]  # of what enters machine code nothing is replaced
 
 NEEDS = {"gauss.gym": "gymnasium", "gauss.view": "viser", "gauss.export.to_sympy": "sympy", "gauss.export.Formulas": "sympy"}
 NEEDS |= {"gauss.export.latex_document": "sympy", "gauss.export.to_casadi": "casadi", "gauss.export.to_jax": "jax"}

@@ -52,6 +52,7 @@ def test_scripts_are_short_and_have_a_title(script):
         assert "figure" in text
 
 
+@pytest.mark.disk  # packages that are hidden enter no machine code
 @pytest.mark.slow
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: str(path.relative_to(folder() / "examples")))
 def test_scripts_run_with_the_extra_of_the_documentation(script, capsys, monkeypatch):

