@@ -96,10 +96,10 @@ def terrain_distances(is_ball: bool) -> Kernel:
     """Machine code of the distances of a hull, or of a ball, and terrain, made once on a machine."""
     laws = TerrainLaws(
         same=terrain_contact.PLANE_TOLERANCE,
-        tiny=terrain_contact.TINY,
+        tiny=terrain_contact.CENTRE_DISTANCE,
         least_depth=terrain_contact.LEAST_DEPTH,
         near_side=terrain_contact.NEAR_SIDE,
-        beside=terrain_contact.BESIDE,
+        beside=terrain_contact.DISTANCE,
         flush=terrain_contact.FLUSH,
         closed=terrain_contact.CLOSED,
         odd=tuple(map(tuple, terrain_contact.ODD.tolist())),
