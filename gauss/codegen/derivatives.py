@@ -33,14 +33,8 @@ _PARTIALS: dict[str, Callable[..., tuple]] = {
     "entry": lambda y, one, zero, x: (zero,),
 }
 
-_DECIDES = {
-    "select": 1,
-    "less": 2,
-    "less_equal": 2,
-    "floor": 1,
-    "row": 1,
-    "entry": 1,
-}  # leading operands: locally constant in these
+# Leading operands of operations that are locally constant in these.
+_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1, "row": 1, "entry": 1}
 
 
 def varying(outputs) -> list[Expression]:

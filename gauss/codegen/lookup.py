@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss.codegen.expression import Expression
 
+NAME_LENGTH = 16  # hexadecimal digits of the digest of a column in its name in code
 UNIFORM = 0.25  # of a distance: breaks that lie closer to equally spaced ones are found by a division
 
 
@@ -34,6 +35,11 @@ class Column:
 
     def __repr__(self):
         return f"{type(self).__name__}({self.digest})"
+
+    @property
+    def name(self) -> str:
+        """Name of its array in code."""
+        return f"column_{self.digest[:NAME_LENGTH]}"
 
     def __eq__(self, other):
         return isinstance(other, Column) and self.digest == other.digest

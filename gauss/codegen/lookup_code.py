@@ -9,12 +9,11 @@ from gauss.codegen.intrinsics import intrinsic
 from gauss.codegen.lookup import Column
 
 DOUBLE, PLACE, BYTE = ir.DoubleType(), ir.IntType(32), ir.IntType(8)
-NAME_LENGTH = 16  # hexadecimal digits of a digest
 
 
 def lookup_code(module: ir.Module, op: str, column: Column, width: int) -> ir.Function:
     """Function of a vector of numbers that is one operation of a column, written once for each module and width."""
-    name = f"{op}_{column.digest[:NAME_LENGTH]}_{width}"
+    name = f"{op}_of_{column.name}_{width}"
     known = module.globals.get(name)
     return known or _Lookup(module, name, op, column, width).function
 
@@ -39,11 +38,10 @@ class _Lookup:
         return ir.Constant(self._vector(kind), value if self.width == 1 else [value] * self.width)
 
     def _entry(self, column: Column, row):
-        return self._read(self._array(column.digest, column.numbers.tobytes()), self.b.fptosi(row, self.places))
+        return self._read(self._array(column), self.b.fptosi(row, self.places))
 
     def _row(self, column: Column, x):
-        guarded = Column([-float("inf"), *column.numbers, float("inf")])
-        array = self._array(guarded.digest, guarded.numbers.tobytes())
+        array = self._array(Column([-float("inf"), *column.numbers, float("inf")]))
         spacing, count = column.spacing, column.numbers.size
         if spacing is None:
             found = self._bisected(array, x, count)
@@ -101,12 +99,11 @@ class _Lookup:
             found = b.insert_element(found, number, PLACE(lane))
         return found
 
-    def _array(self, digest: str, content: bytes):
+    def _array(self, column: Column):
         """Pointer to a constant array; bytes are written and read faster than numbers."""
-        name = f"column_{digest[:NAME_LENGTH]}"
-        known = self.module.globals.get(name)
+        known, content = self.module.globals.get(column.name), column.numbers.tobytes()
         if known is None:
-            known = ir.GlobalVariable(self.module, ir.ArrayType(BYTE, len(content)), name)
+            known = ir.GlobalVariable(self.module, ir.ArrayType(BYTE, len(content)), column.name)
             known.initializer = ir.FormattedConstant(known.value_type, f'c"\\{content.hex(chr(92))}"')
             known.global_constant, known.linkage, known.align = True, "internal", 8
         return self.b.bitcast(known, DOUBLE.as_pointer())

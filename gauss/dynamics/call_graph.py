@@ -29,7 +29,7 @@ from gauss.dynamics.loop_fronts import LoopFronts
 from gauss.dynamics.loop_kernels import GROUND_POSE, LoopJointKind, loop_joint_numbers
 from gauss.dynamics.tree_recursion import link_numbers, link_of
 from gauss.system import Subsystem
-from gauss.system.elimination_cost import elimination_roots
+from gauss.system.elimination_cost import elimination_roots, path_to_ground
 
 MOST_LINK_KINDS = 24  # beyond, links are not distinguished by the zeros among their constants
 DAMPED = float(np.sqrt(MU))  # regularisation: along rows with smaller pivots accelerations are undetermined
@@ -184,10 +184,7 @@ class CallGraph:
 
     def path(self, body: int) -> list[int]:
         """Links from one to the ground."""
-        found = [body]
-        while found[-1] != GROUND:
-            found.append(self.inner[found[-1]])
-        return found
+        return path_to_ground(body, self.inner)
 
     def sum(self, one, other) -> Operand:
         """Record the sum of two arrays."""

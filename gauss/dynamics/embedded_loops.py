@@ -40,8 +40,8 @@ class Front(NamedTuple):
     hubs: list[int]
     pending: list[int]
     factor: LDLT  # factorisation F = L D Lᵀ
-    G: np.ndarray  # (n, 6 + p) l⁻¹ B
-    carried: np.ndarray  # (n, 6 + p) d⁻¹ G
+    G: np.ndarray  # (n, 6 + p) L⁻¹ B
+    carried: np.ndarray  # (n, 6 + p) D⁻¹ G
     inverse_pivots: list  # entries of the diagonal of F over those of D
 
 

@@ -34,7 +34,7 @@ def evaluation_cost(system: System, plan: Plan | Rejected) -> float:
     """Estimated cost [s] of an evaluation by a plan; 0 where no rule states it."""
     key = ("certified",) if plan.dynamics == "certified" else (plan.driver, plan.dynamics)
     fixed, per_body = COSTS.get(key, (0.0, 0.0))
-    if fixed == CALL and cached(system, (_are_of_time,), lambda: _are_of_time(system)):
+    if key == ("compiled loop", "callbacks") and cached(system, (_are_of_time,), lambda: _are_of_time(system)):
         fixed = TIMED_CALL
     return fixed + per_body * system.structure.n_bodies
 

@@ -20,7 +20,7 @@ AXES = np.eye(6)
 class LinkStates(NamedTuple):
     """Links of a loop joint, without the rest of the tree."""
 
-    subsystem: Subsystem  # A subsystem with this joint
+    subsystem: Subsystem  # a subsystem with this joint
     omegas: dict  # omegas, poses: as those of :class:`gauss.dynamics.rnea.KinematicTree`, of its two bodies and the ground
     poses: dict
     links: dict = {}

@@ -7,6 +7,7 @@ from gauss.dynamics.aba import is_zero
 from gauss.dynamics.coupling_constraints import RelationRows
 from gauss.dynamics.embedded_loops import GROUND, LoopRow
 from gauss.dynamics.rnea import KinematicTree
+from gauss.system.elimination_cost import innermost, path_to_ground
 
 CUT = frozenset({"revolute", "prismatic", "ball"})  # inner joints of hubs
 HUB_CHAINS = 4  # chains that meet at a hub, its own inner joint among them; fewer are eliminated faster without one
@@ -22,15 +23,11 @@ class LoopTopology:
 
     def path(self, body: int) -> list[int]:
         """Links from one to the ground."""
-        found = [body]
-        while found[-1] != GROUND:
-            found.append(self.inner[found[-1]])
-        return found
+        return path_to_ground(body, self.inner)
 
     def root(self, bodies) -> int:
         """Innermost common link of some."""
-        paths = [self.path(body) for body in bodies]
-        return next(body for body in paths[0] if all(body in path for path in paths))
+        return innermost([self.path(body) for body in bodies])
 
     def ends(self, constraint, wrenches, tau) -> list[int]:
         """Links whose innermost common one is the root of a row."""

@@ -34,7 +34,6 @@ OPERATIONS = {
     "fnma": "GAUSS_FMA(-{}, {}, {})",
 }
 CONDITIONS = ("less", "less_equal")
-NAME_LENGTH = 16  # hexadecimal digits of the digest of a column
 LETTERS = {"sin": "s", "cos": "c"}  # of the arrays of sines and cosines
 
 
@@ -147,7 +146,7 @@ class CBody:
     def _lookup(self, node: Expression) -> Iterator[str]:
         """Statements that look up a row or an entry in a table."""
         column, x = node.value, self._value(node.operands[0])
-        name, size = f"column_{column.digest[:NAME_LENGTH]}", column.numbers.size
+        name, size = column.name, column.numbers.size
         if column not in self.columns:
             self.columns.add(column)
             yield f"static const double {name}[{size}] = {{{', '.join(map(c_number, column.numbers))}}};"

@@ -1,6 +1,7 @@
 """Estimate of the operations that eliminating the loop constraints of a subsystem takes, before any is traced."""
 
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -81,7 +82,7 @@ def elimination_roots(subsystem) -> list[int]:
 
 def innermost_links(subsystem) -> list[int]:
     """Link of each loop, by loop joint and block of couplings, that is nearest to the ground; the ground itself is one."""
-    return [next(body for body in some[0] if all(body in path for path in some)) for some in _loop_paths(subsystem)]
+    return list(map(innermost, _loop_paths(subsystem)))
 
 
 def _shared_joints(loops, roots) -> int:
@@ -94,16 +95,22 @@ def _shared_joints(loops, roots) -> int:
 def _loop_paths(subsystem) -> list[list[list[int]]]:
     """Links from each body on the joints of each loop joint and block of couplings to the ground."""
     inner = {edge.outer: edge.inner for edge in subsystem.tree}
-
-    def path(body: int) -> list[int]:
-        found = [body]
-        while found[-1] != GROUND:
-            found.append(inner[found[-1]])
-        return found
-
     loops = [{subsystem.joints[index].parent, subsystem.joints[index].child} for index in subsystem.loop_joints]
     loops += [set().union(*(_coupled_bodies(subsystem, int(k)) for k in block)) for block in coupling_blocks(subsystem)]
-    return [[path(body) for body in ends] for ends in loops]
+    return [[path_to_ground(body, inner) for body in ends] for ends in loops]
+
+
+def path_to_ground(body: int, inner: Mapping[int, int]) -> list[int]:
+    """Links from one to the ground, by the inner neighbour of each."""
+    found = [body]
+    while found[-1] != GROUND:
+        found.append(inner[found[-1]])
+    return found
+
+
+def innermost(paths: list[list[int]]) -> int:
+    """First link that some paths to the ground have in common."""
+    return next(body for body in paths[0] if all(body in path for path in paths))
 
 
 def coupling_blocks(subsystem) -> list[np.ndarray]:

@@ -50,8 +50,8 @@ class BodySleepers:
     def kinetic_energies(self, state: State) -> np.ndarray:
         """Kinetic energy (n,) of each body [J]."""
         n, begun = self.count, self.whole.begin(state, 0.0, 0.0)
-        spin, pull, inertia = begun.both[:n, :3, 0], begun.both[:n, 3:6, 0], begun.mass[:, :9].reshape(-1, 3, 3)
-        return 0.5 * ((spin[:, None] @ inertia @ spin[:, :, None]).ravel() + begun.mass[:, 18] * (pull * pull).sum(axis=1))
+        W, u, inertia = begun.both[:n, :3, 0], begun.both[:n, 3:6, 0], begun.mass[:, :9].reshape(-1, 3, 3)
+        return 0.5 * ((W[:, None] @ inertia @ W[:, :, None]).ravel() + begun.mass[:, 18] * (u * u).sum(axis=1))
 
     def _bodies_of(self, key: np.ndarray) -> np.ndarray:
         """Columns (m, 2) of the bodies of contacts by their keys."""

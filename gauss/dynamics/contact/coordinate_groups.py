@@ -4,7 +4,7 @@ Two rates belong together if an inertia, a constraint or a stop couples them, or
 two trees of joints are apart unless a load or a rope connects them. A group under a law of time does not rest by itself.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -114,13 +114,11 @@ def coordinate_groups(system: System, smooth: System, carriers: tuple[int, ...],
 def _groups(traced: TracedMechanism) -> CoordinateGroups:
     terms = _Terms(traced)
     n_v, carriers = terms.n_v, len(traced.carriers)
-    own = [(frozenset((k,)) | _coupled(terms, k), terms.of("tau", k)) for k in range(n_v)]
-    own += [(frozenset((k,)), terms.of("beta", k)) for k in range(n_v)]
+    own = [({k} | _columns(terms, "M", k) | _columns(terms, "B", k), terms.of("tau", k)) for k in range(n_v)]
+    own += [({k}, terms.of("beta", k)) for k in range(n_v)]
     bodies = [(_columns(terms, "J", k), terms.of("bodies", slice(None), k)) for k in range(carriers)]
     rows = [(_columns(terms, "K", k), _of_row(terms, k)) for k in range(len(terms.pattern("K")))]
-    loops = [
-        (_columns(terms, "G", k), _both(terms.of("G", k), terms.of("gamma", k))) for k in range(len(terms.pattern("G")))
-    ]
+    loops = [(_columns(terms, "G", k), _of_all(terms, ("G", "gamma"), k)) for k in range(len(terms.pattern("G")))]
     parts = [*own, *bodies, *rows, *loops]
     root = linked(n_v, (link for rates, found in parts for link in pairwise(sorted(rates | found.rates))))
     numbers, of_rate = np.unique(root, return_inverse=True)
@@ -150,26 +148,19 @@ def bodies_of_groups(system: System, groups: CoordinateGroups) -> list[tuple[str
     return [tuple(names[body] for body in np.flatnonzero(group[:-1] == k)) for k in range(groups.timed.size)]
 
 
-def _columns(terms: _Terms, name: str, k: int) -> frozenset[int]:
-    """Rates that a row, or the rows of a body, act on."""
+def _columns(terms: _Terms, name: str, k: int) -> set[int]:
+    """Rates in a row, or in the rows of a body."""
     pattern = terms.pattern(name)[k].reshape(-1, terms.n_v)
-    return frozenset(np.flatnonzero(pattern.any(axis=0)).tolist())
-
-
-def _coupled(terms: _Terms, k: int) -> frozenset[int]:
-    """Rates that an inertia couples with one, or a loop joint that follows the tree."""
-    return frozenset(_nonzero(terms.pattern("M")[k])) | frozenset(_nonzero(terms.pattern("B")[k]))
-
-
-def _nonzero(row: np.ndarray) -> Iterator[int]:
-    return iter(np.flatnonzero(row).tolist())
+    return set(np.flatnonzero(pattern.any(axis=0)).tolist())
 
 
 def _of_row(terms: _Terms, k: int) -> _Dependence:
     """What a stop, rope or set-valued element depends on."""
-    found = _both(terms.of("rate", k), _both(terms.of("K", k), terms.of("bias", k)))
-    return _both(found, terms.of("gap", k)) if k < len(terms.pattern("gap")) else found
+    names = "rate", "K", "bias", "gap"
+    return _of_all(terms, names if k < len(terms.pattern("gap")) else names[:-1], k)
 
 
-def _both(one: _Dependence, other: _Dependence) -> _Dependence:
-    return _Dependence(one.rates | other.rates, one.timed or other.timed, one.inputs | other.inputs)
+def _of_all(terms: _Terms, names: Iterable[str], k: int) -> _Dependence:
+    """What the k-th rows of some arrays depend on."""
+    rates, timed, inputs = zip(*(terms.of(name, k) for name in names), strict=True)
+    return _Dependence(frozenset().union(*rates), any(timed), frozenset().union(*inputs))

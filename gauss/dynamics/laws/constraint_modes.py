@@ -120,14 +120,14 @@ class ConstraintModes:
     """
 
     def __init__(self, system: System):
-        self.system, self.counts, self.ops, self.about = system, dict[str, int](), list[Condition](), list[str]()
+        self.system, self.counts, self.conditions, self.about = system, dict[str, int](), list[Condition](), list[str]()
         for name, relation in system.scene.relations.items():
             own = Symbols(system, Graph())
             nodes = _conditions(residuals(relation, own), own)
             if not nodes or relation.loses:
                 continue
             self.counts[name] = len(nodes)
-            self.ops += map(Condition.of, nodes)
+            self.conditions += map(Condition.of, nodes)
             self.about += [_about(system, own, node) for node in nodes]
         self.names = tuple(self.counts)
 
@@ -153,7 +153,8 @@ class ConstraintModes:
 
     def _parts(self, mode: Mode | None) -> dict[str, Mode]:
         """Modes of each relation."""
-        values, ends = np.zeros(len(self.ops)) if mode is None else np.array(mode), np.cumsum(list(self.counts.values()))
+        values = np.zeros(len(self.conditions)) if mode is None else np.array(mode)
+        ends = np.cumsum(list(self.counts.values()))
         return {name: tuple(part.tolist()) for name, part in zip(self.names, np.split(values, ends[:-1]), strict=True)}
 
     @cached_property
@@ -163,22 +164,22 @@ class ConstraintModes:
 
     def mode(self, state: State) -> Mode:
         """Mode of a state."""
-        return tuple(op.holds(side) for op, side in zip(self.ops, self.sides(state), strict=True))
+        return tuple(one.holds(side) for one, side in zip(self.conditions, self.sides(state), strict=True))
 
     def margins(self, state: State, mode: Mode) -> np.ndarray:
         """Distance of every condition from its change, on the motion of a mode, negative beyond it, (k,)."""
-        pairs = zip(self.ops, self.sides(state, mode), mode, strict=True)
-        return np.array([op.margin(side, value) for op, side, value in pairs])
+        pairs = zip(self.conditions, self.sides(state, mode), mode, strict=True)
+        return np.array([one.margin(side, value) for one, side, value in pairs])
 
     def beyond(self, state: State, mode: Mode, which: tuple[int, ...]) -> Mode:
         """Mode on the other side of the surfaces of some conditions, near a state."""
         other, sides = list(mode), self.sides(state, mode)
         for k in which:
-            other[k] = self.ops[k].beyond(sides[k], mode[k])
+            other[k] = self.conditions[k].beyond(sides[k], mode[k])
         for k in range(len(other)):  # conditions on what has jumped follow, as that of |x − floor(x)|
             after = self.sides(state, tuple(other))
             if k not in which and abs(after[k] - sides[k]) > CONTINUOUS * self.sizes[k]:
-                other[k] = self.ops[k].holds(after[k])
+                other[k] = self.conditions[k].holds(after[k])
         return tuple(other)
 
     def system_of(self, mode: Mode) -> System:
@@ -227,7 +228,7 @@ class ConstraintModes:
             seen.add(k)
             if step.position or step.velocity:
                 steps[k] = step
-        return steps, len(seen) < len(self.ops)
+        return steps, len(seen) < len(self.conditions)
 
     @cached_property
     def meets_a_jump(self) -> bool:

@@ -74,7 +74,8 @@ class SleepingMotion(ContactMotion):
     def __init__(self, system: System, sleeping: Sleeping, held: bool = False, stepper: Stepper | None = None):
         super().__init__(system, held, stepper)
         self.whole, self.speed, self.duration = self.stepper, sleeping.speed_in(system), sleeping.duration
-        self.sleepers: Any = sleepers_of(self.stepper)
+        whole = self.stepper
+        self.sleepers: Any = TreeSleepers(whole) if isinstance(whole, MechanismStepper) else BodySleepers(whole)
 
     def begin(self, start: State):
         """Begin at a state, with all bodies awake."""
@@ -112,9 +113,9 @@ class SleepingMotion(ContactMotion):
             self.steps, self.state = self.steps + ends.size, State(float(ends[-1]), state.q, state.v)
             return np.column_stack([ends, np.tile(np.concatenate([state.q, state.v, self.work]), (ends.size, 1))])
         rows = super().advance(ends)
-        speed = self.sleepers.speeds(rows[:, 1 + self.system.n_q : -3], self.state)
-        fast = np.flatnonzero((speed > self.speed).any(axis=0))
-        last = len(rows) - 1 - np.argmax((speed > self.speed)[::-1], axis=0)
+        is_fast = self.sleepers.speeds(rows[:, 1 + self.system.n_q : -3], self.state) > self.speed
+        fast = np.flatnonzero(is_fast.any(axis=0))
+        last = len(rows) - 1 - np.argmax(is_fast[::-1], axis=0)
         self.since[fast] = rows[last[fast], 0]
         return rows
 
@@ -135,8 +136,9 @@ class SleepingMotion(ContactMotion):
             v[self.sleepers.rates[k]] = 0.0
         self.state, self.work = State(self.state.t, self.state.q, v), self.work + np.array([0.0, 0.0, lost])
         self._set_asleep(np.where(new, island, self.asleep.island), known)
-        self.events.append(Event(self.state.t, "sleeps", self._names(new), lost))
-        self.first = dict.fromkeys(self._names(new), self.counted) | self.first
+        names = self._names(new)
+        self.events.append(Event(self.state.t, "sleeps", names, lost))
+        self.first = dict.fromkeys(names, self.counted) | self.first
         return True
 
     def _wake(self, pushed: np.ndarray):
@@ -144,8 +146,9 @@ class SleepingMotion(ContactMotion):
         woken = np.isin(self.asleep.island, self.asleep.island[pushed])
         known, self.since[woken] = self._known(), self.state.t
         self._set_asleep(np.where(woken, -1, self.asleep.island), known)
-        self.events.append(Event(self.state.t, "wakes", self._names(woken)))
-        self.times_woken += len(self._names(woken))
+        names = self._names(woken)
+        self.events.append(Event(self.state.t, "wakes", names))
+        self.times_woken += len(names)
 
     def _known(self):
         """Forces on all bodies."""
@@ -228,8 +231,3 @@ class SleepingMotion(ContactMotion):
         return SleepRecord(
             self._names(able), self._names(~able), dict(self.first), self._names(self.asleep.which), self.times_woken
         )
-
-
-def sleepers_of(stepper: FreeBodyStepper | MechanismStepper) -> BodySleepers | TreeSleepers:
-    """What may sleep in the steps of a stepper."""
-    return TreeSleepers(stepper) if isinstance(stepper, MechanismStepper) else BodySleepers(stepper)
