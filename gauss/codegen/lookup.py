@@ -12,7 +12,7 @@ import numpy as np
 from gauss.codegen.expression import Expression
 
 NAME_LENGTH = 16  # hexadecimal digits of the digest of a column in its name in code
-UNIFORM = 0.25  # of a distance: breaks that lie closer to equally spaced ones are found by a division
+SPACING_TOLERANCE = 0.25  # of a distance: breaks that lie closer to equally spaced ones are found by a division
 
 
 class Column:
@@ -49,12 +49,12 @@ class Column:
 
     @cached_property
     def spacing(self) -> float | None:
-        """Distance of breaks that are spaced equally, but for :data:`UNIFORM`; None of others."""
+        """Distance of breaks that are spaced equally, but for :data:`SPACING_TOLERANCE`; None of others."""
         breaks = self.numbers
         if breaks.size < 2 or not 0.0 < (distance := float(breaks[-1] - breaks[0]) / (breaks.size - 1)) < np.inf:
             return None
         off = np.abs(breaks[0] + distance * np.arange(breaks.size) - breaks)
-        return distance if off.max() <= UNIFORM * distance else None
+        return distance if off.max() <= SPACING_TOLERANCE * distance else None
 
     @cached_property
     def _runs(self) -> list[tuple[np.ndarray, np.ndarray]]:

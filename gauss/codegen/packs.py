@@ -12,7 +12,7 @@ from gauss.codegen.expression import Expression
 from gauss.codegen.graph import COMMUTATIVE
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.schedule import Schedule
-from gauss.codegen.superword import SINGLE
+from gauss.codegen.superword import UNPACKABLE
 
 Pack = tuple[Expression, ...]  # one operation, or one input, of each chain
 LEAVES = frozenset({"constant", "symbol"})
@@ -58,7 +58,7 @@ class Packs:
         alike: dict[tuple, dict[int, Pack]] = defaultdict(dict)
         for node in level:
             of_chains = {self._chain[x.index] for x in node.operands if x.index in self._chain}
-            if len(of_chains) == 1 and node.op not in SINGLE:
+            if len(of_chains) == 1 and node.op not in UNPACKABLE:
                 ((kind, lane),) = of_chains
                 own = alike[kind, self._key(node)]
                 own[lane] = (*own.get(lane, ()), node)

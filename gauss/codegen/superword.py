@@ -11,7 +11,7 @@ from gauss.codegen.graph import COMMUTATIVE
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.schedule import Schedule
 
-SINGLE = frozenset({"call", "item", "row", "entry"})  # operations that differ by more than their operands
+UNPACKABLE = frozenset({"call", "item", "row", "entry"})  # operations that differ by more than their operands
 IsomorphicPart = list[Expression]  # operations of a connected component in order, its inputs included
 
 
@@ -21,7 +21,7 @@ def superword_groups(scheduled: Schedule, at_most: int) -> list[list[IsomorphicP
     parts = list(_independent_parts(scheduled.nodes))
     lengths = Counter(map(len, parts))
     for part in parts:  # the key takes time, and most functions are one part
-        if lengths[len(part)] > 1 and all(node.op not in SINGLE for node in part):
+        if lengths[len(part)] > 1 and all(node.op not in UNPACKABLE for node in part):
             groups.setdefault(_shape(part), []).append(part)
     found = [group[k : k + at_most] for group in groups.values() for k in range(0, len(group), at_most)]
     return [group for group in found if len(group) > 1]

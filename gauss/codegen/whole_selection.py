@@ -12,7 +12,7 @@ DEFINITION = "\ndefine internal void "
 CALL = re.compile(r'(?<=call )void (@"[^"]*")\(')
 CONVENTION = "swiftcc "
 MULTIPLY_ADD = '@"llvm.fmuladd.f64"('
-LEAST = 10  # multiply–adds of a function that is handed over: with fewer, nothing is gained
+LEAST_MULTIPLY_ADDS = 10  # multiply–adds of a function that is handed over: with fewer, nothing is gained
 POINTERS = ')* @"', 'ptr @"'  # before the name of a function that is not called there, but passed on
 
 
@@ -37,4 +37,4 @@ def selected_whole(ir_text: str) -> str:
 
 def _gains(function: str) -> bool:
     """Whether a function is one block with multiply–adds enough."""
-    return function.count(MULTIPLY_ADD) >= LEAST and "\n  br " not in function
+    return function.count(MULTIPLY_ADD) >= LEAST_MULTIPLY_ADDS and "\n  br " not in function

@@ -17,8 +17,8 @@ from gauss.scene.stateful_laws import preserved
 from gauss.scene.values import ConstantLaw
 from gauss.system import BoundLoad, System
 
-BUDGET, MOST_CALLS = 1e-3, 50  # s, and calls, of a measurement
-CHECKS = 4e-6  # s an evaluation of the checks that a law of the motion does not switch within a step
+MEASURING_TIME, MOST_CALLS = 1e-3, 50  # s, and calls, of a measurement
+CHECK_COST = 4e-6  # s an evaluation of the checks that a law of the motion does not switch within a step
 
 
 class CallCost(NamedTuple):
@@ -53,7 +53,7 @@ def call_costs(system: System, laws: Laws) -> dict[str, CallCost]:
         beside = max(0.0, _time(lambda: receive(given, target), called) - sum(own)) / max(1, len(called))
     except Exception:  # a law may fail in any way where the motion never comes
         return {bound.load.name: CallCost(TIMED_CALL if timed else CALL, np.nan) for bound in called}
-    share = beside + (0.0 if timed else CHECKS / len(called))
+    share = beside + (0.0 if timed else CHECK_COST / len(called))
     return {bound.load.name: CallCost(one + share, one) for bound, one in zip(called, own, strict=True)}
 
 
@@ -77,7 +77,7 @@ def _time(call: Callable[[], object], bound: Sequence[BoundLoad]) -> float:
         for law in (law for one in bound for law in one.laws):
             kept.enter_context(preserved(law))
         call()  # the first one may compile
-        while len(each) < MOST_CALLS and sum(each) < BUDGET:
+        while len(each) < MOST_CALLS and sum(each) < MEASURING_TIME:
             begin = time.perf_counter()
             call()
             each.append(time.perf_counter() - begin)

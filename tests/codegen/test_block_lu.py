@@ -9,7 +9,7 @@ from llvmlite import ir
 
 from gauss.codegen import machine
 from gauss.codegen.kernels.arrays import Routine
-from gauss.codegen.kernels.block_lu import TOGETHER, write_order, write_solve
+from gauss.codegen.kernels.block_lu import SUPERNODE_PIVOTS, write_order, write_solve
 from gauss.codegen.kernels.vectors import SIX, WIDTH
 
 EXACT = 1e-12  # relative: the matrices are well conditioned
@@ -51,7 +51,7 @@ def call(name: str, *given):
     entry.call(*(one.ctypes.data if isinstance(one, np.ndarray) else one for one in given))
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, TOGETHER + 1, 2 * TOGETHER + 3])
+@pytest.mark.parametrize("n", [1, 2, 7, SUPERNODE_PIVOTS + 1, 2 * SUPERNODE_PIVOTS + 3])
 @pytest.mark.parametrize("graph", [chain, clique, packing, apart])
 def test_solutions_are_those_of_the_dense_matrix(graph, n):
     """Nonsymmetric blocks, chains of pivots shorter and longer than what is eliminated together."""

@@ -10,7 +10,7 @@ from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.object_code import linked, optimised_objects, quick_objects
 from gauss.codegen.tiers import OPTIMISED, QUICK
-from gauss.codegen.whole_selection import CONVENTION, LEAST, selected_whole
+from gauss.codegen.whole_selection import CONVENTION, LEAST_MULTIPLY_ADDS, selected_whole
 
 
 def horner(degree: int, name: str):
@@ -33,25 +33,25 @@ def module(degree: int) -> str:
     return str(writer.module)
 
 
-@pytest.mark.parametrize("degree", [LEAST - 1, LEAST, 5 * LEAST])
+@pytest.mark.parametrize("degree", [LEAST_MULTIPLY_ADDS - 1, LEAST_MULTIPLY_ADDS, 5 * LEAST_MULTIPLY_ADDS])
 def test_only_the_convention_of_long_functions_differs(degree):
     text = module(degree)
     found = selected_whole(text)
     assert found.replace(CONVENTION, "") == text
     defined = re.findall(rf'define internal {CONVENTION}void (@"inner[^"]*")', found)
-    assert len(defined) == (degree >= LEAST)
+    assert len(defined) == (degree >= LEAST_MULTIPLY_ADDS)
     for name in defined:
         assert found.count(f"call {CONVENTION}void {name}(") == text.count(f"call void {name}(") > 0
 
 
 def test_functions_that_are_passed_on_keep_their_convention():
-    text = module(LEAST)
+    text = module(LEAST_MULTIPLY_ADDS)
     (name,) = re.findall(r'define internal void (@"inner[^"]*")', text)
     assert selected_whole(f"{text}\n@table = constant ptr {name}\n").count(CONVENTION) == 0
 
 
 def test_the_results_are_those_of_the_optimised_code():
-    text, given = module(3 * LEAST), np.random.default_rng(0).standard_normal((2, 7))
+    text, given = module(3 * LEAST_MULTIPLY_ADDS), np.random.default_rng(0).standard_normal((2, 7))
     assert CONVENTION in selected_whole(text)
     results = []
     for objects, tier in ((quick_objects(text), QUICK), ([*optimised_objects(text, 1)], OPTIMISED)):

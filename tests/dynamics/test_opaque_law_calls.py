@@ -161,7 +161,6 @@ def test_the_cost_of_a_law_is_stated_with_its_own_part(law):
     system = _pushed(law)
     (cost,) = call_costs(system, Laws(system)).values()
     assert 0.0 < cost.own <= cost.whole
-    assert "own code" in str(cost)
 
 
 def test_a_law_without_a_value_at_the_start_has_an_estimated_cost():
@@ -170,4 +169,3 @@ def test_a_law_without_a_value_at_the_start_has_an_estimated_cost():
     (cost,) = call_costs(system, Laws(system)).values()
     assert cost.whole > 0.0
     assert math.isnan(cost.own)
-    assert "estimated" in str(cost)

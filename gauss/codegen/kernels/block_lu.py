@@ -13,9 +13,9 @@ from gauss.codegen import INTEGER, POINTER
 from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
 from gauss.codegen.kernels.vectors import BLOCK, ROW, SIX, WIDTH, TwistRows, write_apply, write_inverse, write_product
 
-TOGETHER = 16  # most pivots that are eliminated together
-FEW = 4  # neighbours of a pivot: with fewer, the next one does not gain by waiting for it
-TILE = 8  # columns that are updated together: their blocks of the pivots stay in the nearest cache
+SUPERNODE_PIVOTS = 16  # most pivots that are eliminated together
+LEAST_NEIGHBOURS = 4  # neighbours of a pivot: with fewer, the next one does not gain by waiting for it
+TILE_COLUMNS = 8  # columns that are updated together: their blocks of the pivots stay in the nearest cache
 
 
 def write_order(module: ir.Module) -> ir.Function:
@@ -91,8 +91,8 @@ class _SolveWriter:
         r = self.r = subroutine(module, "solve_blocks", [INTEGER, *[INTEGERS] * 4, *[POINTER] * 2])
         (self.n,), (self.slot, self.order, self.start, self.listed, self.A, self.x) = r.integers, r.arrays
         self.y = r.buffer(WIDTH)
-        self.left, self.beside, self.above = (r.buffer(TOGETHER, INTEGER) for _ in range(3))
-        self.right = r.buffer(TOGETHER * TILE, INTEGER)
+        self.left, self.beside, self.above = (r.buffer(SUPERNODE_PIVOTS, INTEGER) for _ in range(3))
+        self.right = r.buffer(SUPERNODE_PIVOTS * TILE_COLUMNS, INTEGER)
 
     def write(self) -> ir.Function:
         r, first = self.r, self.r.variable(0, INTEGER)
@@ -121,9 +121,9 @@ class _SolveWriter:
     def _end_of(self, first: Value) -> Value:
         """End of the pivots from ``first`` on of which each has the next one and its neighbours as neighbours."""
         r, end, goes_on = self.r, self.r.variable(first + 1, INTEGER), self.r.variable(0, INTEGER)
-        goes_on[0] = r.as_integer(self._count(first) >= FEW)
+        goes_on[0] = r.as_integer(self._count(first) >= LEAST_NEIGHBOURS)
         with r.loop() as leave_if:
-            leave_if((goes_on[0] < 1) | (end[0] >= self.n) | (end[0] - first >= TOGETHER))
+            leave_if((goes_on[0] < 1) | (end[0] >= self.n) | (end[0] - first >= SUPERNODE_PIVOTS))
             k, goes_on[0] = end[0], 0
             with r.when((self._count(k) + 1 <= self._count(k - 1)) & (self._count(k - 1) <= self._count(k) + 1)):
                 with r.when(self.slot[self.order[k - 1] * self.n + self.order[k]] > 0):
@@ -172,17 +172,17 @@ class _SolveWriter:
         tile = r.variable(begin, INTEGER)
         with r.loop() as leave_if:
             leave_if(tile[0] >= last)
-            stop = r.variable(tile[0] + TILE, INTEGER)
+            stop = r.variable(tile[0] + TILE_COLUMNS, INTEGER)
             with r.when(stop[0] > last):
                 stop[0] = last
             with r.each(stop[0], tile[0]) as b, r.each(count) as k:
-                self.right[(b - tile[0]) * TOGETHER + k] = self._place(self.order[first + k], self.listed[b])
+                self.right[(b - tile[0]) * SUPERNODE_PIVOTS + k] = self._place(self.order[first + k], self.listed[b])
             with r.each(last, begin) as a:
                 i = self.listed[a]
                 with r.each(count) as k:
                     self.left[k] = self._place(i, self.order[first + k])
                 with r.each(stop[0], tile[0]) as b:
-                    right = self.right.after((b - tile[0]) * TOGETHER)
+                    right = self.right.after((b - tile[0]) * SUPERNODE_PIVOTS)
                     r.call(self.update, count, self._block(i, self.listed[b]), self.A, self.A, self.left, right)
             tile[0] = stop[0]
 

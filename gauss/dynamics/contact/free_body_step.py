@@ -23,10 +23,10 @@ from gauss.dynamics.contact.impact import resting
 from gauss.dynamics.contact.moreau_step import MIDPOINT
 from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection
-from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
+from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP, penetration_error
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable
-from gauss.errors import SimulationError, StateError
+from gauss.errors import SimulationError
 from gauss.system import State, System
 
 # Newton steps with hardly any regularisation nearly always converge; where they cycle, much of it leads near the solution.
@@ -334,11 +334,7 @@ class FreeBodyStepper:
         near = self._near(state, self.begin(state, 0.0, 0.0), 0.0, 0.0, 0.0)
         worst = int(np.argmin(near.gap)) if near.gap.size else 0
         if near.gap.size and near.gap[worst] < -accepted * self.system.scale.length:
-            name = self.table.contacts[near.law[worst]].name
-            raise StateError(
-                f"t = {state.t:.6g} s: {-near.gap[worst]:.3g} [m, rad] inside of {name!r}; move it out with scene.start, "
-                "or begin at gauss.resolve_overlaps(system)."
-            )
+            raise penetration_error(state.t, -near.gap[worst], self.table.contacts[near.law[worst]].name)
 
 
 def rates(near: NearContacts, twists: np.ndarray) -> np.ndarray:

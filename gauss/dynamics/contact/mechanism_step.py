@@ -29,7 +29,7 @@ from gauss.dynamics.contact.mechanism_step_parts import FreeStep, MechanismStep,
 from gauss.dynamics.contact.moreau_step import MIDPOINT, MISSED_CLOSING_RATE
 from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection, near_pairs
-from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP
+from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP, penetration_error
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable, carriers_of
 from gauss.dynamics.contact.step_doubts import JAMMED_RESPONSE, paradoxes_of_step, refuse_jam
@@ -38,7 +38,7 @@ from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
-from gauss.errors import SimulationError, StateError
+from gauss.errors import SimulationError
 from gauss.system import State, System
 
 
@@ -380,7 +380,4 @@ class MechanismStepper:
         worst = int(np.argmax(depth)) if depth.size else 0
         if depth.size and not depth[worst] <= accepted:
             inside = -np.concatenate([near.gap, begun.terms.gap])[worst]
-            raise StateError(
-                f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.rows.name(near, worst)!r}; "
-                "move it out with scene.start, or begin at gauss.resolve_overlaps(system)."
-            )
+            raise penetration_error(state.t, inside, self.rows.name(near, worst))

@@ -27,7 +27,7 @@ from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
 from gauss.dynamics.contact.implicit_damping import ImplicitDamping
-from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps
+from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps, penetration_error
 from gauss.dynamics.contact.paradox import (
     MOST_CONTACTS,
     NEGATIVE,
@@ -312,9 +312,7 @@ class MoreauStepper:
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -accepted:
             inside = -width[worst] * gap_scales(self.system)[worst]
-            raise StateError(
-                f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
-            )
+            raise penetration_error(state.t, inside, self.names[worst], remedy="")
 
     def _rows(self, active_gaps: np.ndarray) -> tuple[np.ndarray, ContactLaws]:
         """Rows of the active gaps, of their friction, and of all set-valued elements, in order; and their laws."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.dynamics.contact_terms import ContactTerms
-from gauss.errors import SimulationError
+from gauss.errors import SimulationError, StateError
 from gauss.scene import Box, Contact, Scene
 from gauss.system import System, guards
 
@@ -11,6 +11,7 @@ START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
 # A step closes gaps by their rates, and leaves half of h² times what curvature adds to their accelerations: up to (h ω)² of
 # the scale for points that turn at ω. Twice that is accepted, for the rates were larger before the step.
 LEFT_BY_STEPS, MOST_LEFT = 2.0, 0.02
+RESOLVED = ", or begin at gauss.resolve_overlaps(system)"  # what else removes penetration
 UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
 
 
@@ -29,6 +30,11 @@ def left_by_steps(system: System, v: np.ndarray, h: float) -> float:
         Length of a step [s].
     """
     return START_OVERLAP + min(LEFT_BY_STEPS * (h * system.scale.fastest(v)) ** 2, MOST_LEFT)
+
+
+def penetration_error(t: float, inside: float, name: str, remedy: str = RESOLVED) -> StateError:
+    """Error of a penetration [m, rad] at the start t [s], by the name of the contact, stop or rope."""
+    return StateError(f"t = {t:.6g} s: {inside:.3g} [m, rad] inside of {name!r}; move it out with scene.start{remedy}.")
 
 
 class UnseenOverlaps:

@@ -75,8 +75,7 @@ class PairKernelRun(PythonRun):
         sleeping, held = problem.sleeping, self.held is not None
         self.pool = stepper_pool(system, held)
         self.stepper = own = self.pool.take()
-        asleep = None if sleeping is None else SleepingMotion(system, sleeping, held, own)
-        self.motion = asleep or ContactMotion(system, held, own)
+        self.motion = ContactMotion(system, held, own) if sleeping is None else SleepingMotion(system, sleeping, held, own)
         self.engine = PairKernelEngine(self.stepper)
         super().__init__(system, TIME_STEPPING, self.engine, None, problem.step, problem.end, switching=problem.switching)
         self.h = problem.step or 0.0  # a fixed step is always given

@@ -67,15 +67,14 @@ class SleepingMotion(ContactMotion):
         When they are put to rest.
     held : bool
         Whether the inputs of the scene are held in each step.
-    stepper : FreeBodyStepper or MechanismStepper, optional
+    stepper : FreeBodyStepper or MechanismStepper
         Steps of this motion alone.
     """
 
-    def __init__(self, system: System, sleeping: Sleeping, held: bool = False, stepper: Stepper | None = None):
+    def __init__(self, system: System, sleeping: Sleeping, held: bool, stepper: Stepper):
         super().__init__(system, held, stepper)
-        self.whole, self.speed, self.duration = self.stepper, sleeping.speed_in(system), sleeping.duration
-        whole = self.stepper
-        self.sleepers: Any = TreeSleepers(whole) if isinstance(whole, MechanismStepper) else BodySleepers(whole)
+        self.whole, self.speed, self.duration = stepper, sleeping.speed_in(system), sleeping.duration
+        self.sleepers: Any = TreeSleepers(stepper) if isinstance(stepper, MechanismStepper) else BodySleepers(stepper)
 
     def begin(self, start: State):
         """Begin at a state, with all bodies awake."""
