@@ -114,7 +114,11 @@ class LoadForces:
 
     def write_of_time(self, given: int, found: int):
         """The same of laws of the time alone, for a state at an address: they need no objects of it."""
-        numbers, place = self._rooms.pop() if self._rooms else self._new_room()
+        try:
+            numbers, place = self._rooms.pop()
+        except IndexError:  # not asked for before: another thread may take the last one in between
+            numbers = self.room()
+            place = address(numbers)
         ctypes.memmove(place, given, 8 * self.n_in)
         t, end = (numbers.item(0),), self.n_in
         for law, what, size in self._timed:
@@ -122,10 +126,6 @@ class LoadForces:
             end += size
         self._of_values.at(place, found)
         self._rooms.append((numbers, place))
-
-    def _new_room(self) -> tuple[np.ndarray, int]:
-        numbers = self.room()
-        return numbers, address(numbers)
 
     def _of_others(self, motion: Kinematics, inputs: np.ndarray) -> np.ndarray:
         """The same of loads that are neither drives nor forces."""
