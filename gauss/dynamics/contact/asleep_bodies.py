@@ -53,13 +53,9 @@ class BodySleepers:
         W, u, inertia = begun.both[:n, :3, 0], begun.both[:n, 3:6, 0], begun.mass[:, :9].reshape(-1, 3, 3)
         return 0.5 * ((W[:, None] @ inertia @ W[:, :, None]).ravel() + begun.mass[:, 18] * (u * u).sum(axis=1))
 
-    def _bodies_of(self, key: np.ndarray) -> np.ndarray:
-        """Columns (m, 2) of the bodies of contacts by their keys."""
-        return self.whole.table.body[np.column_stack(self.whole.table.pair(key))].reshape(-1, 2)
-
     def islands(self, known: KnownContacts) -> np.ndarray:
         """Number (n,) of the island of each body, by contacts that bear a force; −1 of bodies without one."""
-        bodies = self._bodies_of(known.key[known.force[:, 0] > 0.0])
+        bodies = self.whole.table.bodies(known.key[known.force[:, 0] > 0.0])
         root = linked(self.count, bodies[(bodies < self.count).all(axis=1)].tolist())
         touched, found = np.unique(bodies[bodies < self.count]), np.full(self.count, -1)
         found[touched] = root[touched]
@@ -68,7 +64,7 @@ class BodySleepers:
     def split(self, known: KnownContacts, asleep: np.ndarray) -> tuple[KnownContacts, KnownContacts]:
         """Contacts of bodies that are awake, and those of bodies asleep, of the known contacts of all."""
         fixed = np.zeros(self.whole.fixed.shape[1], dtype=bool)
-        rests = np.append(asleep, fixed)[self._bodies_of(known.key)].any(axis=1)
+        rests = np.append(asleep, fixed)[self.whole.table.bodies(known.key)].any(axis=1)
         return (
             KnownContacts(known.key[~rests], known.force[~rests], known.expected[:, ~asleep]),
             KnownContacts(known.key[rests], known.force[rests], known.expected[:, asleep]),
@@ -117,10 +113,7 @@ class BodySleepers:
 
     def closed(self, known: KnownContacts, asleep: np.ndarray) -> np.ndarray:
         """Whether elements of the scene have contacts that bear a force on the bodies asleep."""
-        found = np.zeros(len(self.whole.elements), dtype=bool)
-        first, second = self.whole.table.pair(known.key[known.force[:, 0] > 0.0])
-        found[self.whole.table.law[first, second] - 1] = True
-        return found
+        return self.whole.table.closed(known.key, known.force)
 
     def reached(self, before: np.ndarray, inputs: np.ndarray) -> np.ndarray:
         """Bodies that changed inputs act on: none."""

@@ -80,8 +80,7 @@ class TreeSleepers:
 
     def _groups_of(self, key: np.ndarray) -> np.ndarray:
         """Groups (m, 2) of the bodies of contacts by their keys; −1 of those that stand still."""
-        table = self.whole.table
-        return self.of_body[table.body[np.column_stack(table.pair(key))].reshape(-1, 2)]
+        return self.of_body[self.whole.table.bodies(key)]
 
     def islands(self, known: KnownForces) -> np.ndarray:
         """Number (n,) of the island of each group, by contacts and stops that bear a force; −1 of groups without one."""
@@ -144,8 +143,7 @@ class TreeSleepers:
     def closed(self, known: KnownForces, asleep: np.ndarray) -> np.ndarray:
         """Whether elements of the scene bear a force on the groups asleep, or are their dry frictions."""
         found = np.zeros(len(self.rows.elements), dtype=bool)
-        first, second = self.whole.table.pair(known.key[known.force[:, 0] > 0.0])
-        found[self.whole.table.law[first, second] - 1] = True
+        found[: self.laws] = self.whole.table.closed(known.key, known.force)
         rows = np.flatnonzero(self._asleep_rows(asleep))
         found[self.laws + rows] = (known.others > 0.0) | (rows >= self.gaps)
         return found

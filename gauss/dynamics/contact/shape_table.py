@@ -153,6 +153,16 @@ class ShapeTable:
         first, second = np.divmod(key // MOST_FEATURES, len(self.parts))
         return first, second
 
+    def bodies(self, key: np.ndarray) -> np.ndarray:
+        """Bodies (m, 2) of contacts by their keys."""
+        return self.body[np.column_stack(self.pair(key))].reshape(-1, 2)
+
+    def closed(self, key: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Whether each contact of the scene bears a force, by the keys and forces (m, 3) of its points."""
+        found = np.zeros(len(self.contacts), dtype=bool)
+        found[self.law[self.pair(key[force[:, 0] > 0.0])] - 1] = True
+        return found
+
     def gap_places(self, key: np.ndarray) -> np.ndarray:
         """Places of contacts among all gap functions of the scene, by their keys."""
         first, second = self.pair(key)
