@@ -100,7 +100,7 @@ def test_parameters_that_are_not_identified_are_named():
     t, measured = motion(scene, 0.5, ("A",), 11)
     with pytest.raises(StateError, match="identify 1 combination.*rod.mass, gravity.y"):
         gauss.fit_motion(scene, t, measured, ["rod.mass", "gravity.y"], step=0.05)
-    with pytest.raises(StateError, match="'rod.inertia\\[2\\]' alone can be neither"):
+    with pytest.raises(StateError, match="'rod.inertia\\[2\\]'"):
         gauss.fit_motion(scene, t, measured, ["rod.mass", "rod.inertia[2]"], step=0.05)
     with pytest.raises(StateError, match="gravity.z"):
         gauss.fit_motion(scene, t, measured, {"gravity.y": -9.0, "gravity.z": 0.1}, step=0.05)
