@@ -7,6 +7,7 @@ import pytest
 
 import gauss
 from gauss.errors import SimulationError
+from gauss.scene import Input
 from gauss.scene.toml import from_tables, tables, write_toml
 
 ROUNDING = 1e-11  # of states over a few tenths of a second; adaptive steps restart at other lengths
@@ -153,3 +154,19 @@ def test_outputs_are_derivatives_of_each_other():
         assert np.abs(slope - rate[1:-1]).max() <= FORMULA * np.abs(rate).max()
     felt = np.einsum("kji,kj->ki", motion.output("axes"), a - np.array(scene.gravity))
     np.testing.assert_allclose(motion.output("accelerometer"), felt, rtol=0.0, atol=ROUNDING)
+
+
+@pytest.mark.slow  # two motions are compiled
+@pytest.mark.parametrize("integrator", ["dop853", "rk4"])
+def test_the_effort_of_an_input_may_change_from_one_motion_to_the_next(integrator):
+    """A motion of a system compiled before is that of the scene compiled anew."""
+    gain = np.array([1.0])
+    scene = gauss.load("pendulum")
+    scene.add(Input("motor", next(iter(scene.joints)), effort=lambda u, t, motion: u * gain[0]))
+    options = {"integrator": integrator, "control": lambda t, q, v: [1.0], "rate": 100.0, "progress": False}
+    options |= {"step": 1e-3} if integrator == "rk4" else {}
+    system, ends = gauss.compile_scene(scene), []
+    for gain[0] in (1.0, 20.0):
+        ends.append(gauss.simulate(system, 0.1, **options).q[-1])
+    assert np.array_equal(ends[1], gauss.simulate(scene, 0.1, **options).q[-1])
+    assert not np.array_equal(*ends)
