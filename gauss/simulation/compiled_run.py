@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import content_key
 from gauss.codegen.kernels import ENERGY_RECORD, Control, Loop, LoopStatus
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
@@ -91,7 +90,7 @@ class CompiledRun:
         self.rows: list[np.ndarray] = []
         self.held = problem.held
         self.dynamics, self.method_key = dynamics, method_key(problem.method)
-        self.key: tuple[Hashable, ...] = (dynamics, self.drift, problem.laws.key, self._held_key())
+        self.key: tuple[Hashable, ...] = (dynamics, self.drift, problem.laws.key, self.held is not None)
         self.common: MethodOnSystem = self._on_demand((MethodOnSystem, self.method_key), self._on_system)
         self.program, self.method_state, self.budget, *_ = self.common
         self.layout = self.program.layout
@@ -105,11 +104,6 @@ class CompiledRun:
     def certified(self) -> CertifiedEngine:
         """Engine that confirms accelerations; most runs need none."""
         return CertifiedEngine("auto", self.drift.gains)
-
-    def _held_key(self) -> Hashable:
-        """Whether inputs are held, and the content of their laws: a law may change from one motion to the next."""
-        laws = [one for one in self.system.scene.inputs.values() if not one.is_plain] if self.held else []
-        return content_key(tuple(laws)) if laws else self.held is not None
 
     def _on_system(self) -> MethodOnSystem:
         """What depends on the method and the system alone."""

@@ -1,12 +1,12 @@
 """Laws of loads in compiled dynamics: traced laws become machine code, opaque ones are Python callbacks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from hashlib import sha256
 
 import numpy as np
 
-from gauss.codegen import Expression, Function, Graph, branches, numbers_of
+from gauss.codegen import Expression, Function, Graph, branches, content_key, numbers_of
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.store import cached
 from gauss.scene.stateful_laws import preserved
@@ -39,8 +39,8 @@ class Laws:
         Loads with traced laws, which become machine code, and loads with opaque laws.
     reasons : dict
         Why the law of a load is opaque, {name of the load: reason}.
-    key : str
-        Key of the set of traced laws: a law may have changed since it was traced.
+    key : Hashable
+        Key of the set of traced laws, those of inputs included: a law may have changed since it was traced.
     motion : Kinematics or None
         The system in symbols, where there are laws.
     functions : list of (str, Function)
@@ -54,7 +54,7 @@ class Laws:
         self.traced: list[BoundLoad] = []
         self.called: list[BoundLoad] = []
         self.reasons: dict[str, str] = {}
-        self.key = ""
+        key = ""
         self.functions: list[tuple[str, Function]] = []
         self.motion: Kinematics | None = None
         self.of_smooth: Laws | None = None
@@ -64,12 +64,14 @@ class Laws:
             functions = [function for function in found if isinstance(function, Function)]
             if len(functions) == len(found):
                 self.traced.append(bound)
-                self.key += "".join(f"load {number}: {_digest(system, function)}; " for function in functions)
+                key += "".join(f"load {number}: {_digest(system, function)}; " for function in functions)
                 self.functions += [(bound.load.name, function) for function in functions]
             else:
                 self.called.append(bound)
                 self.reasons[bound.load.name] = next(reason for reason in found if isinstance(reason, str))
         self.probed.clear()
+        inputs = tuple(content_key(given) for given in system.scene.inputs.values() if not given.is_plain)
+        self.key: Hashable = (key, inputs) if inputs else key
 
     def _traced(self, law) -> Function | str:
         """Traced law, or the reason why it is opaque."""
