@@ -28,7 +28,6 @@ log: Callable[..., Any]
 sqrt: Callable[..., Any]
 floor: Callable[..., Any]
 sin, cos, tan, exp, log, sqrt, floor = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt, np.floor
-arctan2 = atan2 = np.arctan2
 
 __all__ = [
     "abs",
@@ -51,6 +50,31 @@ __all__ = [
     "tanh",
     "where",
 ]
+
+
+def arctan2(y, x):
+    """Return the angle of the point (x, y) in the plane [rad], −π … π, entry by entry.
+
+    Parameters
+    ----------
+    y, x : float, ndarray or Expression
+        Second and first coordinate.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of their common shape.
+
+    Examples
+    --------
+    >>> from gauss import math
+    >>> float(math.arctan2(0.0, 1.0))
+    0.0
+    """
+    return _atan2(y, x) if _traced(y, x) else np.arctan2(y, x)
+
+
+atan2 = arctan2
 
 
 def minimum(x, y):
@@ -327,5 +351,5 @@ def _select(condition, x, y):
     return graph_of((condition, x, y)).select(condition, x, y)
 
 
-_minimum, _maximum = _binary("min", min), _binary("max", max)
+_minimum, _maximum, _atan2 = _binary("min", min), _binary("max", max), _binary("atan2", np.arctan2)
 _where = np.frompyfunc(_select, 3, 1)

@@ -14,6 +14,7 @@ LAWS = {
     "abs": math.abs,
     "sign": math.sign,
     "tanh": math.tanh,
+    "angles": lambda x: math.atan2(x, 2.0) + math.atan2(1.0, x),
     "power": lambda x: math.abs(x) ** 1.5 + 2.0**x,
     "comparison as a number": lambda x: 2.0 * (x > 0.0),
     "extremes": lambda x: math.maximum(x, 2.0 * x) - math.minimum(0.5, x),

@@ -61,7 +61,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
     require(trajectory, (Trajectory,), "contact_forces")
     mine = _gaps_of(trajectory, name)
     if trajectory.step is not None:
-        return np.array([normal[mine] for normal, _ in _parts(trajectory)]).reshape(-1, len(mine))
+        return _of_steps(trajectory).of(mine)[0]
     found = kept_with(trajectory, "contact forces", backend, lambda: _of_all(trajectory, backend))
     for k, (solution, which) in found.solutions.items():
         if np.isin(which, mine).any():
@@ -138,7 +138,7 @@ def friction_forces(trajectory: Trajectory, name: str) -> Shaped[np.ndarray, "k 
     mine = _gaps_of(trajectory, name)
     if trajectory.step is None:
         raise StateError("only integrator='time_stepping' knows friction of contacts; this motion was made by another.")
-    return np.array([friction[mine] for _, friction in _parts(trajectory)]).reshape(-1, len(mine), 3)
+    return _of_steps(trajectory).of(mine)[1]
 
 
 def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
@@ -150,7 +150,43 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
     return [places[side] for side in contacts[name].sides(system.scene)]
 
 
+class StepForces(NamedTuple):
+    """Forces of the gaps that bear one, over the step that follows each sample; of n gaps in k samples."""
+
+    samples: int  # k
+    sample: np.ndarray  # sample, gap (n,): indices of the sample and of the gap
+    gap: np.ndarray
+    normal: np.ndarray  # (n,) [N]
+    friction: np.ndarray  # (n, 3) [N], world axes
+
+    def of(self, mine: list[int]) -> tuple[np.ndarray, np.ndarray]:
+        """Normal forces (k, m) and friction forces (k, m, 3) of m gaps."""
+        normal, friction = np.zeros((self.samples, len(mine))), np.zeros((self.samples, len(mine), 3))
+        for column, gap in enumerate(mine):
+            here = self.gap == gap
+            normal[self.sample[here], column] = self.normal[here]
+            friction[self.sample[here], column] = self.friction[here]
+        return normal, friction
+
+
+def _of_steps(trajectory: Trajectory) -> StepForces:
+    """Forces of all gaps over all steps, found once for a motion: each step has the forces of all its contacts."""
+    return kept_with(trajectory, "forces of steps", "auto", lambda: _solve_steps(trajectory))
+
+
+def _solve_steps(trajectory: Trajectory) -> StepForces:
+    sample, gap, normals, frictions = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], [np.zeros(0)], [np.zeros((0, 3))]
+    for k, (normal, friction) in enumerate(_parts(trajectory)):
+        bearing = np.flatnonzero((normal != 0.0) | (friction != 0.0).any(axis=1))
+        sample.append(np.full(bearing.size, k))
+        gap.append(bearing)
+        normals.append(normal[bearing])
+        frictions.append(friction[bearing])
+    return StepForces(len(trajectory), *(np.concatenate(part) for part in (sample, gap, normals, frictions)))
+
+
 def _parts(trajectory: Trajectory):
+    """Normal forces (g,) and friction forces (g, 3) of all gaps, sample by sample."""
     plan = trajectory.stats.plan
     if plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None:
         with lent_stepper(trajectory.system, removal=trajectory.removal) as stepper:

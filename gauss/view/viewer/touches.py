@@ -51,6 +51,8 @@ def _forces(motion: Trajectory, contact: Contact, places: list[FeaturePair]) -> 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NonUniqueReactionWarning)  # a picture sizes nothing
         normal = contact_forces(motion, contact.name)
-        along = np.array([[place.touch(at).normal for place in places] for at in motion.motions], dtype=float)
+        along = np.zeros((*normal.shape, 3))
+        for k in np.flatnonzero(normal.any(axis=1)):  # most pairs of many bodies bear nothing most of the time
+            along[k] = [place.touch(motion.motions[k]).normal for place in places]
         sliding = friction_forces(motion, contact.name) if motion.step is not None else 0.0
     return normal[..., None] * along + sliding
