@@ -124,6 +124,7 @@ class System(NamedPlaces, StateFunctions):
     def is_plain(self) -> bool:
         """Whether nothing in it switches, jumps or may change: joints, couplings, and loads without functions or breaks."""
         given = any(bool(bound.functions) or hasattr(bound.load, "breaks") and bound.load.breaks for bound in self.loads)
+        given = given or not all(one.is_plain for one in self.scene.inputs.values())
         return not (given or self.scene.relations or self.nonsmooth)
 
     @cached_property
