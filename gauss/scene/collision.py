@@ -1,6 +1,7 @@
 """Collision shapes of bodies: sphere, capsule, box, points such as feet, and the half-space."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from typing import ClassVar
 
@@ -8,6 +9,8 @@ import numpy as np
 
 from gauss.errors import SceneError
 from gauss.scene import values
+
+KEPT = 4096  # rotations of boxes
 
 
 @dataclass(frozen=True)
@@ -155,13 +158,21 @@ class Box(Collider):
     @property
     def axes(self) -> np.ndarray:
         """Rotation (3, 3) from its edges to the frame of the body."""
-        return values.rotation_matrix(self.rotation)
+        return _axes(self.rotation)
 
     @property
     def corners(self) -> np.ndarray:
         """Its eight corners."""
         half = np.array(list(product((-0.5, 0.5), repeat=3))) * self.size
         return np.array(self.at) + half @ self.axes.T
+
+
+@lru_cache(maxsize=KEPT)
+def _axes(rotation: tuple) -> np.ndarray:
+    """Rotation matrix (3, 3) of a box, not to be written to: gap functions ask for it in every state."""
+    found = values.rotation_matrix(rotation)
+    found.flags.writeable = False
+    return found
 
 
 @dataclass(frozen=True)

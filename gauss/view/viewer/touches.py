@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.analysis import contact_forces, friction_forces
 from gauss.errors import NonUniqueReactionWarning
-from gauss.scene import Contact, FeaturePair
+from gauss.scene import Box, Capsule, Collider, Contact, FeaturePair, Points, Sphere
 from gauss.simulation import Trajectory
 
 NEAR = 1e-3  # of the size of a mechanism: what is no farther apart is drawn as touching
@@ -38,12 +38,32 @@ def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[Touch
         if not isinstance(contact, Contact):
             continue
         places = contact.places(scene)
+        bounds = [_ball_around(scene.shapes[name]) for name in (contact.shape, contact.other)]
+        near = [k for k, at in enumerate(pictures.motions) if not _are_apart(bounds, at, NEAR * size)]
         for place, force in zip(places, _forces(motion, contact, places).transpose(1, 0, 2), strict=True):
-            here = [place.touch(at) for at in pictures.motions]
-            gap = np.array([touch.gap for touch in here], dtype=float)
+            points, gap = np.zeros((len(pictures.t), 3)), np.full(len(pictures.t), np.inf)
+            for k in near:
+                gap[k], points[k], _ = place.touch(pictures.motions[k])
             smooth = np.stack([np.interp(pictures.t, motion.t, part) for part in force.T], axis=1)
-            found.append(TouchingPoint(np.array([touch.place for touch in here], dtype=float), smooth, gap < NEAR * size))
+            found.append(TouchingPoint(points, smooth, gap < NEAR * size))
     return found
+
+
+def _ball_around(shape: Collider) -> tuple[str, np.ndarray, float] | None:
+    """Body, centre [m] in its frame, and radius [m] of a ball around a shape with corners; None of other shapes."""
+    if not isinstance(shape, Box | Capsule | Points | Sphere):
+        return None
+    corners = np.reshape(np.asarray(shape.corners, dtype=float), (-1, 3))
+    centre = corners.mean(axis=0)
+    return shape.body, centre, float(np.linalg.norm(corners - centre, axis=1).max()) + shape.radius
+
+
+def _are_apart(bounds: list, at, distance: float) -> bool:
+    """Whether the balls around two shapes are farther apart than a distance: most pairs of many bodies never meet."""
+    if None in bounds:
+        return False
+    (one, x, radius), (other, y, other_radius) = bounds
+    return np.linalg.norm(at.position(one, x) - at.position(other, y)) > radius + other_radius + distance
 
 
 def _forces(motion: Trajectory, contact: Contact, places: list[FeaturePair]) -> np.ndarray:
@@ -52,7 +72,7 @@ def _forces(motion: Trajectory, contact: Contact, places: list[FeaturePair]) -> 
         warnings.simplefilter("ignore", NonUniqueReactionWarning)  # a picture sizes nothing
         normal = contact_forces(motion, contact.name)
         along = np.zeros((*normal.shape, 3))
-        for k in np.flatnonzero(normal.any(axis=1)):  # most pairs of many bodies bear nothing most of the time
-            along[k] = [place.touch(motion.motions[k]).normal for place in places]
+        for k, place in np.argwhere(normal).tolist():  # most places of many bodies bear nothing most of the time
+            along[k, place] = places[place].touch(motion.motions[k]).normal
         sliding = friction_forces(motion, contact.name) if motion.step is not None else 0.0
     return normal[..., None] * along + sliding
