@@ -18,7 +18,7 @@ def _method(system) -> list[str]:
     lines, plans = list[str](), system.dynamics.plans(system)
     for what, plan in plans.items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
-        if isinstance(plan, SimulationError):
+        if isinstance(plans["motions"], SimulationError):  # motions go by time stepping, which evaluates none
             continue
         cost, ratio = system.dynamics.cost(system, plan)
         if ratio > CLOSE_ROUTES:

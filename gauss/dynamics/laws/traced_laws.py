@@ -70,8 +70,7 @@ class Laws:
                 self.called.append(bound)
                 self.reasons[bound.load.name] = next(reason for reason in found if isinstance(reason, str))
         self.probed.clear()
-        inputs = tuple(content_key(given) for given in system.scene.inputs.values() if not given.is_plain)
-        self.key: Hashable = (key, inputs) if inputs else key
+        self.key = _with_inputs(key, system)
 
     def _traced(self, law) -> Function | str:
         """Traced law, or the reason why it is opaque."""
@@ -96,6 +95,12 @@ class Laws:
     def outputs(self) -> list[Expression]:
         """Results of the traced laws, in one graph."""
         return [entry for _, function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
+
+
+def _with_inputs(key: str, system: System) -> Hashable:
+    """Key with the content of the laws of inputs, where they have some."""
+    inputs = tuple(content_key(given) for given in system.scene.inputs.values() if not given.is_plain)
+    return (key, inputs) if inputs else key
 
 
 def needs_poses(load) -> bool:
