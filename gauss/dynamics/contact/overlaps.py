@@ -29,7 +29,8 @@ def left_by_steps(system: System, v: np.ndarray, h: float) -> float:
     h : float
         Length of a step [s].
     """
-    return START_OVERLAP + min(LEFT_BY_STEPS * (h * system.scale.fastest(v)) ** 2, MOST_LEFT)
+    turned = min(h * system.scale.fastest(v), 1.0)  # more would leave more than is accepted anyhow, or overflow
+    return START_OVERLAP + min(LEFT_BY_STEPS * turned**2, MOST_LEFT)
 
 
 def penetration_error(t: float, inside: float, name: str, remedy: str = RESOLVED) -> StateError:
