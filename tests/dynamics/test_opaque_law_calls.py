@@ -84,7 +84,7 @@ def test_arguments_are_those_of_the_signature(function):
 
 
 def test_only_laws_of_time_are_asked_without_the_motion():
-    """Their functions of both are told from those of users."""
+    """Functions of the package, of both kinds, are distinguished from those of users."""
     law = lambda t: t  # noqa: E731
     assert law_of_time_alone(as_function(law)) is law
     assert law_of_time_alone(_two) is None
