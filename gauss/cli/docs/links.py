@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from gauss.docs.reference import public_names
+from gauss.cli.docs.reference import public_names
 
 
 def found(name: str) -> object:

@@ -6,8 +6,8 @@ from importlib import import_module
 
 import pytest
 
-from gauss.docs import reference
-from gauss.docs.groups import GROUPS
+from gauss.cli.docs import reference
+from gauss.cli.docs.groups import GROUPS
 
 pytestmark = [pytest.mark.slow, pytest.mark.disk]  # of what enters machine code nothing is replaced
 

@@ -8,7 +8,7 @@ from importlib import import_module
 import pytest
 from numpydoc.docscrape import NumpyDocString
 
-from gauss.docs.groups import ROOMS
+from gauss.cli.docs.groups import ROOMS
 
 PUBLIC = (
     "gauss",

@@ -1,4 +1,4 @@
-"""The moving picture of the start page and of the README: ``python -m gauss.docs.film`` writes it from the example.
+"""The moving picture of the start page and of the README: ``python -m gauss.cli.docs.film`` writes it from the example.
 
 The walking leg of ``models/examples`` over one turn of its crank, with the path of its foot.
 """

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from gauss.docs import generated, notebooks
-from gauss.docs.uses import PAGES, snippets
+from gauss.cli.docs import generated, notebooks
+from gauss.cli.docs.uses import PAGES, snippets
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FILES = sorted(PAGES.rglob("*.md"))
 WITH_CODE = [page for page in FILES if snippets(page)]
 LINK = re.compile(r"\]\((?!https?://)([^)#\s]*)(?:#[^)]*)?\)|^:link: (\S+)|^```\{image\} (\S+)", re.MULTILINE)

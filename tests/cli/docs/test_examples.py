@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from gauss.docs.gallery import SECTIONS
-from gauss.docs.uses import examples
+from gauss.cli.docs.gallery import SECTIONS
+from gauss.cli.docs.uses import examples
 from gauss.io.catalog import folder
 from gauss.versions import version_of
 from tests.support.extras import others

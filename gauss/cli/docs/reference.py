@@ -7,8 +7,8 @@ import inspect
 from functools import cache
 from importlib import import_module
 
-from gauss.docs.groups import GROUPS, ROOMS, Group
-from gauss.docs.uses import uses
+from gauss.cli.docs.groups import GROUPS, ROOMS, Group
+from gauss.cli.docs.uses import uses
 
 MEMBERS = (
     ":members:\n   :inherited-members: Exception, BaseException, tuple, object, int, str, float, Mapping, Env, VectorEnv"

@@ -6,7 +6,7 @@ import warnings
 from importlib import import_module
 from pathlib import Path
 
-from gauss.docs import generated, notebooks, reference
+from gauss.cli.docs import generated, notebooks, reference
 from gauss.errors import FileError, extra, writing
 
 HERE = Path(__file__).parent

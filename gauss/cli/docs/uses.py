@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from gauss.docs.groups import GROUPS, MADE_BY
+from gauss.cli.docs.groups import GROUPS, MADE_BY
 from gauss.io.catalog import folder
 
 PAGES = Path(__file__).parent / "pages"

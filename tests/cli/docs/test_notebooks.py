@@ -4,7 +4,7 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from gauss.docs import notebooks
+from gauss.cli.docs import notebooks
 from gauss.io.catalog import folder
 
 BOOKS = notebooks.notebooks()

@@ -14,8 +14,8 @@ from gauss.dynamics import plan
 from gauss.dynamics.rules import Rule
 from gauss.io.catalog import catalog, folder, linkages, networks, servos
 
-PACKAGE = Path(__file__).parents[1]
-INSIDE = PACKAGE / "docs" / "originals"  # of an installed package; see pyproject.toml
+PACKAGE = Path(__file__).parents[2]
+INSIDE = PACKAGE / "cli" / "docs" / "originals"  # of an installed package; see pyproject.toml
 LINK = re.compile(r"(?<!!)\[([^\]]+)\]\((?!https?://|#)([^)#]+)(?:#[^)]*)?\)")
 INTRODUCTION = (
     "`gauss --help` lists the commands, `gauss COMMAND --help` their options. Wherever a scene is asked for, it is a file, "

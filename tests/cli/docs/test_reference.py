@@ -5,11 +5,11 @@ from importlib import import_module
 import pytest
 
 import gauss
-from gauss.docs import generated, reference
-from gauss.docs.groups import GROUPS
-from gauss.docs.uses import names_in, uses
+from gauss.cli.docs import generated, reference
+from gauss.cli.docs.groups import GROUPS
+from gauss.cli.docs.uses import names_in, uses
 from gauss.dynamics.plan import MOTIONS
-from tests.docs.test_doctests import EXAMPLES
+from tests.cli.docs.test_doctests import EXAMPLES
 
 ABSENT = (
     "torch_",

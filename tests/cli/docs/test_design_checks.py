@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-PAGE = Path(__file__).parents[2] / "gauss/docs/pages/concepts/design_checks.md"
-TESTS = Path(__file__).parents[1]
+PAGE = Path(__file__).parents[3] / "gauss/cli/docs/pages/concepts/design_checks.md"
+TESTS = Path(__file__).parents[2]
 LEAST_ROWS = 3  # independent answers for a part
 PARTS = dict(re.findall(r"^## (.+?)\n(.+?)(?=^## |\Z)", PAGE.read_text(encoding="utf-8"), re.S | re.M))
 

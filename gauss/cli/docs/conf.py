@@ -1,6 +1,6 @@
 """Configuration of Sphinx; read by Sphinx, not imported."""
 
-from gauss.docs import gallery, links
+from gauss.cli.docs import gallery, links
 from gauss.io.catalog import folder
 from gauss.versions import VERSION
 

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gauss import cli
-from gauss.docs.groups import GROUPS
+from gauss.cli.docs.groups import GROUPS
 from tests.support.extras import others
 
 pytestmark = pytest.mark.slow
@@ -19,7 +19,7 @@ sys.modules.update(dict.fromkeys(sys.argv[2:]))  # as if they were not installed
 from pathlib import Path
 from typer.main import get_command
 from gauss.cli import app
-from gauss.docs.build import collect
+from gauss.cli.docs.build import collect
 collect(Path(sys.argv[1]), get_command(app))
 """
 

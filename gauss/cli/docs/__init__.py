@@ -4,6 +4,7 @@ Sphinx with MyST (Markdown), Furo (theme) and sphinx-gallery (examples), all mai
 
     gauss docs --output FOLDER
 
-copies the pages, adds those that are made of the package (:mod:`gauss.docs.generated`, :mod:`gauss.docs.reference`), runs
-the examples of ``models/examples`` for the gallery, and writes HTML that needs no server and no network.
+copies the pages, adds those that are made of the package (:mod:`gauss.cli.docs.generated`,
+:mod:`gauss.cli.docs.reference`), runs the examples of ``models/examples`` for the gallery, and writes HTML that needs no
+server and no network.
 """
