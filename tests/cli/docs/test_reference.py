@@ -25,6 +25,7 @@ PACKAGES = (
     "gauss.servo",
     "gauss.view",
     "gauss.view.viewer",
+    "gauss.export",
     "gauss.gym",
 )
 

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.arguments import real_numbers
 from gauss.dynamics.outputs import split
 from gauss.errors import ArgumentError, SimulationError, extra
-from gauss.gym.task import Task
+from gauss.io.gym.task import Task
 from gauss.simulation import Simulator
 
 with extra("gym"):

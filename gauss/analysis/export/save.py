@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from gauss.analysis.export.exported_function import exported_functions, folder_of, identifier
 from gauss.errors import ArgumentError, did_you_mean, require, writing
-from gauss.export.exported_function import exported_functions, folder_of, identifier
 from gauss.scene import Scene
 from gauss.system import System
 
@@ -70,13 +70,13 @@ def save_as(
 
 
 def _save_c(system, folder: Path, names, name: str) -> list[Path]:
-    from gauss.export.c_files import to_c
+    from gauss.analysis.export.c_files import to_c
 
     return list(to_c(system, names, name).save(folder))
 
 
 def _save_casadi(system, folder: Path, names, name: str) -> list[Path]:
-    from gauss.export.casadi_function import casadi_function
+    from gauss.analysis.export.casadi_function import casadi_function
 
     paths = []
     for exported in exported_functions(system, names):
@@ -96,13 +96,13 @@ def _save_text(make: Callable[..., str], suffix: str) -> Callable:
 
 
 def _jax(system, names) -> str:
-    from gauss.export.jax_module import jax_source
+    from gauss.analysis.export.jax_module import jax_source
 
     return jax_source(system, names)
 
 
 def _latex(system, names) -> str:
-    from gauss.export.formulas import latex_document
+    from gauss.analysis.export.formulas import latex_document
 
     return latex_document(system, names)
 
@@ -112,7 +112,7 @@ def _save_fmu(system, folder: Path, names, name: str) -> list[Path]:
 
 
 def _unit(system, language: str, folder: Path, names, name: str, parameters: Sequence[str] | str) -> Path:
-    from gauss.export.fmu.unit import to_fmu
+    from gauss.analysis.export.fmu.unit import to_fmu
 
     if language != "fmu":
         raise ArgumentError(f"export: {language!r} has no tunable parameters; 'fmu' has, or leave parameters out.")

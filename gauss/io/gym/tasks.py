@@ -4,8 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from gauss.gym.task import Task
 from gauss.io import load
+from gauss.io.gym.task import Task
 from gauss.scene import Scene
 
 

@@ -9,8 +9,8 @@ import pytest
 
 import gauss
 from gauss import export
+from gauss.analysis.export.fmu.model_description import variables
 from gauss.errors import ArgumentError, SceneError, SimulationError
-from gauss.export.fmu.model_description import variables
 from gauss.scene import actuators
 from gauss.scene.named_numbers import scene_of, value_of
 from gauss.system import coordinate_rates

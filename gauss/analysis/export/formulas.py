@@ -4,7 +4,7 @@
 
 M and h are those of the spanning tree, h with gravity and the loads of the scene; c and J are the loop constraints, without
 which λ is absent. They are traced from the mechanics, M and h with symbols for numbers
-(:mod:`gauss.export.symbolic_system`).
+(:mod:`gauss.analysis.export.symbolic_system`).
 """
 
 from collections.abc import Callable, Sequence
@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from gauss.analysis.export.exported_function import ExportedFunction, exported_functions
+from gauss.analysis.export.symbolic_system import has_symbols, in_symbols
 from gauss.arguments import name_list
 from gauss.codegen import Column, Expression
 from gauss.dynamics import compile_scene
 from gauss.errors import SimulationError, extra, require
-from gauss.export.exported_function import ExportedFunction, exported_functions
-from gauss.export.symbolic_system import has_symbols, in_symbols
 from gauss.scene import Scene
 from gauss.system import System
 

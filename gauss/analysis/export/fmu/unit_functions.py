@@ -5,6 +5,8 @@ Both are functions of the parameters of the unit as well, which follow the input
 
 import numpy as np
 
+from gauss.analysis.export.exported_function import ExportedFunction, Shape, without_calls
+from gauss.analysis.export.fmu.unit_parameters import UnitParameters
 from gauss.codegen import Function, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.inputs import input_loads
@@ -16,8 +18,6 @@ from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
 from gauss.dynamics.sensor_values import measured
 from gauss.errors import SimulationError
-from gauss.export.exported_function import ExportedFunction, Shape, without_calls
-from gauss.export.fmu.unit_parameters import UnitParameters
 from gauss.system import State, coordinate_rates, refuse_changed
 
 

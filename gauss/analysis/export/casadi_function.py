@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from gauss.analysis.export.exported_function import ExportedFunction, exported_functions
 from gauss.codegen import Column, Expression
 from gauss.errors import extra
-from gauss.export.exported_function import ExportedFunction, exported_functions
 from gauss.scene import Scene
 from gauss.system import System
 

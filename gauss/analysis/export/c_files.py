@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 
+from gauss.analysis.export.c_code import PRELUDE, CBody
+from gauss.analysis.export.exported_function import ExportedFunction, exported_functions, identifier
 from gauss.errors import require, writing
-from gauss.export.c_code import PRELUDE, CBody
-from gauss.export.exported_function import ExportedFunction, exported_functions, identifier
 from gauss.scene import Scene
 from gauss.system import System
 from gauss.versions import VERSION

@@ -8,9 +8,9 @@ without a branch before the end: compilers vectorise them over the angles of a m
 from collections.abc import Iterator
 from math import isinf, isnan
 
+from gauss.analysis.export.exported_function import ExportedFunction
 from gauss.codegen import LOOKUPS, Column, Expression, schedule
 from gauss.codegen.sincos import COS, LARGEST_REDUCED_ANGLE, P1, P2, P2_TAIL, SIN, TWO_OVER_PI
-from gauss.export.exported_function import ExportedFunction
 
 ROUND = 6755399441055744.0  # 3·2⁵¹: a double of this size has no fractional bits, so adding and subtracting it rounds
 OPERATIONS = {

@@ -12,13 +12,13 @@ from collections.abc import Iterator, Sequence
 from hashlib import sha256
 from pathlib import Path
 
+from gauss.analysis.export.c_files import CCode, c_code
+from gauss.analysis.export.exported_function import ExportedFunction, folder_of, identifier
+from gauss.analysis.export.fmu.model_description import build_description, model_description, variables
+from gauss.analysis.export.fmu.unit_functions import unit_functions
+from gauss.analysis.export.fmu.unit_parameters import UnitParameters
 from gauss.dynamics import compile_scene
 from gauss.errors import ArgumentError, MissingPackageError, SimulationError, require
-from gauss.export.c_files import CCode, c_code
-from gauss.export.exported_function import ExportedFunction, folder_of, identifier
-from gauss.export.fmu.model_description import build_description, model_description, variables
-from gauss.export.fmu.unit_functions import unit_functions
-from gauss.export.fmu.unit_parameters import UnitParameters
 from gauss.scene import Scene
 from gauss.system import State, System
 

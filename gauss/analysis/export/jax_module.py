@@ -6,9 +6,9 @@ One statement for each operation of the graph, on numbers: XLA compiles them to 
 from collections.abc import Callable, Iterator, Sequence
 from math import isfinite, isnan, prod
 
+from gauss.analysis.export.exported_function import ExportedFunction, exported_functions
 from gauss.codegen import LOOKUPS, Column, Expression, Function
 from gauss.errors import extra
-from gauss.export.exported_function import ExportedFunction, exported_functions
 from gauss.scene import Scene
 from gauss.system import System
 from gauss.versions import VERSION

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.dynamics.outputs import split
 from gauss.errors import ArgumentError, SimulationError, extra
-from gauss.gym.task import Task
+from gauss.io.gym.task import Task
 from gauss.simulation import SimulatorBatch
 from gauss.system import State, retract
 

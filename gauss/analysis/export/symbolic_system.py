@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from gauss.analysis.export.exported_function import ExportedFunction, without_calls
 from gauss.codegen import Graph, write
 from gauss.dynamics.given_link_frames import GivenLinkFrames, own_inertia, ungrouped
 from gauss.dynamics.laws.traced_laws import Laws
@@ -17,7 +18,6 @@ from gauss.dynamics.rnea import KinematicTree
 from gauss.dynamics.state_terms import StateTerms
 from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import SimulationError
-from gauss.export.exported_function import ExportedFunction, without_calls
 from gauss.scene import Drive, ElasticLink, JointSpring
 from gauss.system import BoundLoad, State, System, whole
 
