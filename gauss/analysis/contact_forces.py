@@ -220,10 +220,15 @@ def _solve_steps(trajectory: Trajectory) -> StepForces:
     return StepForces(len(trajectory), *(np.concatenate(part) for part in (sample, gap, normals, frictions)))
 
 
+def by_pair_kernels(trajectory: Trajectory) -> bool:
+    """Whether the steps of a motion are those by kernels of pairs of shapes."""
+    plan = trajectory.stats.plan
+    return plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None
+
+
 def _parts(trajectory: Trajectory, samples: Iterable[int]):
     """Normal forces (g,) and friction forces (g, 3) of all gaps, sample by sample."""
-    plan = trajectory.stats.plan
-    if plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None:
+    if by_pair_kernels(trajectory) and trajectory.step is not None:
         with lent_stepper(trajectory.system, removal=trajectory.removal) as stepper:
             stepper.forget()
             for index in samples:

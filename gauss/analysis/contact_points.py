@@ -2,19 +2,22 @@
 
 import warnings
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from gauss.analysis.contact_forces import NOT_UNIQUE, forces_at
+from gauss.analysis.contact_forces import NOT_UNIQUE, by_pair_kernels, forces_at
 from gauss.backends import Backend
-from gauss.dynamics.contact.contact_geometry import ContactGeometry, NearGaps, contact_geometry
+from gauss.dynamics.contact.contact_geometry import contact_geometry
+from gauss.dynamics.contact.contact_stepper import lent_stepper
 from gauss.dynamics.gap_functions import TOUCHING
-from gauss.dynamics.kinematics import Kinematics, kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import NonUniqueReactionWarning, StateError, require
+from gauss.scene import Contact
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 
-NEAR, WIDER, ATTEMPTS = 1e-3, 10.0, 3  # distance of contacts looked for first, of the scene's length; growth; how often
+NEAR = 1e-3  # of the scene's length: what touches is nearer, and what a step of time stepping may close
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +70,8 @@ def contact_points(trajectory: Trajectory, sample: int = -1, backend: str | Back
     """All contacts of shapes at one sample that are closed or bear a force, in one pass; other samples are not computed.
 
     Forces are those of :func:`gauss.contact_forces` and :func:`gauss.friction_forces`: with time stepping means over the
-    step that follows the sample.
+    step that follows the sample. Points, normals and gaps are those that this step evaluates: at the sample, or where there
+    is no impact half a step later.
 
     Parameters
     ----------
@@ -108,36 +112,53 @@ def contact_points(trajectory: Trajectory, sample: int = -1, backend: str | Back
     require(sample, (int, np.integer), "contact_points: sample")
     if not -len(trajectory) <= sample < len(trajectory):
         raise StateError(f"contact_points: expected a sample from 0 to {len(trajectory) - 1}, got {sample}.")
-    system, index = trajectory.system, range(len(trajectory))[sample]
-    normal, friction, ambiguous = forces_at(trajectory, index, backend)
-    if ambiguous:
-        warnings.warn(NOT_UNIQUE.format("single contacts"), NonUniqueReactionWarning, stacklevel=2)
-    geometry, motion = contact_geometry(system), kinematics(system, trajectory.state(index))
-    bearing = (normal != 0.0) | (friction != 0.0).any(axis=1)
-    found = _near(geometry, motion, np.intersect1d(np.flatnonzero(bearing), geometry.places))
-    kept = bearing[found.place] | (found.width <= TOUCHING * system.scale.length)
-    place, gap, point, along = (part[kept] for part in found)
-    contacts = [geometry.contact_of(one)[0] for one in place.tolist()]
-    shapes = system.scene.shapes
+    index = range(len(trajectory))[sample]
+    rows = _of_step(trajectory, index) if by_pair_kernels(trajectory) else _of_gaps(trajectory, index, backend)
+    system, shapes = trajectory.system, trajectory.system.scene.shapes
+    kept = (rows.normal_force != 0.0) | (rows.gap <= TOUCHING * system.scale.length)
+    contacts = [contact for contact, keep in zip(rows.contacts, kept, strict=True) if keep]
+    point, normal, gap, force, friction = (part[kept] for part in rows[1:])
     bodies = tuple((shapes[one.shape].body, shapes[one.other].body) for one in contacts)
+    motion = kinematics(system, trajectory.state(index))
     rates = [motion.velocity_at(a, x) - motion.velocity_at(b, x) for (a, b), x in zip(bodies, point, strict=True)]
     rate = np.reshape(rates, (-1, 3))
-    slip = rate - (rate * along).sum(axis=1)[:, None] * along
+    slip = rate - (rate * normal).sum(axis=1)[:, None] * normal
     names = tuple(one.name for one in contacts)
-    return ContactPoints(float(trajectory.t[index]), names, bodies, point, along, gap, normal[place], friction[place], slip)
+    return ContactPoints(float(trajectory.t[index]), names, bodies, point, normal, gap, force, friction, slip)
 
 
-def _near(geometry: ContactGeometry, motion: Kinematics, bearing: np.ndarray) -> NearGaps:
-    """Near gaps of a state, those that bear a force among them, even where these close within the step alone."""
-    reach = NEAR * motion.system.scale.length
-    for _ in range(ATTEMPTS):
-        found = geometry.find(motion, reach)
-        missing = np.setdiff1d(bearing, found.place)
-        if not missing.size:
-            return found
-        reach *= WIDER
-    for place in missing.tolist():  # before the step other features are the nearest ones
-        contact, number = geometry.contact_of(place)
-        touch = contact.places(motion.system.scene)[number].touch(motion)
-        found = NearGaps(*(np.append(part, [one], axis=0) for part, one in zip(found, (place, *touch), strict=True)))
-    return found
+class _Rows(NamedTuple):
+    """Near contacts, as of :class:`ContactPoints`."""
+
+    contacts: list[Contact]
+    point: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    normal_force: np.ndarray
+    friction: np.ndarray
+
+
+def _of_step(trajectory: Trajectory, index: int) -> _Rows:
+    """Contacts of the step that follows a sample, where it evaluates them."""
+    assert trajectory.step is not None
+    with lent_stepper(trajectory.system, removal=trajectory.removal) as stepper:
+        stepper.forget()
+        step, table = stepper.step_over(trajectory.state(index), trajectory.step), stepper.table
+    near, force = step.contacts, step.force
+    assert near is not None and force is not None  # a step by Python
+    sides = table.sides(near.key)[:, None]
+    friction = sides * (force[:, 1:, None] * near.axes[:, 1:]).sum(axis=1)
+    contacts = [table.contacts[law] for law in near.law.tolist()]
+    return _Rows(contacts, near.place, sides * near.axes[:, 0], near.gap, force[:, 0], friction)
+
+
+def _of_gaps(trajectory: Trajectory, index: int, backend) -> _Rows:
+    """Near contacts at a sample, with the forces of their gaps."""
+    system = trajectory.system
+    geometry = contact_geometry(system)
+    found = geometry.find(kinematics(system, trajectory.state(index)), NEAR * system.scale.length)
+    normal, friction, ambiguous = forces_at(trajectory, index, backend)
+    if ambiguous:
+        warnings.warn(NOT_UNIQUE.format("single contacts"), NonUniqueReactionWarning, stacklevel=3)
+    contacts = [geometry.contact_of(place)[0] for place in found.place.tolist()]
+    return _Rows(contacts, found.point, found.normal, found.width, normal[found.place], friction[found.place])
