@@ -49,10 +49,7 @@ def test_gaps_points_and_normals_are_those_of_the_shapes():
     for place, width, point, normal in zip(*found, strict=True):
         contact, number = geometry.contact_of(place)
         expected = contact.places(system.scene)[number].touch(motion)
-        if contact.shape != "mesh" and {contact.shape, contact.other} != {
-            "cylinder",
-            "box",
-        }:  # numbers in patches depend on the reach
+        if "mesh" not in contact.name and contact.name != "cylinder on box":  # numbers in patches depend on the reach
             assert width == pytest.approx(expected.gap, abs=SAME)
             np.testing.assert_allclose([point, normal], [expected.place, expected.normal], atol=SAME)
         assert sides(system.scene)[place].name == contact.sides(system.scene)[number]
@@ -77,6 +74,7 @@ def test_forces_of_a_sample_change_the_momentum_of_each_body_in_the_step_that_fo
             np.testing.assert_allclose(pushed, change - mass * GRAVITY, atol=tolerance * max(1.0, np.abs(pushed).max()))
 
 
+@pytest.mark.slow
 def test_friction_of_a_block_that_slides_is_against_its_slip():
     motion = stepped(gauss.load("block_on_incline"), 0.05)
     found = gauss.contact_points(motion, 20)
@@ -88,6 +86,7 @@ def test_friction_of_a_block_that_slides_is_against_its_slip():
     np.testing.assert_allclose((found.slip * found.normal).sum(axis=1), 0.0, atol=SAME)
 
 
+@pytest.mark.slow
 def test_a_motion_between_events_has_the_forces_of_rest_and_none_in_flight():
     scene = floor("ball")
     scene.free("F", "ground", scene.body("ball", 1.0, (0.004,) * 3, position=(0, 0, 0.3)), at=(0, 0, 0.3))
@@ -100,6 +99,7 @@ def test_a_motion_between_events_has_the_forces_of_rest_and_none_in_flight():
     np.testing.assert_allclose(found.normal_force, gauss.contact_forces(motion, name)[-1], rtol=SAME)
 
 
+@pytest.mark.slow
 def test_nothing_touches_in_flight():
     scene = floor("ball")
     free_body(scene, "ball", 0.004, (0.0, 0.0, 1.0))
