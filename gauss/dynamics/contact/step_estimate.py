@@ -7,9 +7,9 @@ import numpy as np
 
 from gauss.dynamics.contact.contact_stepper import Stepper, lent_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
-from gauss.dynamics.contact.linked import linked
 from gauss.dynamics.contact.shape_table import KINDS
 from gauss.dynamics.rules import Plan
+from gauss.linked_groups import linked_groups
 from gauss.system import State, System
 
 STEP = 2e-3  # of the time of the scene: steps that resolve its motion
@@ -75,7 +75,7 @@ def estimated_step(system: System, plan: Plan) -> StepEstimate | None:
 
 def _islands(count: int, pairs: np.ndarray) -> tuple[int, ...]:
     """Numbers of bodies in groups that contacts between pairs of bodies (m, 2) connect; of moving ones, the first."""
-    root = linked(count, pairs[(pairs < count).all(axis=1)].tolist())
+    root = linked_groups(count, pairs[(pairs < count).all(axis=1)].tolist())
     return tuple(np.unique(root[np.unique(pairs[pairs < count])], return_counts=True)[1].tolist())
 
 
