@@ -45,30 +45,14 @@ UNTRUSTED = (LoopStatus.UNCONFIRMED, LoopStatus.OFF_CONSTRAINTS, LoopStatus.TOO_
 
 
 class MethodOnSystem(NamedTuple):
-    """What all runs of one method on one system have in common, beside their machine code.
+    """What all runs of one method on one system have in common, beside their machine code."""
 
-    Attributes
-    ----------
-    program : Program
-        Functions of the system.
-    method_state : ndarray or None
-        Initial method state; the accelerations where None.
-    budget : int
-        Steps of one call of the loop.
-    every : int
-        Steps between two checks of the accelerations.
-    order : float
-        Order of the method.
-    checks_bodies : bool
-        Whether accelerations are checked body by body.
-    """
-
-    program: Program
-    method_state: np.ndarray | None
-    budget: int
-    every: int
-    order: float
-    checks_bodies: bool
+    program: Program  # functions of the system
+    method_state: np.ndarray | None  # initial method state; the accelerations where None
+    budget: int  # steps of one call of the loop
+    every: int  # steps between two checks of the accelerations
+    order: float  # order of the method
+    checks_bodies: bool  # whether accelerations are checked body by body
 
 
 class CompiledRun:

@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.dynamics.rules import Plan
+from gauss.errors import listed
+
+MOST_NAMED = 5  # bodies that a line names; the attributes hold all
 
 
 class SleepRecord(NamedTuple):
@@ -28,6 +31,13 @@ class SleepRecord(NamedTuple):
     steps: dict[str, int]
     asleep: tuple[str, ...]
     woken: int
+
+    def __repr__(self):
+        never = f"; never: {listed(self.never, MOST_NAMED)}" if self.never else ""
+        asleep = f": {listed(self.asleep, MOST_NAMED)}" if self.asleep else ""
+        woken = f"; {self.woken} times woken" if self.woken else ""
+        counts = f"{len(self.steps)} of {len(self.able)} able bodies slept, {len(self.asleep)} at the end"
+        return f"SleepRecord({counts}{asleep}{woken}{never})"
 
 
 class Stats(NamedTuple):
@@ -76,6 +86,12 @@ class Stats(NamedTuple):
     handed_over: float | None = None
     sleep: SleepRecord | None = None
 
+    def __repr__(self):
+        rejected = f" and {self.rejected} rejected" if self.rejected else ""
+        plan = "" if self.plan is None else f", {self.plan.driver}, {self.plan.dynamics} dynamics"
+        sleep = "" if self.sleep is None else f", {self.sleep}"
+        return f"Stats({self.steps} steps{rejected}, {self.evaluations} evaluations, {self.wall_time:.3g} s{plan}{sleep})"
+
 
 @dataclass(frozen=True)
 class Event:
@@ -106,29 +122,20 @@ class Event:
 
 
 class EnergyRecord(NamedTuple):
-    """Energies along a motion, for its energy balance; numbers, or arrays (batch,) of a batch.
+    """Energies along a motion, for its energy balance; numbers, or arrays (batch,) of a batch."""
 
-    Parameters
-    ----------
-    kinetic, lowest, highest : float
-        Largest kinetic energy, least and largest potential energy [J].
-    magnitude : float
-        Size that the rounding of the potential energy is relative to [J], see
-        :func:`gauss.dynamics.energies.look_at_energies`.
-    initial, balance, off : float
-        T + V − work + dissipated at the start; its change up to the last point, and the largest change in size [J].
-    jump, when : float
-        Largest change of the balance from one point to the next [J], and the time of the latter [s].
-    """
-
-    kinetic: float
+    kinetic: float  # kinetic, lowest, highest: largest kinetic energy, least and largest potential energy [J]
     lowest: float
     highest: float
+    # size that the rounding of the potential energy is relative to [J], see
+    # :func:`gauss.dynamics.energies.look_at_energies`
     magnitude: float
+    # initial, balance, off: T + V − work + dissipated at the start; its change up to the last point, and the largest change
+    # in size [J]
     initial: float
     balance: float
     off: float
-    jump: float
+    jump: float  # jump, when: largest change of the balance from one point to the next [J], and the time of the latter [s]
     when: float
 
     @property
