@@ -28,7 +28,7 @@ CONTACT = 2 * SIDE
 MASS = 20  # inertia (3, 3) [kg m²], its inverse, mass, its inverse
 LEAST_NUMBER = 1e-60  # forces and velocities that are set to zero: their squares may not be inverted
 ELIMINATED = 12  # K (3, 3) and g (3,) of a contact
-OPEN, STICKING, SLIPPING = 0.0, 1.0, 2.0  # modes of a contact
+APART, STICKING, SLIPPING = 0.0, 1.0, 2.0  # modes of a contact
 LEAST_REGULARISATION = 1e-7  # of contacts that keep their mode: their forces are hardly held back
 ORDER = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 7)
 SOLVE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 14)
@@ -90,7 +90,7 @@ class _BlockContactWriter:
         """The same ε for all contacts at first."""
         self.highest[0], self.decay[0] = regularisation, decay
         with self.r.each(self.m) as c:
-            self.eps[c], self.mode[c] = regularisation, OPEN
+            self.eps[c], self.mode[c] = regularisation, APART
 
     def _sides(self, c: Value):
         """Body and rows of both sides of a contact."""
@@ -209,7 +209,7 @@ class _BlockContactWriter:
         """Regularisation ε of a contact: that of the round after a change of its mode, else less than in the last step."""
         r, radius = self.r, self.mu[c] * trial[0]
         slips = trial[1] * trial[1] + trial[2] * trial[2] > radius * radius
-        mode = r.choose(trial[0] > 0.0, r.choose(slips, SLIPPING, STICKING), OPEN)
+        mode = r.choose(trial[0] > 0.0, r.choose(slips, SLIPPING, STICKING), APART)
         lowered = r.maximum(self.eps[c] * self.decay[0], r.number(LEAST_REGULARISATION))
         stays = r.absolute(mode - self.mode[c]) < 0.5 * STICKING
         self.mode[c], self.eps[c] = mode, r.choose(stays | (self.decay[0] >= 1.0), lowered, self.highest[0])
