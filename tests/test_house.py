@@ -22,6 +22,7 @@ from gauss.codegen import gc_pause
 ROOT = Path(gauss.__file__).parent
 TESTS = Path(__file__).parent
 PACKAGES = sorted(path.parent.name for path in ROOT.glob("*/__init__.py"))
+SHORT_NAMES = sorted(path.stem for path in ROOT.glob("*.pyi") if path.stem != "__init__")  # of what stands inside a room
 # Retired words of names, and what the field says.
 RETIRED_WORDS = {
     **dict.fromkeys(("fade", "fades", "faded", "fading"), "near rank-deficient, near-singular"),
@@ -193,7 +194,7 @@ def page(thing) -> NumpyDocString:
         return NumpyDocString(inspect.getdoc(thing) or "")
 
 
-@pytest.mark.parametrize("package", ["gauss", *(f"gauss.{name}" for name in PACKAGES)])
+@pytest.mark.parametrize("package", ["gauss", *(f"gauss.{name}" for name in (*PACKAGES, *SHORT_NAMES))])
 def test_public_names_have_pages(package):
     if package in NEEDED:
         pytest.importorskip(NEEDED[package])

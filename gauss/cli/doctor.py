@@ -34,6 +34,6 @@ def docs(
     strict: Annotated[bool, typer.Option("--strict", help="Take warnings for errors.")] = False,
 ):
     """Write the documentation as web pages: guides, gallery, reference of all public names, benchmarks."""
-    from gauss.docs.build import build  # imports what no other command needs
+    from gauss.cli.docs.build import build  # imports what no other command needs
 
     typer.echo(f"documentation written to {build(output, context.find_root().command, gallery, strict)}")

@@ -78,7 +78,7 @@ def _record(thing, inside) -> tuple:
 def _function(function: FunctionType, inside) -> tuple:
     if _is_ours(function) and "<locals>" not in function.__qualname__:
         return (IdentityKey(function),)
-    closed = [cell.cell_contents if _is_filled(cell) else None for cell in function.__closure__ or ()]
+    closed = [cell.cell_contents if is_filled(cell) else None for cell in function.__closure__ or ()]
     found = {} if _is_ours(function) else named_globals(function)
     parts = (content_key(part, inside) for part in (function.__defaults__, function.__kwdefaults__, closed, found))
     return function.__code__, IdentityKey(function.__globals__), *parts
@@ -101,7 +101,8 @@ def _is_ours(thing) -> bool:
     return str(getattr(thing, "__module__", "")).partition(".")[0] == PACKAGE
 
 
-def _is_filled(cell) -> bool:
+def is_filled(cell) -> bool:
+    """Whether a cell of a closure has a value."""
     try:
         cell.cell_contents  # noqa: B018
     except ValueError:  # the name is not bound yet

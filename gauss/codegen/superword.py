@@ -10,6 +10,7 @@ from gauss.codegen.expression import Expression
 from gauss.codegen.graph import COMMUTATIVE
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.schedule import Schedule
+from gauss.linked_groups import linked_groups
 
 UNPACKABLE = frozenset({"call", "item", "row", "entry"})  # operations that differ by more than their operands
 IsomorphicPart = list[Expression]  # operations of a connected component in order, its inputs included
@@ -28,23 +29,13 @@ def superword_groups(scheduled: Schedule, at_most: int) -> list[list[IsomorphicP
 
 
 def _independent_parts(nodes) -> Iterator[IsomorphicPart]:
-    """Connected components of the graph without constants (union-find)."""
-    parent: dict[int, int] = {}
-
-    def find(index: int) -> int:
-        while parent[index] != index:
-            parent[index] = index = parent[parent[index]]
-        return index
-
+    """Connected components of the graph without constants."""
     varying = [node for node in nodes if not node.is_constant]
-    for node in varying:
-        parent[node.index] = node.index
-        for operand in node.operands:
-            if not operand.is_constant:
-                parent[find(operand.index)] = find(node.index)
+    places = {node.index: place for place, node in enumerate(varying)}
+    links = ((place, places[x.index]) for place, node in enumerate(varying) for x in node.operands if not x.is_constant)
     parts: dict[int, IsomorphicPart] = {}
-    for node in varying:
-        parts.setdefault(find(node.index), []).append(node)
+    for node, group in zip(varying, linked_groups(len(varying), links).tolist(), strict=True):
+        parts.setdefault(group, []).append(node)
     yield from parts.values()
 
 

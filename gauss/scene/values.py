@@ -238,15 +238,18 @@ def as_function(law_or_constant) -> Callable:
 
 
 def _of_time(law: Callable) -> Callable:
-    """Function of (t, motion) that asks a law of (t)."""
-    return lambda t, motion: law(t)
+    """Function of (t, motion) that asks a law of (t), which is its attribute ``law_of_time``."""
+
+    def asked(t, motion):
+        return law(t)
+
+    asked.law_of_time = law  # type: ignore[attr-defined]
+    return asked
 
 
 def law_of_time_alone(function: Callable) -> Callable | None:
     """Law of (t) behind a function of :func:`as_function`; None if that takes the motion."""
-    own = getattr(function, "__code__", None) in _of_time.__code__.co_consts
-    closure = getattr(function, "__closure__", None)
-    return closure[0].cell_contents if own and closure else None
+    return getattr(function, "law_of_time", None)
 
 
 def smooth_law(value, what: str, unit: str, size: int = 1):

@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import DOP853
 
 import gauss
+from gauss.analysis.export.exported_function import exported_functions
 from gauss.codegen import Expression
-from gauss.export.exported_function import exported_functions
 from tests.analysis.test_event_sensitivities import bouncing, started, stopped
 
 Extended = np.longdouble

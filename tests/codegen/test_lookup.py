@@ -8,11 +8,11 @@ import pytest
 from scipy.interpolate import CubicSpline, PPoly
 
 from gauss import math
+from gauss.analysis.export.c_code import PRELUDE, CBody
+from gauss.analysis.export.casadi_function import casadi_function
+from gauss.analysis.export.exported_function import ExportedFunction
 from gauss.codegen import Column, Expression, Function, Graph, Kernel, content_digest, forward, numbers_of, substitute, write
 from gauss.dynamics.laws.intervals import Interval, enclose
-from gauss.export.c_code import PRELUDE, CBody
-from gauss.export.casadi_function import casadi_function
-from gauss.export.exported_function import ExportedFunction
 
 ROUNDING = 4e-15  # relative to the largest value: of a polynomial about the begin of its piece
 ROWS = 200

@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 from scipy.linalg import qr
 
+from gauss.analysis.export.exported_function import exported_functions
 from gauss.codegen import LOOKUPS, Expression
-from gauss.export.exported_function import exported_functions
 from gauss.system import System, whole
 
 DIGITS = 50

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
+from gauss.analysis.export.casadi_function import casadi_function
+from gauss.analysis.export.exported_function import ExportedFunction, Shape, without_calls
 from gauss.analysis.tangents import constraint_residuals
 from gauss.analysis.user_functions import numbers_of
 from gauss.codegen import write
@@ -23,8 +25,6 @@ from gauss.dynamics.null_space import RANK_TOLERANCE
 from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
 from gauss.errors import SimulationError, extra
-from gauss.export.casadi_function import casadi_function
-from gauss.export.exported_function import ExportedFunction, Shape, without_calls
 from gauss.system import BoundLoad, State, System, coordinate_rates
 
 Casadi = Any  # functions and expressions of CasADi, which has no types

@@ -12,8 +12,8 @@ from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_
 from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper, block_contact_laws
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
-from gauss.dynamics.contact.linked import linked
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.linked_groups import linked_groups
 from gauss.system import State
 
 
@@ -56,7 +56,7 @@ class BodySleepers:
     def islands(self, known: KnownContacts) -> np.ndarray:
         """Number (n,) of the island of each body, by contacts that bear a force; −1 of bodies without one."""
         bodies = self.whole.table.bodies(known.key[known.force[:, 0] > 0.0])
-        root = linked(self.count, bodies[(bodies < self.count).all(axis=1)].tolist())
+        root = linked_groups(self.count, bodies[(bodies < self.count).all(axis=1)].tolist())
         touched, found = np.unique(bodies[bodies < self.count]), np.full(self.count, -1)
         found[touched] = root[touched]
         return found

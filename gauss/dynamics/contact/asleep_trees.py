@@ -12,11 +12,11 @@ import numpy as np
 from gauss.dynamics.contact.compiled_mechanism_step import KnownForces, MechanismMemory
 from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.coordinate_groups import bodies_of_groups, coordinate_groups
-from gauss.dynamics.contact.linked import linked
 from gauss.dynamics.contact.mechanism_kernels import MechanismKernels
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.linked_groups import linked_groups
 from gauss.system import State
 
 
@@ -86,7 +86,7 @@ class TreeSleepers:
         """Number (n,) of the island of each group, by contacts and stops that bear a force; −1 of groups without one."""
         pairs = self._groups_of(known.key[known.force[:, 0] > 0.0])
         stopped = self.groups.of_row[: self.gaps][known.others[: self.gaps] > 0.0]
-        root = linked(self.count, pairs[(pairs >= 0).all(axis=1)].tolist())
+        root = linked_groups(self.count, pairs[(pairs >= 0).all(axis=1)].tolist())
         held = np.unique(np.concatenate([pairs.ravel(), stopped]))
         found = np.full(self.count, -1)
         found[held[held >= 0]] = root[held[held >= 0]]

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Expression, Function, write
-from gauss.dynamics.contact.linked import linked
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms, SparseArrays, TracedMechanism
 from gauss.dynamics.store import cached_on_disk
+from gauss.linked_groups import linked_groups
 from gauss.system import System
 
 
@@ -120,7 +120,7 @@ def _groups(traced: TracedMechanism) -> CoordinateGroups:
     rows = [(_columns(terms, "K", k), _of_row(terms, k)) for k in range(len(terms.pattern("K")))]
     loops = [(_columns(terms, "G", k), _of_all(terms, ("G", "gamma"), k)) for k in range(len(terms.pattern("G")))]
     parts = [*own, *bodies, *rows, *loops]
-    root = linked(n_v, (link for rates, found in parts for link in pairwise(sorted(rates | found.rates))))
+    root = linked_groups(n_v, (link for rates, found in parts for link in pairwise(sorted(rates | found.rates))))
     numbers, of_rate = np.unique(root, return_inverse=True)
     of_rate = of_rate.reshape(n_v)
     timed = np.zeros(numbers.size, dtype=bool)
@@ -139,11 +139,12 @@ def _groups(traced: TracedMechanism) -> CoordinateGroups:
 
 
 def bodies_of_groups(system: System, groups: CoordinateGroups) -> list[tuple[str, ...]]:
-    """Bodies that each group moves."""
+    """Bodies that each group moves, without those of no mass and inertia, as between the joints of one body of MJCF."""
     group = np.full(system.structure.n_bodies + 1, -1)  # the ground is the last one
     for edge in system.structure.tree:  # inner bodies come first
         v = system.joints[edge.constraint].v
         group[edge.outer] = groups.of_rate[v.start] if v.stop > v.start else group[edge.inner]
+    group[:-1][~system.Phi.reshape(-1, 6).any(axis=1)] = -1
     names = system.structure.bodies
     return [tuple(names[body] for body in np.flatnonzero(group[:-1] == k)) for k in range(groups.timed.size)]
 

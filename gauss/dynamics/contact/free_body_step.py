@@ -289,11 +289,15 @@ class FreeBodyStepper:
         found, _ = ContactProblem(response @ rows.T, order[0], laws).solve(order[1])
         return np.column_stack([found[:m], found[m:].reshape(m, 2)]), (found @ response).reshape(self.n, 6)
 
-    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Forces over a step from a state, as of :meth:`forces_of`; it expects its own forces."""
+    def step_over(self, state: State, h: float) -> FreeBodyStep:
+        """Step of length h in Python that expects its own forces."""
         self.known = self.known._replace(expected=np.zeros((6, self.n)))
         found = self.python_step(state, h)
-        return self.forces_of(self.python_step(state, h) if self.known.expected.any() else found)
+        return self.python_step(state, h) if self.known.expected.any() else found
+
+    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Forces over a step from a state that expects its own forces, as of :meth:`forces_of`."""
+        return self.forces_of(self.step_over(state, h))
 
     def forces_of(self, step: FreeBodyStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""

@@ -340,11 +340,15 @@ class MechanismStepper:
             refuse_jam(state.t, rows, begun.H, begun.terms.M.diagonal(), force, after, name)
         return force, added, error
 
-    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Forces over a step from a state, as of :meth:`forces_of`; it expects its own forces."""
+    def step_over(self, state: State, h: float) -> MechanismStep:
+        """Step of length h in Python that expects its own forces."""
         self.known = self.known._replace(share=0.0)
         found = self.python_step(state, h)
-        return self.forces_of(self.python_step(state, h) if self.known.share else found)
+        return self.python_step(state, h) if self.known.share else found
+
+    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Forces over a step from a state that expects its own forces, as of :meth:`forces_of`."""
+        return self.forces_of(self.step_over(state, h))
 
     def forces_of(self, step: MechanismStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""

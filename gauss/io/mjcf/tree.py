@@ -12,6 +12,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.dynamics.kinematics import Kinematics
+from gauss.linked_groups import LinkedGroups
 from gauss.scene import GROUND, Drive, Joint, JointSpring, LinearCoupling, Prescribed, Scene
 from gauss.system import System
 from gauss.system.frames import Pose, compose, invert
@@ -96,20 +97,9 @@ def _busy(scene: Scene) -> set[str]:
 
 def _spanning(scene: Scene, joints: list[Joint]) -> set[str]:
     """Names of joints of a spanning tree, of which the first are preferred (Kruskal)."""
-    group = {name: name for name in [GROUND, *scene.bodies]}
-
-    def root(name: str) -> str:
-        while group[name] != name:
-            group[name] = name = group[group[name]]
-        return name
-
-    kept = set()
-    for joint in joints:
-        ends = root(joint.parent), root(joint.child)
-        if ends[0] != ends[1]:
-            group[ends[0]] = ends[1]
-            kept.add(joint.name)
-    return kept
+    number = {name: k for k, name in enumerate([GROUND, *scene.bodies])}
+    groups = LinkedGroups(len(number))
+    return {joint.name for joint in joints if groups.join(number[joint.parent], number[joint.child])}
 
 
 def _from_the_ground(scene: Scene, kept: set[str]) -> list[tuple[Joint, str, str]]:

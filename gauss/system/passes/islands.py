@@ -4,7 +4,9 @@ Springs and forces between islands do not couple accelerations.
 """
 
 from dataclasses import replace
+from itertools import chain, pairwise
 
+from gauss.linked_groups import linked_groups
 from gauss.system.placed_elements import PlacedFrame
 from gauss.system.subsystem import GROUND, BoundRelation, Subsystem, kept_joints, spanning_tree
 
@@ -19,24 +21,13 @@ def islands(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:
 
 def _groups(subsystem: Subsystem) -> list[list[int]]:
     """Bodies of each island, in order."""
-    stands_for = list(range(subsystem.n_bodies))
-
-    def find(body: int) -> int:
-        while stands_for[body] != body:
-            stands_for[body] = stands_for[stands_for[body]]
-            body = stands_for[body]
-        return body
-
     bound = [[joint.parent, joint.child] for joint in subsystem.joints]
     bound += [[side for name in (c.driver, c.driven) for side in _sides(subsystem.joint(name))] for c in subsystem.couplings]
     bound += [_bodies(subsystem, relation) for relation in subsystem.relations]
-    for bodies in bound:
-        roots = [find(body) for body in bodies if body != GROUND]
-        for root in roots:
-            stands_for[root] = min(roots)
+    links = chain.from_iterable(pairwise(body for body in bodies if body != GROUND) for bodies in bound)
     groups: dict[int, list[int]] = {}
-    for body in range(subsystem.n_bodies):
-        groups.setdefault(find(body), []).append(body)
+    for body, group in enumerate(linked_groups(subsystem.n_bodies, links).tolist()):
+        groups.setdefault(group, []).append(body)
     return list(groups.values())
 
 

@@ -1,0 +1,49 @@
+"""Groups of things that are linked: which of them belong together, by pairs of links (union–find)."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+
+class LinkedGroups:
+    """Groups of numbered things, which links join.
+
+    Paths are halved as they are walked: Tarjan and van Leeuwen, J. ACM 31 (1984), 245–281.
+
+    Parameters
+    ----------
+    count : int
+        Number of things; at first, each is a group of its own.
+    """
+
+    def __init__(self, count: int):
+        self._parent = list(range(count))
+
+    def root(self, one: int) -> int:
+        """Smallest number in the group of a thing."""
+        parent = self._parent
+        while parent[one] != one:
+            parent[one] = one = parent[parent[one]]
+        return one
+
+    def join(self, one: int, other: int) -> bool:
+        """Join the groups of two things; whether they were two."""
+        low, high = sorted((self.root(one), self.root(other)))
+        self._parent[high] = low
+        return low != high
+
+
+def linked_groups(count: int, links: Iterable[tuple[int, int]]) -> np.ndarray:
+    """Group (count,) of each thing: the smallest number in it.
+
+    Parameters
+    ----------
+    count : int
+        Number of things.
+    links : iterable of (int, int)
+        Pairs that belong together.
+    """
+    groups = LinkedGroups(count)
+    for one, other in links:
+        groups.join(one, other)
+    return np.array([groups.root(one) for one in range(count)], dtype=np.int64)
