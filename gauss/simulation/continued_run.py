@@ -1,4 +1,4 @@
-"""A motion whose compiled loop has stopped early: fallback dynamics of its plan continue it from the last confirmed point."""
+"""A motion whose compiled loop has stopped early: its fallback dynamics continue it from the last confirmed point."""
 
 from collections.abc import Callable
 

@@ -5,13 +5,13 @@ import subprocess
 
 import numpy as np
 import pytest
+from gauss.export.c_code import PRELUDE, CBody
+from gauss.export.casadi_function import casadi_function
+from gauss.export.exported_function import ExportedFunction
 from scipy.interpolate import CubicSpline
 
 from gauss import math
 from gauss.codegen import Function, Graph, Kernel, forward, numbers_of, substitute, write
-from gauss.export.c_code import PRELUDE, CBody
-from gauss.export.casadi_function import casadi_function
-from gauss.export.exported_function import ExportedFunction
 
 NAN, EVEN = np.nan, np.linspace(-1.0, 3.0, 100)
 UNEVEN = np.sort(np.append(np.random.default_rng(3).uniform(-1.0, 3.0, 98), [-1.0, 3.0]))
