@@ -22,9 +22,10 @@ deepest penetration at the end [m], of boxes and meshes into the floor and of ba
 of 30, 100 and 1000 balls show how a step grows with their number.
 
 Robots of Gymnasium and of dm_control follow, with stops and contacts, stepped for 1 s under random inputs that change every
-5 steps: the quadruped stands on terrain with a ball, the manipulator is an arm with a gripper between loose objects. Those
-whose packages are not installed are left out. Their first motion includes reading the file. Their error is the deepest penetration at the end: the largest change of a coordinate
-that moves the shapes apart [m, rad] for gauss, the least distance of a contact for MuJoCo.
+5 steps: the quadruped stands on terrain, with a ball above it, the manipulator is an arm with a gripper between loose
+objects. Those whose packages are not installed are left out. Their first motion includes reading the file. Their error is
+the deepest penetration at the end: the largest change of a coordinate that moves the shapes apart [m, rad] for gauss, the
+least distance of a contact for MuJoCo.
 
 Writes benchmarks/results/contacts.md and .csv.
 """

@@ -5,8 +5,11 @@
 Each row is in its unit, so that the laws compare forces and rates of all rows.
 """
 
+from collections.abc import Callable, Sequence
+
 from gauss.codegen import POINTER
 from gauss.codegen.kernels.arrays import Array, Value
+from gauss.codegen.kernels.interleaved_sums import each_sum, highest, lowest
 from gauss.codegen.kernels.near_pairs import BODY, ROW, parts_of
 from gauss.codegen.kernels.step_memory import StepMemory
 
@@ -49,12 +52,21 @@ class ContactRows:
 
     def _row_of_contact(self, at: Value, J: Array, bias: Value, bodies, unit: Value):
         r, n_v = self.r, self.at.n["n_v"]
+        begins, ends = ([self.at.table(name)[body] for body in bodies] for name in ("body_begin", "body_end"))
+        K = self.at["K"].after(at * n_v)
         with r.each(n_v) as j:
-            total = r.number(0.0)
-            for side, body in enumerate(bodies):
+            K[j] = 0.0
+        for side, body in enumerate(bodies):
+            own = self.at["flat:J"].after(body * 6 * n_v)
+            with r.each(ends[side], begins[side]) as j:
+                total = K[j]
                 for i in range(6):
-                    total = total + J[24 * side + i] * self.at["flat:J"][(body * 6 + i) * n_v + j]
-            self.at["K"][at * n_v + j] = total * unit
+                    total = total + J[24 * side + i] * own[n_v * i + j]
+                K[j] = total
+        begin, end = lowest(r, begins), highest(r, ends)
+        with r.each(end, begin) as j:
+            K[j] = K[j] * unit
+        self._bound(at, begin, end)
         rate = r.number(0.0)
         for side, body in enumerate(bodies):
             for i in range(6):
@@ -65,8 +77,23 @@ class ContactRows:
         n_v = self.at.n["n_v"]
         with self.r.each(n_v) as i:
             self.at["K"][at * n_v + i] = self.at["flat:K"][j * n_v + i] * unit
+        self._bound(at, self.at.table("row_begin")[j], self.at.table("row_end")[j])
         self.at["rate"][at], self.at["bias"][at] = self.at["flat:rate"][j] * unit, self.at["flat:bias"][j] * unit
         self.at["unit"][at], self.at["force"][at] = unit, self.at["known_others"][j] / unit
+
+    def _bound(self, at: Value, begin: Value, end: Value):
+        """Keep the bounds of what differs from zero in a row."""
+        self.at.table("k_begin")[at], self.at.table("k_end")[at] = begin, end
+
+    def bounds(self, rows: Sequence[Value]) -> tuple[Value, Value]:
+        """Bounds of what differs from zero in some rows."""
+        begin, end = self.at.table("k_begin"), self.at.table("k_end")
+        return lowest(self.r, [begin[i] for i in rows]), highest(self.r, [end[i] for i in rows])
+
+    def each_product(self, count: Value, rates: Array, done: Callable[[Value, Value], None]):
+        """Products of the first rows with rates or accelerations (n_v,), and what is done with each: (row, product)."""
+        K, n_v = self.at["K"], self.at.n["n_v"]
+        each_sum(self.r, count, self.bounds, lambda total, i, p: total + K[i * n_v + p] * rates[p], done)
 
     def _known_force(self, m: Value, c: Value):
         """Initial forces of a contact, those of the last step."""
