@@ -36,12 +36,10 @@ class ActiveContacts:
         r, n, s, g = self.r, self.at.n, self.at.settings, self.at.n["g"]
         rows = m * 3 + g + n["s"]
         scale = r.variable(0.0)
-
-        def after(i: Value, push: Value):
-            self.at["after"][i] = self.at["rate"][i] + s["h"] * (push + self.at.remaining * self.at["bias"][i])
+        push = self.rows.products(rows, self.at["a"])
+        with r.each(rows) as i:
+            self.at["after"][i] = self.at["rate"][i] + s["h"] * (push[i] + self.at.remaining * self.at["bias"][i])
             scale[0] = r.maximum(r.absolute(self.at["rate"][i]), scale[0])
-
-        self.rows.each_product(rows, self.at["a"], after)
         removal = r.maximum(s["h"], s["removal"])
         with r.each(m + g) as i:
             closed = r.choose(s["removal"] > 0.0, self.at["force"][i], 0.0)
@@ -55,13 +53,11 @@ class ActiveContacts:
             leave_if((again[0] < 1) | (tries[0] > ROUNDS) | (solved[0] < 0.0))
             self._solve_active(m, solved)
             again[0], tries[0] = 0, tries[0] + 1
-
-            def look(i: Value, push: Value):
-                closes = self.at["after"][i] + s["h"] * push < s["missed"] * (scale[0] + 1.0) * -1.0
+            push = self.rows.products(m + g, self.at["added"])
+            with r.each(m + g) as i:
+                closes = self.at["after"][i] + s["h"] * push[i] < s["missed"] * (scale[0] + 1.0) * -1.0
                 with r.when(closes & (self.at["active"][i] < 1.0)):
                     self.at["active"][i], again[0] = 1.0, 1
-
-            self.rows.each_product(m + g, self.at["added"], look)
         return (solved[0] >= 0.0) & (again[0] < 1)
 
     def _solve_active(self, m: Value, solved: Array):
@@ -88,7 +84,7 @@ class ActiveContacts:
             self.at["b"][i], self.at["f"][i] = self.at["after"][row], self.at["force"][row]
             with r.each(k) as j:
                 Y[j] = 0.0
-            begin, end = self.rows.bounds([row])
+            begin, end = self.rows.bounds.around([row])
             with r.each(end, begin) as p:
                 entry = self.at["K"][row * n_v + p]
                 with r.when(r.absolute(entry) > 0.0), r.each(z_end[p], z_begin[p]) as j:

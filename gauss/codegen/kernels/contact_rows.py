@@ -5,11 +5,9 @@
 Each row is in its unit, so that the laws compare forces and rates of all rows.
 """
 
-from collections.abc import Callable, Sequence
-
 from gauss.codegen import POINTER
 from gauss.codegen.kernels.arrays import Array, Value
-from gauss.codegen.kernels.interleaved_sums import each_sum, highest, lowest
+from gauss.codegen.kernels.interleaved_sums import RowBounds, higher, lower, row_products
 from gauss.codegen.kernels.near_pairs import BODY, ROW, parts_of
 from gauss.codegen.kernels.step_memory import StepMemory
 
@@ -63,7 +61,7 @@ class ContactRows:
                 for i in range(6):
                     total = total + J[24 * side + i] * own[n_v * i + j]
                 K[j] = total
-        begin, end = lowest(r, begins), highest(r, ends)
+        begin, end = lower(*begins), higher(*ends)
         with r.each(end, begin) as j:
             K[j] = K[j] * unit
         self._bound(at, begin, end)
@@ -85,15 +83,15 @@ class ContactRows:
         """Keep the bounds of what differs from zero in a row."""
         self.at.table("k_begin")[at], self.at.table("k_end")[at] = begin, end
 
-    def bounds(self, rows: Sequence[Value]) -> tuple[Value, Value]:
-        """Bounds of what differs from zero in some rows."""
-        begin, end = self.at.table("k_begin"), self.at.table("k_end")
-        return lowest(self.r, [begin[i] for i in rows]), highest(self.r, [end[i] for i in rows])
+    @property
+    def bounds(self) -> RowBounds:
+        """Bounds of what differs from zero in the rows."""
+        return RowBounds(self.at.table("k_begin"), self.at.table("k_end"))
 
-    def each_product(self, count: Value, rates: Array, done: Callable[[Value, Value], None]):
-        """Products of the first rows with rates or accelerations (n_v,), and what is done with each: (row, product)."""
-        K, n_v = self.at["K"], self.at.n["n_v"]
-        each_sum(self.r, count, self.bounds, lambda total, i, p: total + K[i * n_v + p] * rates[p], done)
+    def products(self, count: Value, rates: Array) -> Array:
+        """Products of the first rows with rates or accelerations (n_v,)."""
+        row_products(self.r, self.at["K"], self.at.n["n_v"], count, rates, self.bounds, self.at["product"])
+        return self.at["product"]
 
     def _known_force(self, m: Value, c: Value):
         """Initial forces of a contact, those of the last step."""

@@ -5,14 +5,17 @@
 with the Cholesky factor C of Nᵀ M N; N are the rates of independent coordinates, given by its entries alone.
 """
 
-from gauss.codegen import INTEGER
-from gauss.codegen.kernels.arrays import Array, Value
-from gauss.codegen.kernels.interleaved_sums import each_sum, highest, lowest
+from llvmlite import ir
+
+from gauss.codegen import INTEGER, POINTER
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Value, subroutine
+from gauss.codegen.kernels.interleaved_sums import RowBounds, each_sum, higher, row_products
 from gauss.codegen.kernels.step_memory import StepMemory
 
 # Sum of h d over the inertias that single forces meet, above which damping of joints is implicit. It bounds the largest rate
 # of decay times the step: explicit steps diverge beyond 2, and overshoot beyond 1.
 STIFF_DAMPING = 1.0
+SPEED = "speed"  # function of a module
 
 
 def implicit_inertia(inertia, damped, maximum):
@@ -138,7 +141,7 @@ class FreeMotion:
             each_sum(
                 r,
                 k,
-                lambda lanes: (begin, r.choose(lowest(r, [first[i] for i in lanes]) > j, begin, j)),
+                lambda lanes: (begin, j),
                 lambda total, i, p: total + C[i * k + p] * row_of[p],
                 lambda i, total: C.__setitem__(i * k + j, (C[i * k + j] - total) / C[own]),
                 first=j + 1,
@@ -148,7 +151,7 @@ class FreeMotion:
             each_sum(
                 r,
                 j + 1,
-                lambda lanes: (highest(r, [begin, lanes[0]]), j),
+                lambda lanes: (higher(begin, lanes[0]), j),
                 lambda total, i, p: total - E[i * k + p] * row_of[p],
                 lambda i, total: E.__setitem__(i * k + j, total / C[own]),
                 first=least[j],
@@ -174,30 +177,35 @@ class FreeMotion:
 
     def spread(self, target: Array):
         """Accelerations Z z."""
-        r, k, Z, z = self.r, self.at.n["r"], self.at["Z"], self.at["z"]
-        begin, end = self.at.table("z_begin"), self.at.table("z_end")
-        each_sum(
-            r,
-            self.at.n["n_v"],
-            lambda lanes: (lowest(r, [begin[i] for i in lanes]), highest(r, [end[i] for i in lanes])),
-            lambda total, i, p: total + Z[i * k + p] * z[p],
-            target.__setitem__,
-        )
+        at = self.at
+        bounds = RowBounds(at.table("z_begin"), at.table("z_end"))
+        row_products(self.r, at["Z"], at.n["r"], at.n["n_v"], at["z"], bounds, target)
 
     def speed(self, v: Array) -> Value:
         """Largest speed of a point of a shape."""
-        r, n_v, largest, J = self.r, self.at.n["n_v"], self.r.variable(0.0), self.at["flat:J"]
-        begin, end = self.at.table("body_begin"), self.at.table("body_end")
-        with r.each(self.at.n["bodies"] - 1) as b:
-            rates = [r.variable(0.0) for _ in range(6)]
-            with r.each(end[b], begin[b]) as p:
-                for i, rate in enumerate(rates):
-                    rate[0] = rate[0] + J[(b * 6 + i) * n_v + p] * v[p]
-            squares = []
-            for half in range(2):
-                total = r.number(0.0)
-                for rate in rates[3 * half : 3 * half + 3]:
-                    total = total + rate[0] * rate[0]
-                squares.append(r.square_root(total))
-            largest[0] = r.maximum(squares[1] + squares[0] * self.at["reach"][b], largest[0])
-        return largest[0]
+        r, at, found = self.r, self.at, self.r.buffer(1)
+        bodies = at.n["bodies"] - 1, at.n["n_v"], at["flat:J"], at["reach"], at.table("body_begin"), at.table("body_end")
+        r.call(r.module.globals.get(SPEED) or _write_speed(r.module), *bodies, v, found)
+        return found[0]
+
+
+def _write_speed(module: ir.Module) -> ir.Function:
+    """Emit the largest speed of a point of a shape, by Jacobians of bodies and the reach of their shapes."""
+    kinds = [INTEGER, INTEGER, POINTER, POINTER, INTEGERS, INTEGERS, POINTER, POINTER]
+    r = subroutine(module, SPEED, kinds)
+    (bodies, n_v), (J, reach, begin, end, v, found) = r.integers, r.arrays
+    largest = r.variable(0.0)
+    with r.each(bodies) as b:
+        rates = [r.variable(0.0) for _ in range(6)]
+        with r.each(end[b], begin[b]) as p:
+            for i, rate in enumerate(rates):
+                rate[0] = rate[0] + J[(b * 6 + i) * n_v + p] * v[p]
+        squares = []
+        for half in range(2):
+            total = r.number(0.0)
+            for rate in rates[3 * half : 3 * half + 3]:
+                total = total + rate[0] * rate[0]
+            squares.append(r.square_root(total))
+        largest[0] = r.maximum(squares[1] + squares[0] * reach[b], largest[0])
+    found[0] = largest[0]
+    return r.done()

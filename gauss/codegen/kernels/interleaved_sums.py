@@ -5,11 +5,15 @@ as long. Terms that are structurally zero are left out by bounds, which changes 
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
-from gauss.codegen import INTEGER
-from gauss.codegen.kernels.arrays import Routine, Value
+from llvmlite import ir
+
+from gauss.codegen import INTEGER, POINTER
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
 
 LANES = 4  # sums at a time
+PRODUCTS = "row_products"  # function of a module
 
 Bounds = Callable[[Sequence[Value]], tuple[Value, Value]]
 
@@ -54,17 +58,54 @@ def each_sum(
             place[0] = i + size
 
 
-def lowest(r: Routine, values: Sequence[Value]) -> Value:
-    """Least of some integers."""
-    found = values[0]
-    for other in values[1:]:
-        found = r.choose(other < found, other, found)
-    return found
+def lower(x: Value, y: Value) -> Value:
+    """Lower of two integers."""
+    return Value(x.b, x.b.select((x < y).value, x.value, y.value))
 
 
-def highest(r: Routine, values: Sequence[Value]) -> Value:
-    """Largest of some integers."""
-    found = values[0]
-    for other in values[1:]:
-        found = r.choose(other > found, other, found)
-    return found
+def higher(x: Value, y: Value) -> Value:
+    """Higher of two integers."""
+    return Value(x.b, x.b.select((x > y).value, x.value, y.value))
+
+
+class RowBounds(NamedTuple):
+    """First place and end of what differs from zero in each row of a matrix."""
+
+    begin: Array
+    end: Array
+
+    def around(self, rows: Sequence[Value]) -> tuple[Value, Value]:
+        """Bounds of some rows together."""
+        found = self.begin[rows[0]], self.end[rows[0]]
+        for row in rows[1:]:
+            found = lower(found[0], self.begin[row]), higher(found[1], self.end[row])
+        return found
+
+
+def row_products(r: Routine, matrix: Array, columns: Value, count: Value, vector: Array, bounds: RowBounds, target: Array):
+    """Call the product of the first rows of a matrix and a vector; terms outside the bounds of the rows are left out.
+
+    Parameters
+    ----------
+    r : Routine
+        Where code is emitted; its module holds the product once.
+    columns : Value
+        Columns of the matrix.
+    count : Value
+        Number of rows.
+    bounds : RowBounds
+        Bounds of all rows.
+    """
+    function = r.module.globals.get(PRODUCTS) or _write_products(r.module)
+    r.call(function, columns, count, matrix, vector, bounds.begin, bounds.end, target)
+
+
+def _write_products(module: ir.Module) -> ir.Function:
+    r = subroutine(module, PRODUCTS, [INTEGER, INTEGER, POINTER, POINTER, INTEGERS, INTEGERS, POINTER])
+    (columns, count), (matrix, vector, begin, end, target) = r.integers, r.arrays
+
+    def add(total: Value, i: Value, p: Value) -> Value:
+        return total + matrix[i * columns + p] * vector[p]
+
+    each_sum(r, count, RowBounds(begin, end).around, add, target.__setitem__)
+    return r.done()

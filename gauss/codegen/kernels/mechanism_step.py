@@ -88,13 +88,12 @@ class _StepWriter:
         """Whether a gap has an impact in the rest of a step of which the bodies moved a share; then it begins anew."""
         r, s, found = self.r, self.at.settings, self.r.variable(0.0)
 
-        def look(i: Value, product: Value):
-            speed = r.absolute(product + self.at["bias"][i]) * 2.0 * s["h"] + s["rest"]
-            (hit,) = r.inline(self.functions.impact, self.at["gap"][i], self.at["rate"][i], speed, s["h"], s["share"])
-            found[0] = r.maximum(hit, found[0])
-
         with r.when(s["share"] > 0.0):
-            self.rows.each_product(m + self.at.n["g"], self.at["a"], look)
+            push = self.rows.products(m + self.at.n["g"], self.at["a"])
+            with r.each(m + self.at.n["g"]) as i:
+                speed = r.absolute(push[i] + self.at["bias"][i]) * 2.0 * s["h"] + s["rest"]
+                (hit,) = r.inline(self.functions.impact, self.at["gap"][i], self.at["rate"][i], speed, s["h"], s["share"])
+                found[0] = r.maximum(hit, found[0])
         with r.when(found[0] > 0.0):
             self.status[0] = IMPACT
         return found[0]
@@ -113,17 +112,15 @@ class _StepWriter:
             self.at["end_v"][i] = self.at["v"][i] + s["h"] * acceleration
             self.at["total"][i] = self.at["v"][i] + s["h"] * 0.5 * acceleration
         lossy, other = r.variable(0.0), r.variable(0.0)
-
-        def add_work(i: Value, rate: Value):
-            work = self.at["force"][i] * rate
+        rate = self.rows.products(rows, self.at["total"])
+        with r.each(rows) as i:
+            work = self.at["force"][i] * rate[i]
             self.at["row_work"][i] = work
             with r.when(i < m * 3 + g):
                 lossy[0] = lossy[0] + work
             with r.when(i >= m * 3 + g):
                 share = self.at["lossy"][i - (m * 3 + g)]
                 lossy[0], other[0] = lossy[0] + work * share, other[0] + work * (share * -1.0 + 1.0)
-
-        self.rows.each_product(rows, self.at["total"], add_work)
         results[0], results[2] = results[0] + other[0], results[2] - lossy[0]
         self.free.add_damping_over(self.at["total"])
         results[3], results[4] = self.at["residual"][0], 0.0

@@ -80,6 +80,7 @@ def slots(n: dict[str, int]) -> dict[str, int]:
         "known_others": others,
         "K": rows * v,
         "Y": rows * r,
+        "product": rows,
         "rate": rows,
         "bias": rows,
         "gap": m + n["g"],

@@ -72,7 +72,7 @@ def step_patterns(layout: SparseArrays, N: np.ndarray) -> StepPatterns:
     least = np.array([mine.min() for mine in members], dtype=np.int64)
     bodies, others = _bounds(J.any(axis=1)), _bounds(K)
     values = N[row, column]
-    return StepPatterns(gathered, values[i] * values[j], C.argmax(axis=1), least, z_begin, z_end, *bodies, *others)
+    return StepPatterns(gathered, values[i] * values[j], _bounds(C)[0], least, z_begin, z_end, *bodies, *others)
 
 
 def _components(C: np.ndarray) -> np.ndarray:
@@ -85,7 +85,6 @@ def _components(C: np.ndarray) -> np.ndarray:
 
 def _bounds(differs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First place and end of what differs from zero in each row; an empty row ends before it begins."""
-    n = differs.shape[1]
-    some = differs.any(axis=1)
-    begin, end = np.where(some, differs.argmax(axis=1), n), np.where(some, n - differs[:, ::-1].argmax(axis=1), 0)
-    return begin.astype(np.int64), end.astype(np.int64)
+    last = np.ones((len(differs), 1), dtype=bool)  # as if something followed
+    begin, behind = (np.column_stack([part, last]).argmax(axis=1) for part in (differs, differs[:, ::-1]))
+    return begin.astype(np.int64), (differs.shape[1] - behind).astype(np.int64)
