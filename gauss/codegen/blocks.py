@@ -22,19 +22,12 @@ SHORTEST_OF_ROWS = 2_000  # the same where rows are transposed: their buffers, t
 
 
 class StateBlocks(NamedTuple):
-    """Code of a function for vectors of states side by side.
+    """Code of a function for vectors of states side by side."""
 
-    Attributes
-    ----------
-    code : llvmlite.ir.Function
-        ``void name(double* in, i64 in_stride, double* out, i64 out_stride, double* frame, i64 vectors)``: input j of state i
-        is ``in[j * in_stride + i]``; at most :data:`STATES` states.
-    slots : int
-        Numbers of a state in its frame.
-    """
-
+    # ``void name(double* in, i64 in_stride, double* out, i64 out_stride, double* frame, i64 vectors)``: input j of state i
+    # is ``in[j * in_stride + i]``; at most :data:`STATES` states
     code: ir.Function
-    slots: int
+    slots: int  # numbers of a state in its frame
 
     def frame(self, buffers: Buffers) -> ir.Value:
         """Frame of a block, in a function that calls it."""

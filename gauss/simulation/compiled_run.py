@@ -46,27 +46,13 @@ UNTRUSTED = (LoopStatus.UNCONFIRMED, LoopStatus.OFF_CONSTRAINTS, LoopStatus.TOO_
 
 
 class MethodOnSystem(NamedTuple):
-    """What all runs of one method on one system have in common, beside their machine code.
+    """What all runs of one method on one system have in common, beside their machine code."""
 
-    Attributes
-    ----------
-    layout : PointLayout
-        Places in a point.
-    method_state : ndarray or None
-        Initial method state; the accelerations where None.
-    budget : int
-        Steps of one call of the loop.
-    every : int
-        Steps between two checks of the accelerations.
-    order : float
-        Order of the method.
-    """
-
-    layout: PointLayout
-    method_state: np.ndarray | None
-    budget: int
-    every: int
-    order: float
+    layout: PointLayout  # places in a point
+    method_state: np.ndarray | None  # initial method state; the accelerations where None
+    budget: int  # steps of one call of the loop
+    every: int  # steps between two checks of the accelerations
+    order: float  # order of the method
 
 
 class CompiledRun:

@@ -11,6 +11,9 @@ from gauss.export.exported_function import ExportedFunction
 from scipy.interpolate import CubicSpline
 
 from gauss import math
+from gauss.analysis.export.c_code import PRELUDE, CBody
+from gauss.analysis.export.casadi_function import casadi_function
+from gauss.analysis.export.exported_function import ExportedFunction
 from gauss.codegen import Function, Graph, Kernel, forward, numbers_of, substitute, write
 
 NAN, EVEN = np.nan, np.linspace(-1.0, 3.0, 100)

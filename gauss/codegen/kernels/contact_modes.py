@@ -50,9 +50,10 @@ class ContactModes:
         self._compare()
 
     def _rate(self, row: Value) -> Value:
-        """Rate of a row after the step."""
-        K, n_v = self.at["K"].after(row * self.at.n["n_v"]), self.at.n["n_v"]
-        return self.at["rate"][row] + self.r.sum(n_v, lambda i: K[i] * (self.at["end_v"][i] - self.at["v"][i]))
+        """Rate of a row after the step, as the laws take it."""
+        K, n_v, s = self.at["K"].after(row * self.at.n["n_v"]), self.at.n["n_v"], self.at.settings
+        after = self.at["rate"][row] + self.r.sum(n_v, lambda i: K[i] * (self.at["end_v"][i] - self.at["v"][i]))
+        return after + s["h"] * (self.r.number(1.0) - s["share"]) * self.at["bias"][row]
 
     def _hits(self, row: Value) -> Value:
         """Whether a gap has an impact in the step."""

@@ -195,7 +195,8 @@ class FreeBodyStepper:
     ) -> ModesOfStep | None:
         """Contacts that bear a force in a step; None if their modes are those of the last step."""
         slow = sliding_above(self.system, begun.v)
-        modes = modes_of_contacts(self.table, near.law, force, np.hypot(reached[:, 1], reached[:, 2]), slow)
+        along = reached[:, 1:] + (h * (1.0 - share)) * near.bias[:, 1:]  # the velocities that the laws take
+        modes = modes_of_contacts(self.table, near.law, force, np.hypot(*along.T), slow)
         if self.record.is_same(near.key, modes):
             return None
         pushed, hits = np.flatnonzero(modes), self._impacts(near, begun, known, h, share)

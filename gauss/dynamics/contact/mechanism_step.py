@@ -227,7 +227,8 @@ class MechanismStepper:
         name = partial(self.rows.name, near)
         paradoxes = paradoxes_of_step(rows, begun.H, begun.acceleration, force, self.slow(state.v), name)
         hits = self._impacts(rows, begun, h, rest, share)
-        modes = self.rows.modes(rows, near, force, h * acceleration, h * work, hits, self.slow(state.v))
+        after = rows.rate + h * (rows.K @ acceleration + (1.0 - share) * rows.bias)
+        modes = self.rows.modes(rows, near, force, after, h * work, hits, self.slow(state.v))
         return MechanismStep(q, v, near, contacts, others, power, error, paradoxes, modes)
 
     def _open(self, state: State, h: float, rest: float) -> tuple[float, FreeStep, NearContacts, StepRows, float]:

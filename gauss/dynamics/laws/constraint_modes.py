@@ -95,17 +95,11 @@ class Condition(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What residuals do across a surface between two modes.
+    """What residuals do across a surface between two modes."""
 
-    Attributes
-    ----------
-    name : str
-        Constraint that changes most, relative to its terms.
-    position, velocity : float
-        Largest change of its position residual, and of its velocity residual [m, rad], [m/s, rad/s]; 0 where continuous.
-    """
-
-    name: str
+    name: str  # constraint that changes most, relative to its terms
+    # position, velocity: largest change of its position residual, and of its velocity residual [m, rad], [m/s, rad/s]; 0
+    # where continuous
     position: float
     velocity: float
 

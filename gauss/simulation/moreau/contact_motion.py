@@ -19,27 +19,13 @@ from gauss.system import State, System
 
 
 class ContactMotionState(NamedTuple):
-    """What a motion continues from.
+    """What a motion continues from."""
 
-    Attributes
-    ----------
-    state : State
-        The state.
-    work : ndarray, shape (3,)
-        Work of drives and of forces on bodies, energy lost, since the start [J].
-    known : object
-        Forces of the last step.
-    modes : ndarray of int
-        Modes of the contacts and set-valued elements after it.
-    asleep : object
-        Bodies asleep, in motions that know any.
-    """
-
-    state: State
-    work: np.ndarray
-    known: Any
-    modes: np.ndarray
-    asleep: Any = None
+    state: State  # the state
+    work: np.ndarray  # (3,): work of drives and of forces on bodies, energy lost, since the start [J]
+    known: Any  # forces of the last step
+    modes: np.ndarray  # modes of the contacts and set-valued elements after it
+    asleep: Any = None  # bodies asleep, in motions that know any
 
 
 class ContactMotion:
