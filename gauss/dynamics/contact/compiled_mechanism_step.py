@@ -40,9 +40,11 @@ class MechanismMemory(CompiledStepMemory):
     ----------
     stepper : MechanismStepper
         The stepper, of a tree, with couplings or without.
+    room : int
+        Contacts that there is room for.
     """
 
-    def __init__(self, stepper):
+    def __init__(self, stepper, room: int = FIRST_ROOM):
         self.stepper, self.detection, self.record = stepper, stepper.detection, stepper.record
         smooth, kernels = stepper.smooth, stepper.kernels
         table, N = stepper.table, stepper.compliance.free_columns
@@ -59,7 +61,7 @@ class MechanismMemory(CompiledStepMemory):
             "flat": kernels.layout.flat.size,
             "parts": len(table.parts),
             "pairs": len(self.detection.pair),
-            "capacity": FIRST_ROOM,
+            "capacity": room,
             "loops": int(smooth.closes),
             "laws": len(table.contacts),
             "input": stepper.inputs.size,
@@ -81,7 +83,7 @@ class MechanismMemory(CompiledStepMemory):
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
         at["other_restitution"][:], at["other_unit"][:] = rows.other_restitution, rows.other_unit
         at["set_unit"][:], at["limit"][:], at["lossy"][:] = rows.set_unit, rows.limit, rows.lossy
-        room, n = FIRST_ROOM, self.sizes
+        room, n = self.sizes["capacity"], self.sizes
         self.integers = {
             "entries": stepper.kernels.layout.entries.astype(np.int64),
             "known_found": np.zeros((room, 2), dtype=np.int64),
@@ -99,6 +101,15 @@ class MechanismMemory(CompiledStepMemory):
         time = stepper.system.scale.time
         rates = time * RESTING, time * SLIDING_SPEED
         self.set_first(stepper.system, *rates, stepper.shares[0], STEP_SETTINGS, stepper.constants)
+
+    def fitting(self) -> "MechanismMemory":
+        """Return the memory, or a larger one if contacts lack room."""
+        room = len(self.detection.rows)
+        if room <= self.sizes["capacity"]:
+            return self
+        larger = MechanismMemory(self.stepper, room)
+        larger.known = self.known
+        return larger
 
     def kernels(self) -> dict[str, int]:
         """Addresses of kernels of the scene."""
@@ -164,7 +175,7 @@ class MechanismMemory(CompiledStepMemory):
     def known(self, found: KnownForces):
         self.at["results"][SPEED_PLACE] = np.inf
         key, force, others, self.at["before"][0] = found
-        m = min(key.size, FIRST_ROOM)
+        m = key.size
         self.integers["known_found"][:m] = np.column_stack(np.divmod(key[:m], MOST_FEATURES))
         self.integers["known_count"][0] = m
         self.at["known"][: 3 * m], self.at["known_others"][:] = force[:m].ravel(), others
