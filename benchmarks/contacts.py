@@ -24,9 +24,11 @@ of them got velocities of about 1 cm/s and moved for 0.04 s before, so that they
 by micrometres per second, and the laws are met to 1e-5 relative, not to 1e-10 as elsewhere. 1000 stand still, and MuJoCo
 takes its conjugate gradients there: its Newton solver takes seconds a step.
 
-Robots of Gymnasium follow, with stops and contacts, stepped for 1 s under random inputs that change every 5 steps. Their
-first motion includes reading the file. Their error is the deepest penetration at the end: the largest change of a coordinate
-that moves the shapes apart [m, rad] for gauss, the least distance of a contact for MuJoCo.
+Robots of Gymnasium and of dm_control follow, with stops and contacts, stepped for 1 s under random inputs that change every
+5 steps: the quadruped stands on terrain, with a ball above it, the manipulator is an arm with a gripper between loose
+objects. Those whose packages are not installed are left out. Their first motion includes reading the file. Their error is
+the deepest penetration at the end: the largest change of a coordinate that moves the shapes apart [m, rad] for gauss, the
+least distance of a contact for MuJoCo.
 
 Writes benchmarks/results/contacts.md and .csv.
 """
@@ -217,7 +219,7 @@ def crowded() -> list[list[Way]]:
 
 
 def robots() -> list[list[Way]]:
-    """Walking robots under random inputs."""
+    """Walking robots, and an arm with a gripper, under random inputs."""
     steps, found = walkers.ACTIONS * walkers.HOLD, []
     for name, file in walkers.models().items():
         one, other = walkers.ours(file), walkers.theirs(file)
