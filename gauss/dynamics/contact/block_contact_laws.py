@@ -36,8 +36,8 @@ ROUNDS_OF_MANY = (
     Round(0, 1e-2, 20, decay=0.6),
     Round(0, 1e-5, 10, below=CLOSE),
     Round(0, 1e-7, 10, below=CLOSE),
-    Round(0, 1e-5, 30, below=CLOSE),
-    Round(0, 3e-6, 40, below=CLOSE),
+    Round(0, 1e-5, 30, below=0.1 * CLOSE),
+    Round(0, 3e-6, 40, below=0.1 * CLOSE),
     *(each._replace(above=FINE) for each in ROUNDS[1:]),
 )
 
