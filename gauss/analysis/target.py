@@ -14,24 +14,12 @@ ALL_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class TargetRows(NamedTuple):
-    """Rows of a target in one state.
+    """Rows of a target in one state."""
 
-    Attributes
-    ----------
-    error : ndarray, shape (m,)
-        Target less actual value [rad, m].
-    jacobian : ndarray, shape (m, n_v)
-        A in ė = −A v.
-    units : ndarray, shape (m,)
-        1 rad, or the length of the scene [m].
-    weights : ndarray, shape (m,)
-        Weights of the squared errors in these units.
-    """
-
-    error: np.ndarray
-    jacobian: np.ndarray
-    units: np.ndarray
-    weights: np.ndarray
+    error: np.ndarray  # (m,): target less actual value [rad, m]
+    jacobian: np.ndarray  # (m, n_v): A in ė = −A v
+    units: np.ndarray  # (m,): 1 rad, or the length of the scene [m]
+    weights: np.ndarray  # (m,): weights of the squared errors in these units
 
 
 @dataclass(frozen=True, kw_only=True)

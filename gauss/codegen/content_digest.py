@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from gauss.codegen.content_key import PACKAGE, IdentityKey, named_globals
+from gauss.codegen.content_key import IdentityKey, named_globals
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.lookup import Column
-from gauss.codegen.source_digest import is_outer, source_digest
+from gauss.codegen.source_digest import PACKAGE, closed_over, is_outer, source_digest
 
 BY_NAME = (PACKAGE, "numpy", "math", "cmath", "operator", "builtins")  # packages whose functions the key of the cache holds
 # built-in functions by which code may depend on more than its constants, globals and arguments
@@ -292,17 +292,10 @@ def _function(encoder: _Encoder, function: FunctionType) -> Sequence:
         return _named(encoder, function)
     ours = (function.__module__ or "").partition(".")[0] == PACKAGE
     encoder.note_module(function.__module__ or "")
-    closed = tuple(_content(cell) for cell in function.__closure__ or ())
+    closed = tuple(closed_over(function))
     seen = {} if ours else named_globals(function)
     defaults = function.__defaults__, function.__kwdefaults__
     return encoder.sequence(b"p", (*defaults, vars(function), closed, seen, function.__code__))
-
-
-def _content(cell) -> tuple:
-    try:
-        return (cell.cell_contents,)
-    except ValueError:  # the name is not bound yet
-        return ()
 
 
 def _code(encoder: _Encoder, code: CodeType) -> Sequence:

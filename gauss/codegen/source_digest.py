@@ -16,9 +16,9 @@ from pathlib import Path
 from types import FunctionType, MethodType
 
 from gauss.codegen import object_cache
-from gauss.codegen.content_key import PACKAGE, is_filled
 from gauss.lazy import LOADED_AT
 
+PACKAGE = __name__.partition(".")[0]
 FOLDER = Path(__file__).parent.parent
 READ = 1 << 16  # bytes at a time: more than most sources have
 INNER = frozenset(
@@ -44,12 +44,24 @@ def reaches_outer(function) -> bool:
         if is_outer(getattr(thing, "__module__", None) or type(thing).__module__):
             return True
         if isinstance(thing, FunctionType):
-            left += [cell.cell_contents for cell in thing.__closure__ or () if is_filled(cell)]
+            left += [value for values in closed_over(thing) for value in values]
         elif isinstance(thing, MethodType):
             left += [thing.__func__, thing.__self__]
         elif isinstance(thing, partial):
             left += [thing.func, *thing.args, *thing.keywords.values()]
     return False
+
+
+def closed_over(function: FunctionType) -> list[tuple]:
+    """Value of each name that a function closes over, empty where the name is not bound yet."""
+    return [_content(cell) for cell in function.__closure__ or ()]
+
+
+def _content(cell) -> tuple:
+    try:
+        return (cell.cell_contents,)
+    except ValueError:
+        return ()
 
 
 @cache

@@ -22,18 +22,10 @@ CHECK_COST = 4e-6  # s an evaluation of the checks that a law of the motion does
 
 
 class CallCost(NamedTuple):
-    """Cost of the opaque laws of a load in one evaluation.
+    """Cost of the opaque laws of a load in one evaluation."""
 
-    Attributes
-    ----------
-    whole : float
-        Time of an evaluation that they add [s].
-    own : float
-        Part of it that is the user's code [s]; not a number if it was not measured.
-    """
-
-    whole: float
-    own: float
+    whole: float  # time of an evaluation that they add [s]
+    own: float  # part of it that is the user's code [s]; not a number if it was not measured
 
     def __str__(self):
         if self.own != self.own:

@@ -23,27 +23,15 @@ PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel
 
 
 class Link(NamedTuple):
-    """Constants of a link.
+    """Constants of a link."""
 
-    Attributes
-    ----------
-    R, p : ndarray
-        From the inner link frame to the joint: rotation (3, 3), joint point on the inner side (3,) [m].
-    turn : ndarray, shape (3, 3)
-        Constant turn about the axis of the joint that remains, to the outer link frame.
-    inertia : tuple of ndarray
-        Blocks A, B, C of the regrouped inertia in the outer link frame.
-    first : ndarray, shape (3,)
-        Regrouped mass times the centre of mass there [kg m].
-    R_central, p_central : ndarray
-        The link frame in the principal central frame of the body: rotation, origin [m]; empty in kernels.
-    """
-
-    R: np.ndarray
+    R: np.ndarray  # R, p: from the inner link frame to the joint: rotation (3, 3), joint point on the inner side (3,) [m]
     p: np.ndarray
-    turn: np.ndarray
-    inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
-    first: np.ndarray
+    turn: np.ndarray  # (3, 3): constant turn about the axis of the joint that remains, to the outer link frame
+    inertia: tuple[np.ndarray, np.ndarray, np.ndarray]  # blocks A, B, C of the regrouped inertia in the outer link frame
+    first: np.ndarray  # (3,): regrouped mass times the centre of mass there [kg m]
+    # R_central, p_central: the link frame in the principal central frame of the body: rotation, origin [m]; empty in
+    # kernels
     R_central: np.ndarray = np.zeros((0, 0))
     p_central: np.ndarray = np.zeros(0)
 

@@ -25,28 +25,15 @@ if TYPE_CHECKING:
 
 
 class RowFront(NamedTuple):
-    """Rows that are eliminated at one root.
+    """Rows that are eliminated at one root."""
 
-    Attributes
-    ----------
-    factor : BlockLDLT
-        Factorisation of S_rr + μ.
-    H : dict
-        Wrenches (6, m) on the root, by block of rows.
-    across : dict
-        (S_rr + μ)⁻¹ H_rᵀ, by block of rows; empty for the ground.
-    coupled, pending : dict
-        S_rp and (S_rr + μ)⁻¹ S_rp, by block of rows p that are eliminated further in.
-    S : dict
-        Blocks of S_rr.
-    """
-
-    factor: BlockLDLT
-    H: dict
-    across: dict
+    factor: BlockLDLT  # factorisation of S_rr + μ
+    H: dict  # wrenches (6, m) on the root, by block of rows
+    across: dict  # (S_rr + μ)⁻¹ H_rᵀ, by block of rows; empty for the ground
+    # coupled, pending: S_rp and (S_rr + μ)⁻¹ S_rp, by block of rows p that are eliminated further in
     coupled: dict[int, dict]
     pending: dict[int, dict]
-    S: dict
+    S: dict  # blocks of S_rr
 
 
 class LoopFronts:

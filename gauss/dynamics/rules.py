@@ -18,19 +18,11 @@ from gauss.system.explain import MOST_REASONS
 
 
 class Rejected(NamedTuple):
-    """An applicable rule whose conditions do not hold.
+    """An applicable rule whose conditions do not hold."""
 
-    Attributes
-    ----------
-    driver, dynamics : str
-        As of a :class:`Plan`.
-    why : tuple of str
-        Violated conditions, in words.
-    """
-
-    driver: str
+    driver: str  # driver, dynamics: as of a :class:`Plan`
     dynamics: str
-    why: tuple[str, ...]
+    why: tuple[str, ...]  # violated conditions, in words
 
     def __str__(self) -> str:
         return f"{self.driver}, {self.dynamics} dynamics: {reasons_in_words(self.why)}"
@@ -120,33 +112,15 @@ class Plan:
 
 
 class Question(NamedTuple):
-    """Facts on which the conditions of rules are evaluated.
+    """Facts on which the conditions of rules are evaluated."""
 
-    Attributes
-    ----------
-    system : System
-        The system.
-    laws : Laws
-        Its loads, traced or opaque.
-    backend : str or object
-        Requested backend, or "auto".
-    method : Integrator or None
-        Integrator; None for single states.
-    drift : Drift
-        Constraint stabilisation with its gains.
-    stabilisation : str
-        Its name, as given by the user.
-    held : bool
-        Whether inputs are held between samples of a control law.
-    """
-
-    system: System
-    laws: Laws
-    backend: object = "auto"
-    method: Integrator | None = None
-    drift: Drift = Drift()
-    stabilisation: str = "projection"
-    held: bool = False
+    system: System  # the system
+    laws: Laws  # its loads, traced or opaque
+    backend: object = "auto"  # requested backend, or "auto"
+    method: Integrator | None = None  # integrator; None for single states
+    drift: Drift = Drift()  # constraint stabilisation with its gains
+    stabilisation: str = "projection"  # its name, as given by the user
+    held: bool = False  # whether inputs are held between samples of a control law
 
 
 def named(backend) -> str:
@@ -163,23 +137,13 @@ class Asked(Protocol):
 
 
 class Rule(NamedTuple):
-    """One row of a table.
+    """One row of a table."""
 
-    Attributes
-    ----------
-    driver, dynamics, fallback : str
-        Of the plan.
-    when : callable
-        Question → whether the rule applies.
-    conditions : tuple of callable
-        Question → violated conditions, in words.
-    """
-
-    driver: str
+    driver: str  # driver, dynamics, fallback: of the plan
     dynamics: str
     fallback: str = ""
-    when: Callable[[Any], bool] = lambda ask: True
-    conditions: tuple[Callable[[Any], list[str]], ...] = ()
+    when: Callable[[Any], bool] = lambda ask: True  # question → whether the rule applies
+    conditions: tuple[Callable[[Any], list[str]], ...] = ()  # question → violated conditions, in words
 
     def against(self, ask: Asked) -> list[str]:
         """Violated conditions, each once."""
@@ -187,18 +151,10 @@ class Rule(NamedTuple):
 
 
 class RuleTable(NamedTuple):
-    """Rules in order.
+    """Rules in order."""
 
-    Attributes
-    ----------
-    rules : tuple of Rule
-        The first whose conditions hold is taken.
-    refusal : callable
-        (question, reasons) → message where none does.
-    """
-
-    rules: tuple[Rule, ...]
-    refusal: Callable[[Any, str], str]
+    rules: tuple[Rule, ...]  # the first whose conditions hold is taken
+    refusal: Callable[[Any, str], str]  # (question, reasons) → message where none does
 
     def plan(self, ask: Asked, wanted: Plan | None = None) -> Plan:
         """Plan of the first rule whose conditions hold; with ``wanted``, of the rule with that driver and dynamics.

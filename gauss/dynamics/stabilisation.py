@@ -41,21 +41,12 @@ class Baumgarte:
 
 
 class Drift(NamedTuple):
-    """Constraint stabilisation with its gains.
+    """Constraint stabilisation with its gains."""
 
-    Attributes
-    ----------
-    projects : bool
-        Whether position and velocity are projected after each step, in the mass metric.
-    gains : tuple of float or None
-        α and β of Baumgarte's method [1/s].
-    partitioned : bool
-        Whether dependent coordinates follow from the independent ones, see
-        :mod:`gauss.simulation.compiled_steps.coordinate_partitioning`.
-    """
-
-    projects: bool = True
-    gains: tuple[float, float] | None = None
+    projects: bool = True  # whether position and velocity are projected after each step, in the mass metric
+    gains: tuple[float, float] | None = None  # α and β of Baumgarte's method [1/s]
+    # whether dependent coordinates follow from the independent ones, see
+    # :mod:`gauss.simulation.compiled_steps.coordinate_partitioning`
     partitioned: bool = False
 
 

@@ -21,25 +21,16 @@ from gauss.system import System
 
 
 class Term(NamedTuple):
-    """A function of a state.
+    """A function of a state."""
 
-    Attributes
-    ----------
-    arguments : str
-        Its arguments, of q, v, a (acceleration), l (load).
-    shapes : tuple of str
-        Shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints; p: values
-        of the parameter; i: standard inertial parameters of all bodies.
-    trace : callable
-        (terms, request, acceleration or load) → its results.
-    of_frame, has_reference, has_loads, of_parameter, of_loops : bool
-        Whether it is a function of a frame; in axes to be chosen; whether it depends on the loads of the scene; whether it
-        is the derivative by a parameter; whether it is of the tree with its loops eliminated.
-    """
-
-    arguments: str
+    arguments: str  # its arguments, of q, v, a (acceleration), l (load)
+    # shapes of its results: digits, v: independent rates, or all; V: all rates; r: rows of the loop constraints; p: values
+    # of the parameter; i: standard inertial parameters of all bodies
     shapes: tuple[str, ...]
-    trace: Callable
+    trace: Callable  # (terms, request, acceleration or load) → its results
+    # of_frame, has_reference, has_loads, of_parameter, of_loops: whether it is a function of a frame; in axes to be chosen;
+    # whether it depends on the loads of the scene; whether it is the derivative by a parameter; whether it is of the tree
+    # with its loops eliminated
     of_frame: bool = False
     has_reference: bool = False
     has_loads: bool = False

@@ -18,24 +18,12 @@ DOP853 = next(method for method in LIBRARIES if method.name == "scipy_dop853")
 
 
 class CrankMotion(NamedTuple):
-    """Solution of the equation of the crank.
+    """Solution of the equation of the crank."""
 
-    Attributes
-    ----------
-    t : ndarray, shape (k,)
-        Samples that were reached [s].
-    y : ndarray, shape (k, 2)
-        Angle and speed of the crank there [rad, rad/s].
-    longest : float
-        Longest distance of two evaluations of the law of the motor [s].
-    interruption : KeyboardInterrupt or None
-        Ctrl-C, after which the samples end early.
-    """
-
-    t: np.ndarray
-    y: np.ndarray
-    longest: float
-    interruption: KeyboardInterrupt | None
+    t: np.ndarray  # (k,): samples that were reached [s]
+    y: np.ndarray  # (k, 2): angle and speed of the crank there [rad, rad/s]
+    longest: float  # longest distance of two evaluations of the law of the motor [s]
+    interruption: KeyboardInterrupt | None  # Ctrl-C, after which the samples end early
 
 
 def motor_times(motor: Callable, start, duration: float, breaks=()) -> Timetable:

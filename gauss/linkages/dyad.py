@@ -21,21 +21,11 @@ from gauss.linkages.plane import cross, dot, left, pair
 
 
 class Inner(NamedTuple):
-    """Inner joint in world axes.
+    """Inner joint in world axes."""
 
-    Attributes
-    ----------
-    x : complex
-        Pin, or reference point of the slider.
-    u : complex or None
-        Direction of the guide.
-    sign : float
-        +1 if link i is the child of the joint: then the joint's reaction is the one on link i.
-    """
-
-    x: Complex
-    u: Complex | None
-    sign: float
+    x: Complex  # pin, or reference point of the slider
+    u: Complex | None  # direction of the guide
+    sign: float  # +1 if link i is the child of the joint: then the joint's reaction is the one on link i
 
     def seen(self, velocity: Complex, turning: Real) -> Complex:
         """Components of a relative motion at x that the joint constrains."""
@@ -47,27 +37,14 @@ class Inner(NamedTuple):
 
 
 class DyadFreedoms(NamedTuple):
-    """The two freedoms of a dyad at its inner joint.
+    """The two freedoms of a dyad at its inner joint."""
 
-    Attributes
-    ----------
-    inner : Inner
-        The inner joint.
-    frees : tuple
-        Freedoms of i and j.
-    tau : tuple of complex
-        Motions τ_i, τ_j in the components of the inner joint.
-    det : float
-        τ_i × τ_j.
-    quality : complex
-        Angle in [0, π/2] from the singular positions of the group, as cos + i sin up to a factor:
-        the transmission angle of RRR, |cos| of the pressure angle of RRP as sine.
-    """
-
-    inner: Inner
-    frees: tuple[PinFreedom | SlideFreedom, PinFreedom | SlideFreedom]
-    tau: tuple[Complex, Complex]
-    det: Real
+    inner: Inner  # the inner joint
+    frees: tuple[PinFreedom | SlideFreedom, PinFreedom | SlideFreedom]  # freedoms of i and j
+    tau: tuple[Complex, Complex]  # motions τ_i, τ_j in the components of the inner joint
+    det: Real  # τ_i × τ_j
+    # angle in [0, π/2] from the singular positions of the group, as cos + i sin up to a factor: the transmission angle of
+    # RRR, |cos| of the pressure angle of RRP as sine
     quality: Complex
 
 

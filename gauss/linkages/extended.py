@@ -31,27 +31,14 @@ FIELDS = ("p", "e", "v", "omega", "a", "alpha")
 
 
 class Extended(NamedTuple):
-    """Results in twice the precision at crank angles (m,), rounded to doubles.
+    """Results in twice the precision at crank angles (m,), rounded to doubles."""
 
-    Attributes
-    ----------
-    motion : LinkageKinematics
-        Where the links are and how they move; without the groups at their inner joints.
-    condition : ndarray, shape (n, m)
-        Condition number of each group.
-    reactions : dict
-        Joint → reaction (m,), see :class:`gauss.linkages.Cycle`.
-    torque : ndarray, shape (m,)
-        Torque of the motor [N m].
-    error : ndarray, shape (m,)
-        By how much torque, reactions or accelerations change when the data change by their rounding, relative to the largest
-        contribution of each; not a number where the linkage may not close.
-    """
-
-    motion: LinkageKinematics
-    condition: np.ndarray
-    reactions: dict[str, np.ndarray]
-    torque: np.ndarray
+    motion: LinkageKinematics  # where the links are and how they move; without the groups at their inner joints
+    condition: np.ndarray  # (n, m): condition number of each group
+    reactions: dict[str, np.ndarray]  # joint → reaction (m,), see :class:`gauss.linkages.Cycle`
+    torque: np.ndarray  # (m,): torque of the motor [N m]
+    # (m,): by how much torque, reactions or accelerations change when the data change by their rounding, relative to the
+    # largest contribution of each; not a number where the linkage may not close
     error: np.ndarray
 
 

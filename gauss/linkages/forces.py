@@ -8,21 +8,11 @@ from gauss.linkages.plane import dot, left, pair
 
 
 class Wrench(NamedTuple):
-    """Force and moment about a point.
+    """Force and moment about a point."""
 
-    Attributes
-    ----------
-    x : complex
-        The point [m].
-    force : complex
-        Force [N].
-    moment : float
-        Moment about x [N m].
-    """
-
-    x: Complex
-    force: Complex
-    moment: Real
+    x: Complex  # the point [m]
+    force: Complex  # force [N]
+    moment: Real  # moment about x [N m]
 
     def about(self, x: Complex) -> "Wrench":
         """Return the same wrench about another point."""

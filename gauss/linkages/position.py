@@ -12,19 +12,11 @@ from gauss.linkages.plane import cross, dot, left, pair
 
 
 class DyadPoses(NamedTuple):
-    """Poses of the two links, and the closure slack of the group.
+    """Poses of the two links, and the closure slack of the group."""
 
-    Attributes
-    ----------
-    i, j : Pose
-        The links.
-    slack : dict
-        Reason for a failed assembly, and closure slack [m], negative where it fails.
-    """
-
-    i: Pose
+    i: Pose  # i, j: the links
     j: Pose
-    slack: dict
+    slack: dict  # reason for a failed assembly, and closure slack [m], negative where it fails
 
 
 def place(dyad: Dyad, placed: dict) -> DyadPoses:

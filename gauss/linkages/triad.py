@@ -49,24 +49,12 @@ def _cross3(a, b) -> tuple:
 
 
 class Placed(NamedTuple):
-    """A class III group at its pins.
+    """A class III group at its pins."""
 
-    Attributes
-    ----------
-    pose : Pose
-        The ternary link.
-    legs : tuple of Pose
-        The legs.
-    pins : tuple of complex
-        Pins of the ternary link in world.
-    residuals : tuple of float
-        Loop residuals of the legs after Newton's last step [m].
-    """
-
-    pose: Pose
-    legs: tuple[Pose, ...]
-    pins: tuple[Complex, ...]
-    residuals: tuple[Real, ...]
+    pose: Pose  # the ternary link
+    legs: tuple[Pose, ...]  # the legs
+    pins: tuple[Complex, ...]  # pins of the ternary link in world
+    residuals: tuple[Real, ...]  # loop residuals of the legs after Newton's last step [m]
 
 
 def place(triad: Triad, placed, guess, steps: int = STEPS) -> Placed:

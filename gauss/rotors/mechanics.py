@@ -22,33 +22,16 @@ MOST_ELEMENTS = 5000  # shafts and links: larger networks take minutes to compil
 
 
 class Conditions(NamedTuple):
-    """Inputs of the equations besides time, angles and speeds: the mode, and the torques of what sticks.
+    """Inputs of the equations besides time, angles and speeds: the mode, and the torques of what sticks."""
 
-    Attributes
-    ----------
-    f : ndarray, shape (n_l,)
-        Torque factor of each link.
-    state : ndarray, shape (n_l,)
-        Of dry links the sign of the slip, 0 where they stick; of springs the backlash side in contact.
-    held : ndarray, shape (n_l,)
-        Torque of dry links that stick [N m].
-    dry : ndarray, shape (n_d,)
-        Sign of the speed of shafts with dry friction, 0 where their group sticks.
-    gate : ndarray, shape (n_terms,)
-        1 for torques that act, else 0.
-    dry_limit : ndarray, shape (n_d,)
-        Dry friction of shafts [N m].
-    stuck : ndarray, shape (n_g,)
-        Torque of the friction of a group at rest on its root [N m].
-    """
-
-    f: np.ndarray
+    f: np.ndarray  # (n_l,): torque factor of each link
+    # (n_l,): of dry links the sign of the slip, 0 where they stick; of springs the backlash side in contact
     state: np.ndarray
-    held: np.ndarray
-    dry: np.ndarray
-    gate: np.ndarray
-    dry_limit: np.ndarray
-    stuck: np.ndarray
+    held: np.ndarray  # (n_l,): torque of dry links that stick [N m]
+    dry: np.ndarray  # (n_d,): sign of the speed of shafts with dry friction, 0 where their group sticks
+    gate: np.ndarray  # (n_terms,): 1 for torques that act, else 0
+    dry_limit: np.ndarray  # (n_d,): dry friction of shafts [N m]
+    stuck: np.ndarray  # (n_g,): torque of the friction of a group at rest on its root [N m]
 
 
 class NetworkInstant(NamedTuple):

@@ -21,23 +21,13 @@ SLOW_SPEED = 1e-2  # slow speed relative to the largest known one
 
 
 class GearBranch(NamedTuple):
-    """Gear between a shaft and its parent on the way to the root.
+    """Gear between a shaft and its parent on the way to the root."""
 
-    Attributes
-    ----------
-    link, child, parent : int
-        Indices.
-    rate : float
-        ω_child/ω_parent.
-    forward : bool
-        Whether the child is the driven shaft.
-    """
-
-    link: int
+    link: int  # link, child, parent: indices
     child: int
     parent: int
-    rate: float
-    forward: bool
+    rate: float  # ω_child/ω_parent
+    forward: bool  # whether the child is the driven shaft
 
 
 @dataclass(frozen=True)

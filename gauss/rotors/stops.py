@@ -8,23 +8,14 @@ from gauss.dynamics.laws.switching_times import Timetable
 
 
 class StepEnd(NamedTuple):
-    """Mandatory end of a step.
+    """Mandatory end of a step."""
 
-    Attributes
-    ----------
-    before, after : float
-        End of the step, and start of the next one [s]: a few units in the last place apart at a switching time of a law, so
-        that no evaluation falls upon it.
-    switches : bool
-        Whether torques may be discontinuous there.
-    samples : tuple of float
-        Times of samples [s].
-    """
-
+    # before, after: end of the step, and start of the next one [s]: a few units in the last place apart at a switching time
+    # of a law, so that no evaluation falls upon it
     before: float
     after: float
-    switches: bool
-    samples: tuple[float, ...]
+    switches: bool  # whether torques may be discontinuous there
+    samples: tuple[float, ...]  # times of samples [s]
 
 
 def stops(duration: float, times: Timetable, switches: np.ndarray, samples: np.ndarray | None) -> list[StepEnd]:

@@ -14,21 +14,11 @@ COINCIDENT_POINTS = 1e-24  # squared distance, relative to that of the scene, be
 
 
 class Touch(NamedTuple):
-    """Contact distance, point and normal of two features.
+    """Contact distance, point and normal of two features."""
 
-    Attributes
-    ----------
-    gap : number or Expression
-        g_N [m], negative inside.
-    place : ndarray, shape (3,)
-        On the surface of one of them, in world axes [m].
-    normal : ndarray, shape (3,)
-        Unit vector out of the second shape.
-    """
-
-    gap: object
-    place: np.ndarray
-    normal: np.ndarray
+    gap: object  # g_N [m], negative inside
+    place: np.ndarray  # (3,): on the surface of one of them, in world axes [m]
+    normal: np.ndarray  # (3,): unit vector out of the second shape
 
 
 class FeaturePair:

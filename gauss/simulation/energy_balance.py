@@ -34,22 +34,12 @@ SHOWN = 8  # failing motions of a batch that a warning names
 
 
 class Imbalance(NamedTuple):
-    """Residual of the energy balance of a motion.
+    """Residual of the energy balance of a motion."""
 
-    Parameters
-    ----------
-    off, scale : float
-        Largest residual, and the energy that it is compared with [J].
-    when : float
-        End of the interval of its largest change [s].
-    allowed : float
-        Tolerance, relative to the scale.
-    """
-
-    off: float
+    off: float  # off, scale: largest residual, and the energy that it is compared with [J]
     scale: float
-    when: float
-    allowed: float = WRONG
+    when: float  # end of the interval of its largest change [s]
+    allowed: float = WRONG  # tolerance, relative to the scale
 
     @property
     def is_wrong(self) -> bool:

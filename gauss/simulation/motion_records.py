@@ -122,29 +122,20 @@ class Event:
 
 
 class EnergyRecord(NamedTuple):
-    """Energies along a motion, for its energy balance; numbers, or arrays (batch,) of a batch.
+    """Energies along a motion, for its energy balance; numbers, or arrays (batch,) of a batch."""
 
-    Parameters
-    ----------
-    kinetic, lowest, highest : float
-        Largest kinetic energy, least and largest potential energy [J].
-    magnitude : float
-        Size that the rounding of the potential energy is relative to [J], see
-        :func:`gauss.dynamics.energies.look_at_energies`.
-    initial, balance, off : float
-        T + V − work + dissipated at the start; its change up to the last point, and the largest change in size [J].
-    jump, when : float
-        Largest change of the balance from one point to the next [J], and the time of the latter [s].
-    """
-
-    kinetic: float
+    kinetic: float  # kinetic, lowest, highest: largest kinetic energy, least and largest potential energy [J]
     lowest: float
     highest: float
+    # size that the rounding of the potential energy is relative to [J], see
+    # :func:`gauss.dynamics.energies.look_at_energies`
     magnitude: float
+    # initial, balance, off: T + V − work + dissipated at the start; its change up to the last point, and the largest change
+    # in size [J]
     initial: float
     balance: float
     off: float
-    jump: float
+    jump: float  # jump, when: largest change of the balance from one point to the next [J], and the time of the latter [s]
     when: float
 
     @property

@@ -16,21 +16,11 @@ from gauss.system import State
 
 
 class AfterJump(NamedTuple):
-    """State after a jump of prescribed velocities.
+    """State after a jump of prescribed velocities."""
 
-    Attributes
-    ----------
-    state : State
-        Just after the switching time.
-    work : ndarray
-        Quadratures up to then: work of drives and of forces on bodies, energy lost, … [J].
-    event : Event
-        The impact.
-    """
-
-    state: State
-    work: np.ndarray
-    event: Event
+    state: State  # just after the switching time
+    work: np.ndarray  # quadratures up to then: work of drives and of forces on bodies, energy lost, … [J]
+    event: Event  # the impact
 
 
 def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> AfterJump | None:

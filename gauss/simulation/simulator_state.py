@@ -6,28 +6,13 @@ from gauss.simulation.moreau.unseen_contacts import FIRST
 
 
 class SimulatorState(NamedTuple):
-    """State of a simulator, opaque.
+    """State of a simulator, opaque."""
 
-    Attributes
-    ----------
-    point, control : bytes
-        Point of the motion and record of its loop.
-    begun : float
-        Time of the state that the motion began from [s].
-    steps : int
-        Steps since then.
-    contacts : object
-        Contacts that the next step starts from, where the point does not hold them.
-    of : tuple
-        Step and methods of the simulator; any where empty.
-    watched : tuple
-        When the next look at the shapes is due, and whether undetected switching was warned of.
-    """
-
-    point: bytes
+    point: bytes  # point, control: point of the motion and record of its loop
     control: bytes
-    begun: float
-    steps: int
-    contacts: Any = None
-    of: tuple = ()
+    begun: float  # time of the state that the motion began from [s]
+    steps: int  # steps since then
+    contacts: Any = None  # contacts that the next step starts from, where the point does not hold them
+    of: tuple = ()  # step and methods of the simulator; any where empty
+    # when the next look at the shapes is due, and whether undetected switching was warned of
     watched: tuple = (FIRST, False)

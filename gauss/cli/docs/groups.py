@@ -7,22 +7,12 @@ from gauss import errors
 
 
 class Group(NamedTuple):
-    """A chapter of the reference.
+    """A chapter of the reference."""
 
-    Attributes
-    ----------
-    key : str
-        Name of its page.
-    title, text : str
-        Heading and introduction.
-    names : tuple of str
-        Full public names.
-    """
-
-    key: str
-    title: str
+    key: str  # name of its page
+    title: str  # title, text: heading and introduction
     text: str
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # full public names
 
 
 def _of(package: str, names: str = "") -> tuple[str, ...]:

@@ -5,6 +5,7 @@ Matrices are stored by rows. Loops and conditions are blocks of ``with``.
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from hashlib import blake2b
 
 from llvmlite import ir
 
@@ -278,6 +279,11 @@ def routine(function: NativeFunction, module: ir.Module, width: int) -> tuple[Ro
     r = Routine(function.begin_scalar(module, width))
     (given, result), (in_stride, out_stride) = r.arrays, r.integers
     return r, Strided(r.b, given.pointer, in_stride), Strided(r.b, result.pointer, out_stride)
+
+
+def name_with(name: str, *constants) -> str:
+    """Name of a subroutine into which constants are compiled: another one for other values."""
+    return f"{name}_{blake2b(repr(constants).encode(), digest_size=8).hexdigest()}"
 
 
 def subroutine(module: ir.Module, name: str, kinds) -> Routine:

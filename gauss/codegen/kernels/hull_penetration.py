@@ -10,7 +10,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
-from gauss.codegen.kernels.arrays import INTEGERS, Array, Value, subroutine
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Value, name_with, subroutine
 from gauss.codegen.kernels.hull_points import Hull, cross, put, vector, write_farthest, write_nearest
 
 MOST_POINTS, MOST_FACES, MOST_EDGES = 48, 256, 192
@@ -19,9 +19,9 @@ SIDES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (0, 2, 3))  # of a tetrahedron, counte
 
 
 class _PenetrationWriter:
-    def __init__(self, module: ir.Module, states: tuple[int, int, int], close: float, accepted: float):
+    def __init__(self, module: ir.Module, name: str, states: tuple[int, int, int], close: float, accepted: float):
         kinds = [INTEGERS, INTEGERS, POINTER, POINTER, POINTER, INTEGERS, POINTER, INTEGERS]
-        r = self.r = subroutine(module, "penetration", kinds)
+        r = self.r = subroutine(module, name, kinds)
         self.records, (self.pose, self.scale, self.simplex, self.own, self.result, self.status) = r.arrays[:2], r.arrays[2:]
         (self.found, self.placeless, self.left), self.close, self.accepted = states, close, accepted
         self.farthest, self.nearest = write_farthest(module), write_nearest(module)
@@ -165,4 +165,5 @@ def write_penetration(module: ir.Module, states: tuple[int, int, int], close: fl
     close, accepted : float
         Relative to the scale: differences of bounds that are rounding, and that are accepted without a better corner.
     """
-    return module.globals.get("penetration") or _PenetrationWriter(module, states, close, accepted).write()
+    name = name_with("penetration", states, close, accepted)
+    return module.globals.get(name) or _PenetrationWriter(module, name, states, close, accepted).write()

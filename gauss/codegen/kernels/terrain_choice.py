@@ -7,15 +7,15 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
-from gauss.codegen.kernels.arrays import INTEGERS, Value, subroutine
+from gauss.codegen.kernels.arrays import INTEGERS, Value, name_with, subroutine
 from gauss.codegen.kernels.hull_points import vector
 from gauss.codegen.kernels.patch_rows import POINT
 from gauss.codegen.kernels.terrain_outline import MOST_RAW, write_outlines
 
 
 class _ChoiceWriter:
-    def __init__(self, module: ir.Module, laws):
-        r = self.r = subroutine(module, "choice", [POINTER, INTEGER, POINTER, INTEGERS, INTEGERS])
+    def __init__(self, module: ir.Module, name: str, laws):
+        r = self.r = subroutine(module, name, [POINTER, INTEGER, POINTER, INTEGERS, INTEGERS])
         (self.total,), (self.points, self.settings, self.chosen, self.count) = r.integers, r.arrays
         self.laws, self.kept, self.order = laws, r.buffer(MOST_RAW, INTEGER), r.buffer(MOST_RAW, INTEGER)
         self.level, self.number = r.buffer(MOST_RAW), r.variable(0, INTEGER)
@@ -80,4 +80,5 @@ def write_choice(module: ir.Module, laws) -> ir.Function:
     Settings are the distance of places that are the same, and of gaps that have one place in the order; two axes (3,) of the
     field along its grid.
     """
-    return module.globals.get("choice") or _ChoiceWriter(module, laws).write()
+    name = name_with("choice", laws.same, laws.odd, laws.slots)
+    return module.globals.get(name) or _ChoiceWriter(module, name, laws).write()

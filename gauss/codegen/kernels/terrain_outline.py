@@ -7,7 +7,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
-from gauss.codegen.kernels.arrays import INTEGERS, Value, subroutine
+from gauss.codegen.kernels.arrays import INTEGERS, Value, name_with, subroutine
 from gauss.codegen.kernels.hull_points import cross, vector
 from gauss.codegen.kernels.patch_rows import POINT
 
@@ -21,14 +21,16 @@ class _OutlineWriter:
     ----------
     module : llvmlite.ir.Module
         Where code is emitted.
+    name : str
+        Name of the function there.
     same : float
         Difference of normals of one plane.
     odd : tuple
         Directions along which no edges are expected.
     """
 
-    def __init__(self, module: ir.Module, same: float, odd: tuple):
-        r = self.r = subroutine(module, "outlines", [POINTER, INTEGER, POINTER, INTEGERS])
+    def __init__(self, module: ir.Module, name: str, same: float, odd: tuple):
+        r = self.r = subroutine(module, name, [POINTER, INTEGER, POINTER, INTEGERS])
         (self.total,), (self.points, given, self.kept) = r.integers, r.arrays
         self.near, self.same, self.odd = given[0], same, odd
         self.group, self.leader = r.buffer(MOST_RAW, INTEGER), r.buffer(MOST_RAW, INTEGER)
@@ -129,4 +131,5 @@ class _OutlineWriter:
 
 def write_outlines(module: ir.Module, same: float, odd: tuple) -> ir.Function:
     """Emit ``outlines(double* points, i64 total, double* near, i64* kept)``: 1 for points that are kept, 0 for others."""
-    return module.globals.get("outlines") or _OutlineWriter(module, same, odd).write()
+    name = name_with("outlines", same, odd)
+    return module.globals.get(name) or _OutlineWriter(module, name, same, odd).write()

@@ -12,7 +12,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
-from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, subroutine
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value, name_with, subroutine
 from gauss.codegen.kernels.hull_points import put, vector
 
 RECORD = 5  # integers of a record
@@ -100,12 +100,14 @@ class _NormalWriter:
     ----------
     module : llvmlite.ir.Module
         Where code is emitted.
+    name : str
+        Name of the function there.
     aligned, on_edge : float
         Angle [rad] of normals that are the same; share of a corner below which a place is on the opposite edge.
     """
 
-    def __init__(self, module: ir.Module, aligned: float, on_edge: float):
-        r = self.r = subroutine(module, "has_normal", [INTEGERS, INTEGERS, POINTER, POINTER, POINTER, INTEGERS])
+    def __init__(self, module: ir.Module, name: str, aligned: float, on_edge: float):
+        r = self.r = subroutine(module, name, [INTEGERS, INTEGERS, POINTER, POINTER, POINTER, INTEGERS])
         self.surface, self.vertices, self.points = Surface(r, r.arrays[0]), r.arrays[1], r.arrays[2]
         self.place, self.direction, self.result = vector(r.arrays[3]), vector(r.arrays[4]), r.arrays[5]
         self.aligned, self.on_edge = aligned, on_edge
@@ -172,7 +174,8 @@ class TriangleMemory:
             r.buffer(6),
             r.buffer(1, INTEGER),
         )
-        self.function = r.module.globals.get("has_normal") or _NormalWriter(r.module, *laws).write()
+        name = name_with("has_normal", *laws)
+        self.function = r.module.globals.get(name) or _NormalWriter(r.module, name, *laws).write()
 
     def put(self, triangle: Triangle):
         """Store a triangle."""

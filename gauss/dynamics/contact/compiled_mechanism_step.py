@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.codegen import from_disk
 from gauss.codegen.kernels import CallingSteps, CompiledMechanismStep, StepFunctions
-from gauss.codegen.kernels.step_memory import MECHANISM, STEP_SETTINGS, TERMS
+from gauss.codegen.kernels.step_memory import MECHANISM, PATTERNS, RESULTS, STEP_SETTINGS, TERMS
 from gauss.dynamics.contact.compiled_step_memory import CompiledStepMemory, LoopOfSteps
 from gauss.dynamics.contact.contact_step import contact_solver
 from gauss.dynamics.contact.free_bodies import place_function
@@ -17,8 +17,11 @@ from gauss.dynamics.contact.mechanism_kernels import MechanismTerms
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.dynamics.contact.paradox import SLIDING as SLIDING_SPEED
 from gauss.dynamics.contact.shape_table import MOST_FEATURES
+from gauss.dynamics.contact.step_patterns import step_patterns
 from gauss.dynamics.gap_functions import RESTING
 from gauss.system import State
+
+SPEED_PLACE = RESULTS.index("fastest")
 
 
 class KnownForces(NamedTuple):
@@ -45,6 +48,7 @@ class MechanismMemory(CompiledStepMemory):
         self.stepper, self.detection, self.record = stepper, stepper.detection, stepper.record
         smooth, kernels = stepper.smooth, stepper.kernels
         table, N = stepper.table, stepper.compliance.free_columns
+        self.patterns = step_patterns(kernels.layout, N)
         sizes = {
             "n_q": smooth.n_q,
             "n_v": smooth.n_v,
@@ -62,6 +66,7 @@ class MechanismMemory(CompiledStepMemory):
             "laws": len(table.contacts),
             "input": stepper.inputs.size,
             "sleepers": stepper.asleep.sum(),
+            "gathers": self.patterns.weight.size,
         }
         parts = dict(zip(MechanismTerms._fields, kernels.layout.parts, strict=True))
         terms = {f"flat:{name}": ("flat", parts[name][0].start) for name in TERMS}
@@ -72,7 +77,7 @@ class MechanismMemory(CompiledStepMemory):
     def _fill(self, N: np.ndarray):
         stepper, at, table, rows = self.stepper, self.at, self.stepper.table, self.stepper.rows
         row, column = np.nonzero(N)
-        at["value"][:] = N[row, column]
+        at["value"][:], at["weight"][:] = N[row, column], self.patterns.weight
         at["fixed"][:] = stepper.kernels.layout.flat
         at["reach"][:], at["damping"][:] = stepper.reach, stepper.damping.d
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
@@ -88,7 +93,11 @@ class MechanismMemory(CompiledStepMemory):
             "row": row.astype(np.int64),
             "column": column.astype(np.int64),
             "asleep": stepper.asleep.astype(np.int64),
+            "k_begin": np.zeros(3 * room + n["g"] + n["s"], dtype=np.int64),
+            "k_end": np.zeros(3 * room + n["g"] + n["s"], dtype=np.int64),
         }
+        found = self.patterns._asdict()
+        self.integers |= {name: np.ascontiguousarray(found[name], dtype=np.int64) for name in PATTERNS}
         time = stepper.system.scale.time
         rates = time * RESTING, time * SLIDING_SPEED
         self.set_first(stepper.system, *rates, stepper.shares[0], STEP_SETTINGS, stepper.constants)
@@ -148,6 +157,11 @@ class MechanismMemory(CompiledStepMemory):
         return self._calling(state, work, ends[:sound], rows) if sound else LoopOfSteps(0, 0.0, [], False)
 
     @property
+    def fastest(self) -> float:
+        """Largest speed of a point of a shape at the end of the last step [m/s]; infinite if another one was the last."""
+        return float(self.at["results"][SPEED_PLACE])
+
+    @property
     def known(self) -> KnownForces:
         """Forces of the last step."""
         m = int(self.integers["known_count"][0])
@@ -159,6 +173,7 @@ class MechanismMemory(CompiledStepMemory):
 
     @known.setter
     def known(self, found: KnownForces):
+        self.at["results"][SPEED_PLACE] = np.inf
         key, force, others, self.at["before"][0] = found
         m = key.size
         self.integers["known_found"][:m] = np.column_stack(np.divmod(key[:m], MOST_FEATURES))

@@ -95,17 +95,11 @@ class Condition(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What residuals do across a surface between two modes.
+    """What residuals do across a surface between two modes."""
 
-    Attributes
-    ----------
-    name : str
-        Constraint that changes most, relative to its terms.
-    position, velocity : float
-        Largest change of its position residual, and of its velocity residual [m, rad], [m/s, rad/s]; 0 where continuous.
-    """
-
-    name: str
+    name: str  # constraint that changes most, relative to its terms
+    # position, velocity: largest change of its position residual, and of its velocity residual [m, rad], [m/s, rad/s]; 0
+    # where continuous
     position: float
     velocity: float
 
@@ -312,8 +306,10 @@ def refuse_surfaces(system: System, what: str):
 
 def _has_any(system: System, ops: tuple[str, ...]) -> bool:
     """Whether constraints have operations of these kinds."""
-    outputs = system.relations.function.outputs
-    return cached(system, (_has_any, ops), lambda: any(node.op in ops for node in reachable(outputs)))
+    function = system.relations.function
+    if function is None:
+        return False
+    return cached(system, (_has_any, ops), lambda: any(node.op in ops for node in function.nodes))
 
 
 def _conditions(traced: tuple[np.ndarray, np.ndarray], view: Symbols) -> list[Expression]:

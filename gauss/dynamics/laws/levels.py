@@ -11,15 +11,9 @@ LEVELED = ("floor", "row")
 
 
 class Levels(NamedTuple):
-    """Levels of a number.
+    """Levels of a number."""
 
-    Attributes
-    ----------
-    breaks : Column or None
-        Numbers at which the level changes; whole numbers if None.
-    """
-
-    breaks: Column | None = None
+    breaks: Column | None = None  # numbers at which the level changes; whole numbers if None
 
     def at(self, x):
         """Level of a number or an expression."""

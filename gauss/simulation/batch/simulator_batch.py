@@ -41,20 +41,11 @@ POINT_COPIES = 4  # of times, coordinates and rates of a motion, that a batch ho
 
 
 class SimulatorBatchState(NamedTuple):
-    """State of a batch of simulators, opaque.
+    """State of a batch of simulators, opaque."""
 
-    Attributes
-    ----------
-    of : tuple
-        Step [s], number of motions, method.
-    kept : tuple
-        What the motions continue from.
-    flags : tuple
-        Number of steps, whether a warning was given, inputs, marks of motions and their reasons, when shapes are looked at.
-    """
-
-    of: tuple
-    kept: tuple
+    of: tuple  # step [s], number of motions, method
+    kept: tuple  # what the motions continue from
+    # number of steps, whether a warning was given, inputs, marks of motions and their reasons, when shapes are looked at
     flags: tuple
 
 

@@ -17,24 +17,12 @@ from gauss.system import State
 
 
 class ReachedPoint(NamedTuple):
-    """Point of a motion.
+    """Point of a motion."""
 
-    Attributes
-    ----------
-    row : ndarray, shape (1 + n_q + n_v + 3,)
-        Time [s], coordinates, rates, work [J].
-    kept : object
-        What steps continue from beside it.
-    events : list of Event
-        Changes of the contact mode in the step before.
-    closed : bool
-        Whether a gap is closed, by its force in the step before.
-    """
-
-    row: np.ndarray
-    kept: Any
-    events: list[Event]
-    closed: bool
+    row: np.ndarray  # (1 + n_q + n_v + 3,): time [s], coordinates, rates, work [J]
+    kept: Any  # what steps continue from beside it
+    events: list[Event]  # changes of the contact mode in the step before
+    closed: bool  # whether a gap is closed, by its force in the step before
 
 
 class SingleSteps(Protocol):

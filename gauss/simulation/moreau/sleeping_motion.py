@@ -28,27 +28,13 @@ LOOK_STEPS = 16  # steps between two looks for islands at rest
 
 
 class _Asleep(NamedTuple):
-    """Bodies, or trees of joints, asleep.
+    """Bodies, or trees of joints, asleep."""
 
-    Attributes
-    ----------
-    island : ndarray of int, shape (n,)
-        Island of each that sleeps; −1 of those awake.
-    stepper : FreeBodyStepper or MechanismStepper
-        Steps of those that are awake.
-    resting : KnownContacts or KnownForces
-        Forces on those asleep.
-    closed : ndarray of bool
-        Elements that bear a force on these.
-    places : ndarray of int
-        Elements of the stepper among those of the scene.
-    """
-
-    island: np.ndarray
-    stepper: FreeBodyStepper | MechanismStepper
-    resting: Any
-    closed: np.ndarray
-    places: np.ndarray
+    island: np.ndarray  # (n,): island of each that sleeps; −1 of those awake
+    stepper: FreeBodyStepper | MechanismStepper  # steps of those that are awake
+    resting: Any  # forces on those asleep
+    closed: np.ndarray  # elements that bear a force on these
+    places: np.ndarray  # elements of the stepper among those of the scene
 
     @property
     def which(self) -> np.ndarray:

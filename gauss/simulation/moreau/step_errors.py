@@ -21,22 +21,12 @@ SHORTENINGS = 2  # of the step in a row that show it
 
 
 class LocalError(NamedTuple):
-    """Error of a step over the tolerance.
+    """Error of a step over the tolerance."""
 
-    Attributes
-    ----------
-    displacement, rates : float
-        Of positions and of rates, if nothing jumps.
-    jump : float
-        Of positions, if rates jump.
-    impact : bool
-        Whether a gap had an impact.
-    """
-
-    displacement: float
+    displacement: float  # displacement, rates: of positions and of rates, if nothing jumps
     rates: float
-    jump: float
-    impact: bool
+    jump: float  # of positions, if rates jump
+    impact: bool  # whether a gap had an impact
 
     def largest(self, jumps: bool) -> float:
         """The error, where rates may jump or not."""

@@ -33,24 +33,13 @@ REVERSED_FORCE = 1e-9  # relative to the largest force: a smaller force with rev
 
 
 class PhaseParts(NamedTuple):
-    """System, cut rows and margins of a phase, cached.
+    """System, cut rows and margins of a phase, cached."""
 
-    Attributes
-    ----------
-    system : System
-        Smooth system of the contact mode; active constraints are rows.
-    links : CutRows
-        Links with losses, held joints, and forces of sliding ones.
-    cut : System or None
-        The same system without them, if there are any; phases that differ by held and sliding joints share it.
-    margins : Kernel or None
-        Margins of the features in contact, where a body has several.
-    """
-
-    system: System
-    links: CutRows
+    system: System  # smooth system of the contact mode; active constraints are rows
+    links: CutRows  # links with losses, held joints, and forces of sliding ones
+    # the same system without them, if there are any; phases that differ by held and sliding joints share it
     cut: System | None
-    margins: Kernel | None
+    margins: Kernel | None  # margins of the features in contact, where a body has several
 
 
 def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places: Mapping) -> PhaseParts:
