@@ -17,7 +17,7 @@ LANE = ir.IntType(32)  # index of a lane
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
 INTRINSICS |= {"min": "llvm.minnum", "max": "llvm.maxnum"}
-COMPARISONS = {"less": "<", "less_equal": "<="}
+PREDICATES = {"less": "<", "less_equal": "<="}
 # fast-math flags of loops written for one state only: LLVM may fuse multiply–adds; gauss.codegen.multiply_add decides
 # elsewhere
 FLAGS = ("contract",)
@@ -152,8 +152,8 @@ class Lanes:
             return found
         if op == "max" and self._is_opposite(*x):
             return b.call(self._intrinsic("llvm.fabs", 1), x[:1])
-        if op in COMPARISONS:
-            return b.fcmp_ordered(COMPARISONS[op], *x)
+        if op in PREDICATES:
+            return b.fcmp_ordered(PREDICATES[op], *x)
         if op in ("exp", "log", "atan2") and isinstance(self.module, DeviceModule):
             return b.call(elementary(self.module, op), x)
         if op == "atan2":
