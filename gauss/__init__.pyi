@@ -52,6 +52,7 @@ from gauss import (
 from gauss.analysis import (
     constraint_forces,
     contact_forces,
+    contact_points,
     drive_forces,
     energy,
     friction_forces,
@@ -180,6 +181,7 @@ __all__ = [
     "compile_scene",
     "constraint_forces",
     "contact_forces",
+    "contact_points",
     "crosscheck",
     "crossings",
     "derivatives",

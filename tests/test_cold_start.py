@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 
 import gauss
-from gauss.codegen.library_symbols import LAPACK
+from gauss.codegen.linking import LAPACK
 from gauss.integrators.methods import LIBRARY_ORIGINS, ORIGINS
 from gauss.lazy import LazyTable
 from gauss.simulation import progress

@@ -1,4 +1,5 @@
 from gauss.analysis.contact_forces import contact_forces, friction_forces
+from gauss.analysis.contact_points import ContactPoints, contact_points
 from gauss.analysis.inverse_dynamics import InverseDynamics, inverse_dynamics
 from gauss.analysis.inverse_kinematics import InverseKinematics, differential_inverse_kinematics, inverse_kinematics
 from gauss.analysis.planned_motion import PlannedMotion, plan_motion
@@ -18,6 +19,7 @@ from gauss.simulation.energy_balance import warn_of_balance
 
 __all__ = [
     "CenterOfMassTarget",
+    "ContactPoints",
     "DistanceTarget",
     "Energy",
     "InverseDynamics",
@@ -30,6 +32,7 @@ __all__ = [
     "Target",
     "constraint_forces",
     "contact_forces",
+    "contact_points",
     "differential_inverse_kinematics",
     "drive_forces",
     "energy",

@@ -1,6 +1,7 @@
 """Forces of unilateral constraints along a motion: multipliers λ ≥ 0 of the closed gaps, and friction."""
 
 import warnings
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,15 +14,20 @@ from gauss.backends.closure import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.contact_stepper import lent_stepper
-from gauss.dynamics.contact.mode_selection import mode_selector
+from gauss.dynamics.contact.mode_selection import ModeSelector, mode_selector
 from gauss.dynamics.gap_functions import gaps, with_gaps
-from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, did_you_mean, require
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import contact_parts, step_at
 from gauss.system import sides
+
+NOT_UNIQUE = (
+    "the forces of {} are not unique: more gaps are closed than it takes to bear the load. Single forces are those of least "
+    "norm, one of many distributions; do not size anything by them. Their sum and moment are right."
+)
 
 
 def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, "k m"]:
@@ -67,12 +73,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
         if np.isin(which, mine).any():
             _require_certified(solution, which, mine, name, trajectory.t[k])
     if found.ambiguous[:, mine].any():
-        warnings.warn(
-            f"the forces of {name!r} are not unique: more gaps are closed than it takes to bear the load. Single forces are "
-            "those of least norm, one of many distributions; do not size anything by them. Their sum and moment are right.",
-            NonUniqueReactionWarning,
-            stacklevel=2,
-        )
+        warnings.warn(NOT_UNIQUE.format(repr(name)), NonUniqueReactionWarning, stacklevel=2)
     return found.values[:, mine]
 
 
@@ -90,26 +91,60 @@ def _of_all(trajectory: Trajectory, backend) -> GapForces:
     shape = len(trajectory), len(trajectory.system.contacts.placed)
     found, selector = GapForces(np.zeros(shape), np.zeros(shape, dtype=bool), {}), mode_selector(trajectory.system)
     for k, motion in enumerate(trajectory.motions):
-        instant, held = gaps(motion), selector.choose(motion.state, selector.touching(motion.state), backend)
-        which = np.array(held.gaps, dtype=int)
-        if not which.size:
+        sample = _of_sample(selector, motion, backend)
+        if sample is None:
             continue
-        moved = kinematics(held.system, motion.state)
-        compulsion = with_gaps(assemble_motion(moved, Applied(moved), held.load), instant, which)
-        solution = solve(compulsion, backend)
-        found.solutions[k] = solution, which
+        found.solutions[k], (solution, which) = sample, sample
         if solution.status.certified:
-            free = Factor(compulsion, np.arange(which.size)).free_active()
-            sizes = np.linalg.norm(free, axis=1)
-            found.values[k, which] = _least(solution.inequality_multipliers, free)
-            found.ambiguous[k, which] = sizes > UNDETERMINED_SHARE * sizes.max(initial=0.0)
+            found.values[k, which], found.ambiguous[k, which] = _least_of(solution)
     return found
+
+
+def _least_of(solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of least norm of the closed gaps of a solution, and which of them are not unique."""
+    free = Factor(solution.compulsion, np.arange(solution.inequality_multipliers.size)).free_active()
+    sizes = np.linalg.norm(free, axis=1)
+    return _least(solution.inequality_multipliers, free), sizes > UNDETERMINED_SHARE * sizes.max(initial=0.0)
+
+
+def _of_sample(selector: ModeSelector, motion: Kinematics, backend) -> tuple[Solution, np.ndarray] | None:
+    """Solution of a sample with closed gaps, and these gaps; None if all are open."""
+    instant, held = gaps(motion), selector.choose(motion.state, selector.touching(motion.state), backend)
+    which = np.array(held.gaps, dtype=int)
+    if not which.size:
+        return None
+    moved = kinematics(held.system, motion.state)
+    return solve(with_gaps(assemble_motion(moved, Applied(moved), held.load), instant, which), backend), which
+
+
+def forces_at(trajectory: Trajectory, index: int, backend: str | Backend | type) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Normal forces (g,) and friction forces (g, 3) of all gaps at one sample [N], and whether single ones are not unique.
+
+    SimulationError if the sample has no certified solution.
+    """
+    system = trajectory.system
+    if trajectory.step is not None:
+        ((normal, friction),) = _parts(trajectory, [index])
+        return normal, friction, False
+    normal, ambiguous = np.zeros(len(system.contacts.placed)), False
+    sample = _of_sample(mode_selector(system), kinematics(system, trajectory.state(index)), backend)
+    if sample is not None:
+        solution, which = sample
+        if not solution.status.certified:
+            raise _uncertified(solution, trajectory.t[index])
+        normal[which], loose = _least_of(solution)
+        ambiguous = bool(loose.any())
+    return normal, np.zeros((normal.size, 3)), ambiguous
+
+
+def _uncertified(solution: Solution, t: float) -> SimulationError:
+    return SimulationError(f"t = {t:.6g} s, backend {solution.backend!r}: {solution.status}.")
 
 
 def _require_certified(solution: Solution, which: np.ndarray, mine: list[int], name: str, t: float):
     """Raise a SimulationError if the forces of some gaps are not certified."""
     if not solution.status.certified:
-        raise SimulationError(f"t = {t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+        raise _uncertified(solution, t)
     places = len(solution.compulsion.structure.constraints) + np.flatnonzero(np.isin(which, mine))
     refuse_doubtful(solution, places, name, t)
 
@@ -176,7 +211,7 @@ def _of_steps(trajectory: Trajectory) -> StepForces:
 
 def _solve_steps(trajectory: Trajectory) -> StepForces:
     sample, gap, normals, frictions = [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], [np.zeros(0)], [np.zeros((0, 3))]
-    for k, (normal, friction) in enumerate(_parts(trajectory)):
+    for k, (normal, friction) in enumerate(_parts(trajectory, range(len(trajectory)))):
         bearing = np.flatnonzero((normal != 0.0) | (friction != 0.0).any(axis=1))
         sample.append(np.full(bearing.size, k))
         gap.append(bearing)
@@ -185,16 +220,22 @@ def _solve_steps(trajectory: Trajectory) -> StepForces:
     return StepForces(len(trajectory), *(np.concatenate(part) for part in (sample, gap, normals, frictions)))
 
 
-def _parts(trajectory: Trajectory):
-    """Normal forces (g,) and friction forces (g, 3) of all gaps, sample by sample."""
+def by_pair_kernels(trajectory: Trajectory) -> bool:
+    """Whether the steps of a motion are those by kernels of pairs of shapes."""
     plan = trajectory.stats.plan
-    if plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None:
+    return plan is not None and plan.dynamics == "pair kernels" and trajectory.step is not None
+
+
+def _parts(trajectory: Trajectory, samples: Iterable[int]):
+    """Normal forces (g,) and friction forces (g, 3) of all gaps, sample by sample."""
+    if by_pair_kernels(trajectory) and trajectory.step is not None:
         with lent_stepper(trajectory.system, removal=trajectory.removal) as stepper:
             stepper.forget()
-            for index in range(len(trajectory)):
+            for index in samples:
                 yield stepper.forces_over(trajectory.state(index), trajectory.step)
         return
-    for index, motion in enumerate(trajectory.motions):
+    for index in samples:
+        motion = kinematics(trajectory.system, trajectory.state(index))
         yield contact_parts(motion, step_at(trajectory, index).force)
 
 

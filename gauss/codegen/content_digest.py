@@ -3,7 +3,8 @@
 Numbers, texts, arrays, collections and records of this package enter by value, in an encoding from which they could be read
 back: things of different content have different encodings. Top-level functions and classes of this package, numpy and the
 standard mathematics enter by name, for the key of the cache holds their sources or versions
-(:mod:`gauss.codegen.disk_cache`). Another function enters by its code, its defaults, the values that it closes over and
+(:mod:`gauss.codegen.disk_cache`); a thing of an outer package of ours takes the sources of all these with it
+(:mod:`gauss.codegen.source_digest`). Another function enters by its code, its defaults, the values that it closes over and
 those of its globals. A traced function enters by its operations. Anything else has no digest, and what depends on it is not
 kept: a digest that misses a number would be the key of the code of another mechanism.
 """
@@ -22,10 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from gauss.codegen.content_key import PACKAGE, IdentityKey, named_globals
+from gauss.codegen.content_key import IdentityKey, named_globals
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.lookup import Column
+from gauss.codegen.source_digest import PACKAGE, closed_over, is_outer, source_digest
 
 BY_NAME = (PACKAGE, "numpy", "math", "cmath", "operator", "builtins")  # packages whose functions the key of the cache holds
 # built-in functions by which code may depend on more than its constants, globals and arguments
@@ -66,6 +68,11 @@ def content_digest(*things, most: int = sys.maxsize, in_process: bool = False) -
         encoder.encode(things)
     except (NoDigestError, RecursionError):
         return None
+    if encoder.outer and not in_process:
+        sources = source_digest(outer=True)
+        if sources is None:
+            return None
+        encoder.parts.append(sources)
     return hashlib.sha256(b"".join(encoder.parts)).digest()
 
 
@@ -78,6 +85,12 @@ class _Encoder:
         self.functions: dict[int, int] = {}  # address of each traced function encoded so far → its number
         self.names: dict[int, bytes] = {}  # address of each named object encoded so far → its name
         self.codes: dict[int, int] = {}  # address of each code object encoded so far → its number
+        self.outer: set[str] = set()  # modules of our outer packages of which something was encoded
+
+    def note_module(self, name: str):
+        """Note the module of something that enters without its source."""
+        if is_outer(name):
+            self.outer.add(name)
 
     def encode(self, thing):
         """Append the encoding of an object: its own part, then those of what it contains, in order.
@@ -219,6 +232,7 @@ def _set(encoder: _Encoder, things) -> Sequence:
     for thing in things:
         own = _Encoder(encoder.most, encoder.in_process)
         own.encode(thing)
+        encoder.outer |= own.outer
         found.append(b"".join(own.parts))
     return encoder.sequence(b"u", sorted(found))
 
@@ -229,6 +243,7 @@ def _named(encoder: _Encoder, thing) -> Sequence:
     if name is None:
         if not _has_name(thing):
             _refused(encoder, thing)
+        encoder.note_module(thing.__module__)
         name = encoder.names[id(thing)] = b"@" + _text(thing.__module__) + _text(thing.__qualname__)
     encoder.parts.append(name)
     return ()
@@ -266,6 +281,7 @@ def _ufunc(encoder: _Encoder, ufunc: np.ufunc) -> Sequence:
 def _module(encoder: _Encoder, module: ModuleType) -> Sequence:
     if module.__name__.partition(".")[0] not in BY_NAME or module is builtins:
         _refused(encoder, module)
+    encoder.note_module(module.__name__)
     encoder.parts.append(b"M" + _text(module.__name__))
     return ()
 
@@ -275,17 +291,11 @@ def _function(encoder: _Encoder, function: FunctionType) -> Sequence:
     if id(function) in encoder.names or _has_name(function):
         return _named(encoder, function)
     ours = (function.__module__ or "").partition(".")[0] == PACKAGE
-    closed = tuple(_content(cell) for cell in function.__closure__ or ())
+    encoder.note_module(function.__module__ or "")
+    closed = tuple(closed_over(function))
     seen = {} if ours else named_globals(function)
     defaults = function.__defaults__, function.__kwdefaults__
     return encoder.sequence(b"p", (*defaults, vars(function), closed, seen, function.__code__))
-
-
-def _content(cell) -> tuple:
-    try:
-        return (cell.cell_contents,)
-    except ValueError:  # the name is not bound yet
-        return ()
 
 
 def _code(encoder: _Encoder, code: CodeType) -> Sequence:

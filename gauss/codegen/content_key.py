@@ -12,7 +12,7 @@ from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, Modul
 
 import numpy as np
 
-PACKAGE = __name__.partition(".")[0]
+from gauss.codegen.source_digest import PACKAGE, closed_over
 
 
 class IdentityKey:
@@ -78,7 +78,7 @@ def _record(thing, inside) -> tuple:
 def _function(function: FunctionType, inside) -> tuple:
     if _is_ours(function) and "<locals>" not in function.__qualname__:
         return (IdentityKey(function),)
-    closed = [cell.cell_contents if _is_filled(cell) else None for cell in function.__closure__ or ()]
+    closed = [value[0] if value else None for value in closed_over(function)]
     found = {} if _is_ours(function) else named_globals(function)
     parts = (content_key(part, inside) for part in (function.__defaults__, function.__kwdefaults__, closed, found))
     return function.__code__, IdentityKey(function.__globals__), *parts
@@ -99,14 +99,6 @@ def _names(code: CodeType):
 
 def _is_ours(thing) -> bool:
     return str(getattr(thing, "__module__", "")).partition(".")[0] == PACKAGE
-
-
-def _is_filled(cell) -> bool:
-    try:
-        cell.cell_contents  # noqa: B018
-    except ValueError:  # the name is not bound yet
-        return False
-    return True
 
 
 # content of the kinds of objects that are compared by value

@@ -1,25 +1,20 @@
 """Compiled objects on disk by the content that they are made from: a new process loads them without tracing anything.
 
-The key is the digest of that content (:mod:`gauss.codegen.content_digest`), of our sources and of the environment
-(the compiler, numpy, Python, the CPU). An entry is a pickle of the Python object around the machine code: names and sizes of
-its functions, tables, facts found while it was traced. In it stand names instead of the machine code, which is kept as
-object code (:mod:`gauss.codegen.machine`), and instead of the objects that the content consists of, which the new process
-has. An entry is read under the seal of :mod:`gauss.codegen.object_cache`, like the machine code itself.
-
-Reading the sources takes 8 ms; so their digest is kept in the cache under the list of their paths, sizes and times of
-change, which takes 4 ms. Sources that changed after this process began are not those that it has loaded: then there is no
-digest, and nothing is kept.
+The key is the digest of that content (:mod:`gauss.codegen.content_digest`), of our sources
+(:mod:`gauss.codegen.source_digest`) and of the environment (the compiler, numpy, Python, the CPU). An entry is a pickle of
+the Python object around the machine code: names and sizes of its functions, tables, facts found while it was traced. In it
+stand names instead of the machine code, which is kept as object code (:mod:`gauss.codegen.machine`), and instead of the
+objects that the content consists of, which the new process has. An entry is read under the seal of
+:mod:`gauss.codegen.object_cache`, like the machine code itself.
 """
 
 import hashlib
 import io
-import os
 import pickle
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from pathlib import Path
 from typing import Any, TypeVar
 
 import llvmlite
@@ -29,11 +24,9 @@ import numpy as np
 from gauss.codegen import machine, object_cache
 from gauss.codegen.content_digest import content_digest
 from gauss.codegen.processor import features
-from gauss.lazy import LOADED_AT
+from gauss.codegen.source_digest import reaches_outer, source_digest
 
 T = TypeVar("T")
-FOLDER = Path(__file__).parent.parent
-READ = 1 << 16  # bytes at a time: more than most sources have
 
 
 def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None) -> T:
@@ -48,13 +41,14 @@ def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None)
     first : bytes, optional
         Digest that the first object of the content had before. What is made is kept only if it has it still.
     """
-    name = _name(content, first)
+    outer = reaches_outer(make)
+    name = _name(content, first, outer)
     if name is None:
         return make()
     found = _read(name, content)
     if found is None:
         found = make()
-        if _name(content) == name:  # a function may have changed what it closes over meanwhile
+        if _name(content, None, outer) == name:  # a function may have changed what it closes over meanwhile
             _write(name, found, content)
     return found
 
@@ -72,11 +66,12 @@ def note(content: tuple, first: bytes | None = None):
         object_cache.write(name, b"")
 
 
-def _name(content: tuple, first: bytes | None = None) -> str | None:
-    """Name of an entry in the cache; None if the content has no digest, or nothing is cached."""
+def _name(content: tuple, first: bytes | None = None, outer: bool = False) -> str | None:
+    """Name of an entry, whose maker may be of an outer package; None if the content has no digest, or nothing is cached."""
     if object_cache.folder() is None:
         return None
-    parts = first or content_digest(content[0]), content_digest(*content[1:]), package_digest()
+    parts = [first or content_digest(content[0]), content_digest(*content[1:]), package_digest()]
+    parts += [source_digest(outer=True)] if outer else []
     known = [part for part in parts if part is not None]
     return "made-" + hashlib.sha256(b"".join(known)).hexdigest() if len(known) == len(parts) else None
 
@@ -131,47 +126,10 @@ class _Unpickler(pickle.Unpickler):
 
 @cache
 def package_digest() -> bytes | None:
-    """SHA-256 of sources and environment; None if sources have changed since this process began."""
-    files = sorted(_sources(str(FOLDER)))
-    if max(changed for *_, changed in files) >= LOADED_AT:
+    """SHA-256 of inner sources and environment; None if sources have changed since this process began."""
+    sources = source_digest()
+    if sources is None:
         return None
-    listed = "sources-" + hashlib.sha256(repr((str(FOLDER), files)).encode()).hexdigest()
-    content = object_cache.read(listed)
-    if content is None:
-        content = _content_of([path for path, *_ in files])
-        object_cache.write(listed, content)
     cpu = llvm.get_process_triple(), llvm.get_host_cpu_name(), features()
     about = *cpu, llvmlite.__version__, llvm.llvm_version_info, np.__version__, sys.version
-    return hashlib.sha256(content + repr(about).encode()).digest()
-
-
-def _sources(folder: str, inside: str = "") -> Iterator[tuple[str, int, int]]:
-    """Path inside the package, size and last change [ns] of each source."""
-    for entry in os.scandir(folder):
-        if entry.is_dir(follow_symlinks=False):
-            if entry.name != "__pycache__":
-                yield from _sources(entry.path, f"{inside}{entry.name}/")
-        elif entry.name.endswith((".py", ".pyi")):
-            found = entry.stat()
-            yield inside + entry.name, found.st_size, max(found.st_mtime_ns, found.st_ctime_ns)
-
-
-def _content_of(paths: list[str]) -> bytes:
-    total = hashlib.sha256()
-    for path in paths:
-        content = _bytes_of(f"{FOLDER}/{path}")
-        total.update(b"%s\0%d\0" % (path.encode(), len(content)))
-        total.update(content)
-    return total.digest()
-
-
-def _bytes_of(path: str) -> bytes:
-    """Content of a file; a file object would take half as long again, a path object twice."""
-    file = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
-    try:
-        parts = [os.read(file, READ)]
-        while len(parts[-1]) == READ:
-            parts.append(os.read(file, READ))
-    finally:
-        os.close(file)
-    return b"".join(parts)
+    return hashlib.sha256(sources + repr(about).encode()).digest()

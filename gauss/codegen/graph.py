@@ -30,8 +30,8 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "mul": operator.mul,
     "div": lambda x, y: x / y if y else x * math.inf,  # IEEE 754, as machine code divides: 0/0 is NaN, not an error
     "atan2": math.atan2,
-    "min": min,
-    "max": max,
+    "min": lambda x, y: y if y < x or y != y else x,  # NaN if one is
+    "max": lambda x, y: y if x < y or y != y else x,
     "less": lambda x, y: float(x < y),
     "less_equal": lambda x, y: float(x <= y),
 }

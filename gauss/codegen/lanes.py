@@ -16,8 +16,10 @@ DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
 LANE = ir.IntType(32)  # index of a lane
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
-INTRINSICS |= {"min": "llvm.minnum", "max": "llvm.maxnum"}
 PREDICATES = {"less": "<", "less_equal": "<="}
+# full vectors whose sines and cosines one call computes: the operations of one depend on each other for a hundred cycles,
+# and the scheduler of a processor does not reach the next call; two take a quarter less
+SIDE_BY_SIDE = 2
 # fast-math flags of loops written for one state only: LLVM may fuse multiply–adds; gauss.codegen.multiply_add decides
 # elsewhere
 FLAGS = ("contract",)
@@ -152,6 +154,8 @@ class Lanes:
             return found
         if op == "max" and self._is_opposite(*x):
             return b.call(self._intrinsic("llvm.fabs", 1), x[:1])
+        if op in ("min", "max"):
+            return self._extreme(op, *x)
         if op in PREDICATES:
             return b.fcmp_ordered(PREDICATES[op], *x)
         if op in ("exp", "log", "atan2") and isinstance(self.module, DeviceModule):
@@ -159,6 +163,16 @@ class Lanes:
         if op == "atan2":
             return self._each_lane("atan2", x)
         return b.call(self._intrinsic(INTRINSICS[op], len(x)), x)
+
+    def _extreme(self, op: str, x, y):
+        """Smaller or larger of two numbers, NaN if one is; of equal ones, as 0 and −0, a constant, else the first."""
+        b = self.b
+        if _is_literal(x) or _is_literal(y):
+            constant, number = (x, y) if _is_literal(x) else (y, x)
+            is_constant = b.fcmp_ordered("<=", *((constant, number) if op == "min" else (number, constant)))
+            return b.select(is_constant, constant, number)
+        found = b.select(b.fcmp_ordered("<", *((y, x) if op == "min" else (x, y))), y, x)  # NaN if x is: one instruction
+        return b.select(b.fcmp_unordered("!=", y, y), y, found)
 
     def _is_opposite(self, x, y) -> bool:
         """Whether one number is −1 times the other: the larger one is then |x|, one instruction instead of four."""
@@ -198,8 +212,9 @@ class Lanes:
         return self.b.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), lane_indices(lanes))
 
     def sincos_together(self, angles: dict):
-        """Compute sines and cosines of angles {node: value}, a vector register of angles at a time."""
-        at_once = vector_width(self.module) // self.width
+        """Compute sines and cosines of angles {node: value}, one or two vector registers of angles at a time."""
+        registers = vector_width(self.module) // self.width
+        at_once = SIDE_BY_SIDE if registers == 1 < self.width else registers
         nodes = list(angles) if at_once > 1 else []
         for start in range(0, len(nodes), at_once):
             part = nodes[start : start + at_once]
@@ -237,6 +252,11 @@ class Lanes:
 def kind(width: int) -> ir.Type:
     """Type of ``width`` doubles."""
     return DOUBLE if width == 1 else ir.VectorType(DOUBLE, width)
+
+
+def _is_literal(value) -> bool:
+    """Whether a value is written as its number; none of them is NaN (:mod:`gauss.codegen.simplification`)."""
+    return isinstance(value, ir.Constant) or type(value) is TextValue and value.reference[0] not in "%@"
 
 
 def _is_condition(value) -> bool:

@@ -1,7 +1,8 @@
 """Tables of numbers as data: two operations read them, so that code does not grow with the rows of a table.
 
 ``row`` counts the breaks of a table below a number, ``entry`` reads a column in a row. Both are locally constant, as the
-floor of a number is: a piece of a table is a polynomial of x whose coefficients are entries.
+floor of a number is: a piece of a table is a polynomial of x whose coefficients are entries. What is not a number has a
+row of its own behind the others, and NaN is the entry there.
 """
 
 import hashlib
@@ -79,12 +80,12 @@ class Column:
         return least, largest
 
     def row(self, x):
-        """Breaks below x, entry by entry."""
-        return np.searchsorted(self.numbers, x).astype(float)[()]
+        """Breaks below x, entry by entry; one more than there are, of NaN."""
+        return (np.searchsorted(self.numbers, x) + np.isnan(x)).astype(float)[()]
 
     def entry(self, row):
-        """Numbers in a row, entry by entry."""
-        return self.numbers[self._places(row)][()]
+        """Numbers in a row, entry by entry; NaN behind the last one."""
+        return np.where(np.asarray(row) < self.numbers.size, self.numbers[self._places(row)], np.nan)[()]
 
     def _places(self, row) -> np.ndarray:
         return np.clip(np.asarray(row, dtype=float), 0, self.numbers.size - 1).astype(int)

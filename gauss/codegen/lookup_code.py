@@ -1,8 +1,9 @@
-"""Operations of tables in LLVM IR: a column is a constant array of the module, written as bytes.
+"""Operations of tables in LLVM IR: a column is a constant array of the module, written as bytes, with NaN behind its end.
 
 The row of a number among equally spaced breaks is found by a division and one comparison on each side, else by bisection.
 """
 
+import numpy as np
 from llvmlite import ir
 
 from gauss.codegen.intrinsics import intrinsic
@@ -47,6 +48,7 @@ class _Lookup:
             found = self._bisected(array, x, count)
         else:
             found = self._divided(array, x, count, float(column.numbers[0]), spacing)
+        found = self.b.select(self.b.fcmp_unordered("!=", x, x), self._all(PLACE, count + 1), found)  # NaN: behind the last
         return self.b.sitofp(found, self.kind)
 
     def _divided(self, array, x, count: int, first: float, spacing: float):
@@ -101,7 +103,7 @@ class _Lookup:
 
     def _array(self, column: Column):
         """Pointer to a constant array; bytes are written and read faster than numbers."""
-        known, content = self.module.globals.get(column.name), column.numbers.tobytes()
+        known, content = self.module.globals.get(column.name), np.append(column.numbers, np.nan).tobytes()
         if known is None:
             known = ir.GlobalVariable(self.module, ir.ArrayType(BYTE, len(content)), column.name)
             known.initializer = ir.FormattedConstant(known.value_type, f'c"\\{content.hex(chr(92))}"')

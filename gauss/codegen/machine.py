@@ -8,7 +8,9 @@ import os
 import zlib
 
 from gauss.codegen import object_cache, tiers
-from gauss.codegen.object_code import about, linked, optimised_objects, packed, quick_objects, unpacked
+from gauss.codegen.linking import linked
+from gauss.codegen.object_cache import packed, unpacked
+from gauss.codegen.object_code import about, optimised_objects, quick_objects
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, EntryPoint, MachineCode
 

@@ -11,6 +11,7 @@ folder but not read the key, has no valid seal. Root and processes of this user 
 import hashlib
 import hmac
 import os
+import struct
 from contextlib import suppress
 from pathlib import Path
 
@@ -75,6 +76,21 @@ def remove(name: str):
     if place is not None:
         with suppress(OSError):
             os.unlink(place / name)
+
+
+def packed(objects: list[bytes]) -> bytes:
+    """Several byte strings as one."""
+    return struct.pack(f"<{1 + len(objects)}Q", len(objects), *map(len, objects)) + b"".join(objects)
+
+
+def unpacked(content: bytes) -> list[bytes]:
+    """Byte strings of :func:`packed`."""
+    (count,) = struct.unpack_from("<Q", content)
+    lengths, at, found = struct.unpack_from(f"<{count}Q", content, 8), 8 * (1 + count), []
+    for length in lengths:
+        found.append(content[at : at + length])
+        at += length
+    return found
 
 
 def file_sizes() -> dict[str, int]:

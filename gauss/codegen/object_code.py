@@ -1,4 +1,4 @@
-"""LLVM IR → object code of this CPU, and object code → machine code in memory.
+"""LLVM IR → object code of this CPU.
 
 Two tiers: quick, by LLVM's FastISel (code-generation level 0, no passes over the IR), and optimised. A module is optimised
 in units of a few functions each, so that no call into LLVM takes long: the time until a background thread stops, and until
@@ -7,18 +7,15 @@ unit that reads them; functions that use a variable stay in one unit. Both tiers
 in the same order, fused where the IR says so: their results are equal to the last bit.
 """
 
-import gc
 import re
-import struct
 from collections.abc import Callable, Iterator
 from functools import cache
-from itertools import count, islice
+from itertools import islice
 
 import llvmlite
 import llvmlite.binding as llvm
 
-from gauss.codegen.library_symbols import register_symbols_of
-from gauss.codegen.processor import features
+from gauss.codegen.processor import features, prepare_llvm
 from gauss.codegen.terminal_line import units_in_progress
 from gauss.codegen.whole_selection import selected_whole
 
@@ -26,7 +23,6 @@ OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth l
 PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
 RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one object for that of another
 UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
-LINKS_PER_COLLECTION = 32  # modules linked between two collections, which take 30 ms
 SELECTED_WHOLE = "x86_64"  # processor on which some functions are (gauss.codegen.whole_selection)
 CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
 FUNCTION = re.compile(r"^define [^\n]*\n\{\n.*?^\}\n", re.MULTILINE | re.DOTALL)
@@ -38,8 +34,7 @@ INTERNAL = re.compile(r"^define internal ")
 @cache
 def target(level: int) -> llvm.TargetMachine:
     """Code generator of the host CPU for an optimisation level."""
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
+    prepare_llvm()
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=features(), opt=level, reloc=RELOCATION, codemodel="jitdefault"
     )
@@ -107,45 +102,6 @@ def _passes() -> tuple[llvm.FunctionPassManager, llvm.PassBuilder]:
     """Passes over functions, made once: llvmlite never frees them."""
     builder = _builder()
     return builder.getFunctionPassManager(), builder
-
-
-def packed(objects: list[bytes]) -> bytes:
-    """Several byte strings as one."""
-    return struct.pack(f"<{1 + len(objects)}Q", len(objects), *map(len, objects)) + b"".join(objects)
-
-
-def unpacked(content: bytes) -> list[bytes]:
-    """Byte strings of :func:`packed`."""
-    (count,) = struct.unpack_from("<Q", content)
-    lengths, at, found = struct.unpack_from(f"<{count}Q", content, 8), 8 * (1 + count), []
-    for length in lengths:
-        found.append(content[at : at + length])
-        at += length
-    return found
-
-
-_links = count(1)
-
-
-def linked(objects: list[bytes]) -> llvm.ExecutionEngine:
-    """Machine code in memory, owned by the engine."""
-    target(OPTIMISED)
-    machine = llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
-    )
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-    register_symbols_of(objects)
-    for content in objects:
-        engine.add_object_file(llvm.ObjectFileRef.from_data(content))
-    engine.finalize_object()
-    _collect_engines_that_are_gone()
-    return engine
-
-
-def _collect_engines_that_are_gone():
-    """Collect garbage from time to time: few Python objects hold much machine code, and the collector counts objects."""
-    if next(_links) % LINKS_PER_COLLECTION == 0 and gc.isenabled():
-        gc.collect()
 
 
 class ModuleUnits:

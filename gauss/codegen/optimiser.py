@@ -16,7 +16,9 @@ from contextlib import suppress
 from threading import Condition, Thread, current_thread
 
 from gauss.codegen import object_cache
-from gauss.codegen.object_code import linked, optimised_objects, packed, unpacked
+from gauss.codegen.linking import linked
+from gauss.codegen.object_cache import packed, unpacked
+from gauss.codegen.object_code import optimised_objects
 from gauss.codegen.process_end import can_skip_destructors, skip_destructors
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, VARIABLE, MachineCode, Run, reset_after_fork, wanted
 

@@ -38,3 +38,10 @@ def _most() -> int:
     if given not in map(str, WIDER):
         raise ArgumentError(f"{VARIABLE}: expected 2, 4 or 8 doubles in a vector register, got {given!r}.")
     return int(given)
+
+
+@cache
+def prepare_llvm():
+    """Let LLVM make, and link, code of this processor."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()

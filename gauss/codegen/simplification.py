@@ -56,6 +56,12 @@ def _div(graph: "Graph", x: "Expression", y: "Expression") -> "Expression | None
     return None
 
 
+def _extreme(graph: "Graph", x: "Expression", y: "Expression") -> "Expression | None":
+    """Smaller or larger of two numbers: NaN if one is."""
+    is_missing = [one.is_constant and one.value != one.value for one in (x, y)]
+    return y if is_missing[1] else x if is_missing[0] or x is y else None
+
+
 SIMPLIFIED = frozenset({"constant", "neg"})  # operands at which the rules look, beside two that are the same
 # rule of each operation: the simpler expression, or None
 SIMPLER: dict[str, Callable] = {
@@ -63,6 +69,6 @@ SIMPLER: dict[str, Callable] = {
     "sub": _sub,
     "mul": _mul,
     "div": _div,
-    "min": lambda graph, x, y: x if x is y else None,
-    "max": lambda graph, x, y: x if x is y else None,
+    "min": _extreme,
+    "max": _extreme,
 }

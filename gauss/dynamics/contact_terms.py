@@ -50,7 +50,7 @@ class ContactTermsKernel:
             return [[*width, *apart, *rate, *jacobian(rate, v).ravel(), *bias]]
 
         self.system, self.trace = system, lambda: write(flat, 1, system.n_q, self.n_v, name="touching")
-        n = len(watched.function.outputs) - m
+        n = len(watched.traced.outputs) - m
         self.parts = np.cumsum([m, len(whole), n, n * self.n_v])
 
     @cached_property

@@ -1,6 +1,7 @@
 """Constrained forward dynamics of a subsystem whose loops are eliminated where they close."""
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -149,3 +150,15 @@ class EmbeddedChains(EmbeddedMechanism):
     """The same without hubs: more operations, but no chain needs to meet its own rows."""
 
     of_subsystem = _ByChains
+
+
+@dataclass(frozen=True)
+class Embedding:
+    """Elimination of loops where they close: with or without hubs, and the redundant rows that are left out."""
+
+    mechanism: type[EmbeddedMechanism] = EmbeddedMechanism
+    dependent: Sequence[Collection[int]] = ()  # of each subsystem; none if empty
+
+    def __call__(self, system: System, q, v, t: Scalar = 0.0) -> EmbeddedMechanism:
+        """The system in one state."""
+        return self.mechanism(system, q, v, t, self.dependent)

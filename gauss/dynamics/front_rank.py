@@ -4,14 +4,10 @@ Of redundant loop constraints a set of full rank is eliminated. The others follo
 checks of accelerations and states have all rows.
 """
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
-from gauss.codegen import Scalar
 from gauss.dynamics.conditions import has_large_loops
-from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism
+from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism, Embedding
 from gauss.dynamics.error_scale import consistent_states
 from gauss.dynamics.generic_rank import ROUNDOFF_PIVOT, count, dependent_rows, is_generic_rank
 from gauss.dynamics.rules import Question
@@ -19,28 +15,6 @@ from gauss.dynamics.store import cached_on_disk
 from gauss.system import State, System
 
 ELIMINATIONS = EmbeddedMechanism, EmbeddedChains
-
-
-@dataclass(frozen=True)
-class Embedding:
-    """Elimination of loops where they close."""
-
-    mechanism: type[EmbeddedMechanism] = EmbeddedMechanism  # elimination with or without hubs
-    # rows that are left out; see :class:`gauss.dynamics.embedded_aba.EmbeddedMechanism`
-    dependent: Sequence[Collection[int]] = ()
-
-    def __call__(self, system: System, q, v, t: Scalar = 0.0) -> EmbeddedMechanism:
-        """The system in one state."""
-        return self.mechanism(system, q, v, t, self.dependent)
-
-    def is_regular(self, system: System, state: State) -> bool:
-        """Whether its fronts have large pivots in a state of numbers, and its rows pivots above round-off."""
-        with np.errstate(all="ignore"):
-            try:
-                found = self(system, state.q, state.v, state.t)
-            except ZeroDivisionError:
-                return False
-            return found.is_regular and all(pivot > ROUNDOFF_PIVOT for pivot in found.pivots)
 
 
 def has_loops(ask: Question) -> bool:
@@ -95,4 +69,14 @@ def _regular_embedding(system: System) -> Embedding | None:
 
 def _regular_at(system: System, state: State, dependent=()) -> Embedding | None:
     found = (Embedding(one, dependent) for one in ELIMINATIONS)
-    return next((one for one in found if one.is_regular(system, state)), None)
+    return next((one for one in found if _is_regular(one, system, state)), None)
+
+
+def _is_regular(embedding: Embedding, system: System, state: State) -> bool:
+    """Whether the fronts have large pivots in a state of numbers, and the rows pivots above round-off."""
+    with np.errstate(all="ignore"):
+        try:
+            found = embedding(system, state.q, state.v, state.t)
+        except ZeroDivisionError:
+            return False
+        return found.is_regular and all(pivot > ROUNDOFF_PIVOT for pivot in found.pivots)

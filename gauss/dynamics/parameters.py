@@ -43,7 +43,7 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
         _mapped([getattr(subsystem, name) for name in SUBSYSTEM_FIELDS], take, kind.append)
         kind += [repr(getattr(subsystem, f.name)) for f in fields(Subsystem) if f.name not in SUBSYSTEM_FIELDS]
     for relations in (system.relations, system.contacts, system.slips, system.set_valued):
-        kind.append(relations.function.text() if relations.placed else "")
+        kind.append("" if relations.function is None else relations.function.text())
     _mapped([system.scene.contacts, system.scene.set_valued], keep, kind.append)
     return np.concatenate([np.ravel(array) for array in found]), tuple(kind)
 

@@ -295,6 +295,15 @@ def motion_plan(system: System) -> Plan:
     return plan_of(Question(system, Laws(system), method=METHODS["dop853"]))
 
 
+# Rules ask for the kind of a method alone; steps of time stepping belong to the simulation.
+_TIME_STEPPING = FixedStep("time_stepping", "time stepping", 1, "", 1, lambda *_: NotImplemented, nonsmooth=True)
+
+
+def time_stepping_plan(system: System) -> Plan:
+    """Plan of a motion by time stepping; SimulationError if the conditions of no rule hold."""
+    return MOTIONS.plan(Question(system, Laws(system), method=_TIME_STEPPING))
+
+
 def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
     """Plan of a motion, cached with the system; of a plain one on disk, for its conditions reduce the system.
 

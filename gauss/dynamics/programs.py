@@ -5,7 +5,8 @@ Those of other files are imported where they are asked for: one motion needs one
 
 from functools import cached_property
 
-from gauss.dynamics.front_rank import Embedding, embedding_of
+from gauss.dynamics.embedded_aba import Embedding
+from gauss.dynamics.front_rank import embedding_of
 from gauss.dynamics.traced_system import Program
 
 

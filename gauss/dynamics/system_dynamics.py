@@ -15,15 +15,16 @@ from gauss.dynamics.consistent_states import consistent
 from gauss.dynamics.evaluation_cost import evaluation_cost, slowdown
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
-from gauss.dynamics.plan import ACCELERATIONS, motion_plan
+from gauss.dynamics.plan import ACCELERATIONS, motion_plan, time_stepping_plan
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import Store
-from gauss.errors import SimulationError, judged_later
+from gauss.errors import GaussError, SimulationError, judged_later
 from gauss.system import State, Subsystem, System
 
 if TYPE_CHECKING:
     from gauss.dynamics.contact.near_detection import CandidatePairs
     from gauss.dynamics.contact.sleepers import Sleepers
+    from gauss.dynamics.contact.step_estimate import StepEstimate
 
 
 class SystemDynamics(Store):
@@ -50,6 +51,16 @@ class SystemDynamics(Store):
         from gauss.dynamics.contact.near_detection import candidate_pairs
 
         return candidate_pairs(system)
+
+    def time_step(self, system: System) -> "tuple[Plan, StepEstimate | None] | GaussError":
+        """Plan of time stepping, and what a step by kernels of pairs takes at the start; an error with the reason."""
+        from gauss.dynamics.contact.step_estimate import estimated_step
+
+        try:
+            plan = time_stepping_plan(system)
+            return plan, estimated_step(system, plan)
+        except GaussError as refusal:
+            return refusal
 
     def sleepers(self, system: System) -> "Sleepers | SimulationError":
         """Bodies that may sleep in time stepping, and those that never do; where none may, the error with the reason."""

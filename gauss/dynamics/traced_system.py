@@ -73,7 +73,14 @@ class Program:
         The parametrised system, if some numbers of the system are parameters.
     inputs : bool
         Whether the inputs of the scene are parameters, held in each step; otherwise they are zero.
+
+    Attributes
+    ----------
+    checks_bodies : bool
+        Whether accelerations of a tree are checked by inverse dynamics of all bodies, independent of link frames.
     """
+
+    checks_bodies = True
 
     def __init__(
         self,
@@ -121,11 +128,6 @@ class Program:
     def has_redundant_rows(self) -> bool:
         """Whether the loop constraints of what is projected are redundant at every configuration."""
         return self.projects and not self.has_full_rank
-
-    @property
-    def checks_bodies(self) -> bool:
-        """Whether the check of accelerations is by inverse dynamics of all bodies, independent of link frames."""
-        return not self.system.has_closures
 
     @property
     def may_lose_rank(self) -> bool:

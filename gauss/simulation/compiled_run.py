@@ -2,7 +2,7 @@
 
 Accelerations are checked every few steps by inverse dynamics in machine code, and at the ends by the certified recursion;
 the loop stops at a failed check, and the fallback dynamics of the plan continue from the last confirmed point
-(:func:`gauss.simulation.compiled_runs.finished`). Adaptive methods: :mod:`gauss.simulation.compiled_adaptive_run`; fixed
+(:mod:`gauss.simulation.continued_run`). Adaptive methods: :mod:`gauss.simulation.compiled_adaptive_run`; fixed
 steps: :mod:`gauss.simulation.compiled_fixed_run`.
 """
 
@@ -20,6 +20,7 @@ from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.plan import method_key
+from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.programs import program_of
 from gauss.dynamics.store import cached_on_disk, is_noted_on_disk, note_on_disk
 from gauss.dynamics.traced_system import Program
@@ -47,12 +48,11 @@ UNTRUSTED = (LoopStatus.UNCONFIRMED, LoopStatus.OFF_CONSTRAINTS, LoopStatus.TOO_
 class MethodOnSystem(NamedTuple):
     """What all runs of one method on one system have in common, beside their machine code."""
 
-    program: Program  # functions of the system
+    layout: PointLayout  # places in a point
     method_state: np.ndarray | None  # initial method state; the accelerations where None
     budget: int  # steps of one call of the loop
     every: int  # steps between two checks of the accelerations
     order: float  # order of the method
-    checks_bodies: bool  # whether accelerations are checked body by body
 
 
 class CompiledRun:
@@ -76,8 +76,7 @@ class CompiledRun:
         self.dynamics, self.method_key = dynamics, method_key(problem.method)
         self.key: tuple[Hashable, ...] = (dynamics, self.drift, problem.laws.key, self.held is not None)
         self.common: MethodOnSystem = self._on_demand((MethodOnSystem, self.method_key), self._on_system)
-        self.program, self.method_state, self.budget, *_ = self.common
-        self.layout = self.program.layout
+        self.layout, self.method_state, self.budget, *_ = self.common
         self.inputs = np.zeros(len(self.layout.parameters))
         self.input_forces = InputForces(self.system) if self.held else None
         duration = self.end - self.start.t
@@ -89,15 +88,25 @@ class CompiledRun:
         """Engine that confirms accelerations; most runs need none."""
         return CertifiedEngine("auto", self.drift.gains)
 
+    @cached_property
+    def program(self) -> Program:
+        """Functions of the system; machine code that is read from disk needs none."""
+        kind, layout, laws = program_of(self.dynamics), self.layout, self.problem.laws
+        make = lambda: kind(self.system, laws, self.drift, layout.memory, inputs=self.held is not None)  # noqa: E731
+        return self._on_demand((Program, layout.memory), make)
+
+    @property
+    def checks_bodies(self) -> bool:
+        """Whether accelerations are checked body by body, which joints that close loops do not allow."""
+        return not self.system.has_closures and self.program.checks_bodies
+
     def _on_system(self) -> MethodOnSystem:
         """What depends on the method and the system alone."""
-        system, laws, evaluations = self.system, self.problem.laws, self.problem.method.evaluations
+        system, method = self.system, self.problem.method
         method_state, size = self._initial_method_state()
-        held, kind = self.held is not None, program_of(self.dynamics)
-        program = self._on_demand((Program, size), lambda: kind(system, laws, self.drift, size, inputs=held))
-        budget = max(1, int(BUDGET * min(1.0, BUDGET_WORK / (max(1, system.n_v) ** 2 * evaluations))))
-        every, order = steps_per_check(evaluations), self.problem.method.order
-        return MethodOnSystem(program, method_state, budget, every, order, program.checks_bodies)
+        layout = PointLayout(system.n_q, system.n_v, size, () if self.held is None else tuple(system.scene.inputs))
+        budget = max(1, int(BUDGET * min(1.0, BUDGET_WORK / (max(1, system.n_v) ** 2 * method.evaluations))))
+        return MethodOnSystem(layout, method_state, budget, steps_per_check(method.evaluations), method.order)
 
     def _initial_method_state(self) -> tuple[np.ndarray | None, int]:
         """Initial method state, the accelerations where None, and its size."""
@@ -229,7 +238,7 @@ class CompiledRun:
         this machine code, which is noted on disk, and later where the check fails. Other systems are checked body by body in
         machine code, at their last point, too.
         """
-        if self.common.checks_bodies:
+        if self.checks_bodies:
             return True
         packed = self.point
         checked: Sequence | np.ndarray = (self.control.constraint_residual,)  # the error by which the loop decides
@@ -259,7 +268,7 @@ class CompiledRun:
 
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
-        known = self.common.checks_bodies or self._is_certified()
+        known = self.checks_bodies or self._is_certified()
         return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECK_ERRORS])
 
     def _is_certified(self) -> bool:
@@ -272,6 +281,20 @@ class CompiledRun:
     def _certified_loops(self) -> dict[Hashable, bool]:
         """Whether kinds of step loops were confirmed."""
         return self._on_demand((dict,), dict)
+
+    def finished(self, fallback: Callable[[State, np.ndarray | None], Trajectory]) -> Trajectory:
+        """Trajectory, continued by ``fallback(start, samples)`` where the loop has stopped early.
+
+        Raises
+        ------
+        SimulationError
+            If the motion cannot continue; its ``trajectory`` holds the motion so far.
+        """
+        if self.control.status == LoopStatus.DONE:
+            return self.trajectory()
+        from gauss.simulation.continued_run import continued
+
+        return continued(self, fallback)
 
     def trajectory(self) -> Trajectory:
         """Motion so far."""

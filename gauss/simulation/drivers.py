@@ -5,9 +5,10 @@ Each imports what it runs: one motion needs one of them.
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from gauss.dynamics import engines
+from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.plan import plan_of
@@ -16,9 +17,13 @@ from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
-from gauss.simulation.compiled_runs import adaptive_run, finished, fixed_run, moreau_run
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+    from gauss.simulation.compiled_fixed_run import CompiledFixedRun
+    from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 
 T = TypeVar("T")
 
@@ -41,6 +46,43 @@ def engine(dynamics: str, problem: Problem) -> "engines.Engine":
             return engines.CertifiedEngine(problem.backend, gains)
 
 
+def fixed_run(problem: Problem, dynamics: str) -> "CompiledFixedRun":
+    """Fixed steps of a problem in machine code, of time stepping too."""
+    assert isinstance(problem.method, FixedStep)
+    if problem.method.nonsmooth:
+        return moreau_run(problem)
+    if problem.laws.called:
+        from gauss.simulation.called_runs import CalledFixedRun
+
+        return CalledFixedRun(problem, dynamics)
+    from gauss.simulation.compiled_fixed_run import CompiledFixedRun
+
+    return CompiledFixedRun(problem, dynamics)
+
+
+def adaptive_run(problem: Problem, dynamics: str) -> "CompiledAdaptiveRun":
+    """Adaptive steps of a problem in machine code."""
+    if problem.laws.called:
+        from gauss.simulation.called_runs import CalledAdaptiveRun
+
+        return CalledAdaptiveRun(problem, dynamics)
+    from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
+
+    return CompiledAdaptiveRun(problem, dynamics)
+
+
+def moreau_run(problem: Problem, removal: float = 0.0) -> "CompiledMoreauRun":
+    """Moreau–Jean steps of a problem in machine code; penetration is removed in a time ``removal`` [s], zero: in a step."""
+    laws = smooth_question(problem.question).laws
+    if laws.called:
+        from gauss.simulation.moreau.called_run import CalledMoreauRun
+
+        return CalledMoreauRun(problem, laws, removal)
+    from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
+
+    return CompiledMoreauRun(problem, laws, removal=removal)
+
+
 def _constant(problem: Problem, plan: Plan) -> Trajectory:
     from gauss.simulation.constant_motion import constant
 
@@ -50,7 +92,7 @@ def _constant(problem: Problem, plan: Plan) -> Trajectory:
 def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
     run = (fixed_run if isinstance(problem.method, FixedStep) else adaptive_run)(problem, plan.dynamics)
     run.run()
-    return finished(run, lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
+    return run.finished(lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
 
 def _samples(problem: Problem, plan: Plan) -> Trajectory:

@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.dynamics.rules import Plan
+from gauss.errors import listed
+
+MOST_NAMED = 5  # bodies that a line names; the attributes hold all
 
 
 class SleepRecord(NamedTuple):
@@ -28,6 +31,13 @@ class SleepRecord(NamedTuple):
     steps: dict[str, int]
     asleep: tuple[str, ...]
     woken: int
+
+    def __repr__(self):
+        never = f"; never: {listed(self.never, MOST_NAMED)}" if self.never else ""
+        asleep = f": {listed(self.asleep, MOST_NAMED)}" if self.asleep else ""
+        woken = f"; {self.woken} times woken" if self.woken else ""
+        counts = f"{len(self.steps)} of {len(self.able)} able bodies slept, {len(self.asleep)} at the end"
+        return f"SleepRecord({counts}{asleep}{woken}{never})"
 
 
 class Stats(NamedTuple):
@@ -75,6 +85,12 @@ class Stats(NamedTuple):
     plan: Plan | None = None
     handed_over: float | None = None
     sleep: SleepRecord | None = None
+
+    def __repr__(self):
+        rejected = f" and {self.rejected} rejected" if self.rejected else ""
+        plan = "" if self.plan is None else f", {self.plan.driver}, {self.plan.dynamics} dynamics"
+        sleep = "" if self.sleep is None else f", {self.sleep}"
+        return f"Stats({self.steps} steps{rejected}, {self.evaluations} evaluations, {self.wall_time:.3g} s{plan}{sleep})"
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from gauss.errors import SimulationError, StateError
 from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem
-from gauss.simulation.compiled_runs import adaptive_run
-from gauss.simulation.drivers import DRIVERS
+from gauss.simulation.drivers import DRIVERS, adaptive_run
 from gauss.simulation.problem import Problem
 from gauss.simulation.simulate import simulate
 from gauss.simulation.step_limits import BUDGET, lasting

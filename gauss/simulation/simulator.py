@@ -25,7 +25,7 @@ from gauss.integrators import FixedStep
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, random_changes
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
-from gauss.simulation.compiled_runs import fixed_run
+from gauss.simulation.drivers import fixed_run
 from gauss.simulation.held_inputs import FLOAT, HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
@@ -249,7 +249,7 @@ class Simulator:
             self._look_for_passing()
 
     def _look_for_passing(self):
-        self._watch.look(self._rates, self._steps, lambda: self.state)
+        self._watch.look(self._rates, self._steps, lambda: self.state, self._run.fastest)
 
     def _set(self, u):
         given = u if type(u) is np.ndarray and u.dtype is FLOAT else real_numbers(u)

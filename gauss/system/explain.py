@@ -53,7 +53,25 @@ def _steps_in_contact(system) -> list[str]:
         return []
     parts, pairs, by_grid = system.dynamics.candidate_pairs(system)
     by = f"a grid finds the near ones: its work is that of {parts} parts" if by_grid else "tried one by one in each step"
-    return [f"  contacts of shapes: {pairs} pairs of {parts} convex parts, {by}", *_sleeping(system)]
+    return [f"  contacts of shapes: {pairs} pairs of {parts} convex parts, {by}", *_time_step(system), *_sleeping(system)]
+
+
+def _time_step(system) -> list[str]:
+    """Plan of time stepping, and what a step takes at the start."""
+    found = system.dynamics.time_step(system)
+    if isinstance(found, GaussError):
+        return [f"  time stepping: no step from the start, {found}"]
+    plan, step = found
+    if step is None:
+        return [f"  time stepping: {plan.dynamics} dynamics, contacts in the machine code of the scene"]
+    solver = "free bodies, Newton's method on a block-sparse matrix" if step.free else "a mechanism, Newton's method"
+    kinds = f" ({listed(step.kinds, MOST_REASONS)})" if step.kinds else ""
+    islands = f" in {len(step.islands)} islands of up to {max(step.islands)} bodies" if step.islands else ""
+    return [
+        f"  time stepping: {plan.dynamics}, the step of {solver}",
+        f"    at the start {step.points} near points of {step.pairs} pairs{kinds}{islands}: about "
+        f"{1e6 * step.cost:.2g} µs a step of {step.step:.2g} s (CPU time, measured); more where more bodies touch",
+    ]
 
 
 def _sleeping(system) -> list[str]:

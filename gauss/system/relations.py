@@ -65,26 +65,34 @@ class Relations:
     ----------
     placed : tuple of PlacedRelation
         Their bodies, joints and rows.
-    function : Function
-        All rows as expressions of poses, rates and time; relation by relation the blocks of A, of B, then C, D, gap.
+    function : Function or None
+        All rows as expressions of poses, rates and time; relation by relation the blocks of A, of B, then C, D, gap. None
+        without relations.
     bodies, joints : tuple of int
         Bodies and joints whose symbols are the inputs.
     """
 
     placed: tuple[PlacedRelation, ...]
-    function: Function
+    function: Function | None
     bodies: tuple[int, ...]
     joints: tuple[int, ...]
 
     @cached_property
     def kernel(self) -> Kernel:
         """Machine code of all rows."""
-        return from_disk((Kernel, self.function), lambda: Kernel(self.function, batch=False))
+        function = self.traced
+        return from_disk((Kernel, function), lambda: Kernel(function, batch=False))
 
     @cached_property
     def asks_time(self) -> bool:
         """Whether any row depends on the time."""
-        return bool(self.function.outputs) and _asks(self.function.outputs, self.function.inputs[-1:])
+        return self.function is not None and _asks(self.function.outputs, self.function.inputs[-1:])
+
+    @property
+    def traced(self) -> Function:
+        """The function, of relations that there are."""
+        assert self.function is not None
+        return self.function
 
     @property
     def have_power(self) -> bool:
@@ -97,7 +105,7 @@ class Relations:
         parts = [part for b in self.bodies for part in (view.R[b].ravel(), view.x[b], view.W[b], view.u[b])]
         parts += [part for j in self.joints for part in (view.state.q[joints[j].q], view.state.v[joints[j].v])]
         inputs = np.concatenate([*parts, [view.t]])
-        return self.function.inlined(inputs) if inputs.dtype == object else self.kernel(inputs)
+        return self.traced.inlined(inputs) if inputs.dtype == object else self.kernel(inputs)
 
     def rows(self, view: View) -> Iterator[Rows]:
         """Rows of each relation, by a view in numbers or expressions.
@@ -125,7 +133,7 @@ class Relations:
             yield Rows(tuple(blocks[:n]), tuple(blocks[n:-3]), *blocks[-3:])
 
 
-NO_RELATIONS = Relations((), Function("relations", [], []), (), ())
+NO_RELATIONS = Relations((), None, (), ())
 
 
 def place_relations(system, relations) -> Relations:

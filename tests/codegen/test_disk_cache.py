@@ -17,7 +17,7 @@ from gauss.codegen import cache_size as size
 from gauss.codegen.file_trust import write_temporary
 from gauss.errors import CacheWarning
 
-disk_cache = import_module("gauss.codegen.disk_cache")
+disk_cache, source_digest = (import_module(f"gauss.codegen.{name}") for name in ("disk_cache", "source_digest"))
 GIVEN = np.array([2.0, 3.0])
 pytestmark = pytest.mark.disk
 
@@ -125,7 +125,7 @@ def test_other_sources_and_another_machine_have_other_keys(what, place, monkeypa
     made(1.5)
     match what:
         case "sources":
-            monkeypatch.setattr(disk_cache, "_content_of", lambda paths: b"other")
+            monkeypatch.setattr(disk_cache, "source_digest", lambda outer=False: b"other")
         case "cpu":
             monkeypatch.setattr(disk_cache.llvm, "get_host_cpu_name", lambda: "other")
         case "python":
@@ -137,7 +137,8 @@ def test_other_sources_and_another_machine_have_other_keys(what, place, monkeypa
 
 
 def test_sources_changed_since_the_process_began_keep_nothing(place, monkeypatch):
-    monkeypatch.setattr(disk_cache, "LOADED_AT", 0)
+    monkeypatch.setattr(source_digest, "LOADED_AT", 0)
+    monkeypatch.setattr(disk_cache, "source_digest", source_digest.source_digest.__wrapped__)
     monkeypatch.setattr(disk_cache, "package_digest", disk_cache.package_digest.__wrapped__)
     assert made(1.5)[1] and made(1.5)[1] and not entries(place)
 

@@ -69,8 +69,8 @@ def test_units_are_the_module():
 
 def test_packed_objects_are_unpacked():
     parts = [b"", b"a" * 1000, bytes(range(256))]
-    assert object_code.unpacked(object_code.packed(parts)) == parts
-    assert object_code.unpacked(object_code.packed([])) == []
+    assert object_cache.unpacked(object_cache.packed(parts)) == parts
+    assert object_cache.unpacked(object_cache.packed([])) == []
 
 
 def test_optimised_code_takes_over_with_the_same_digits():

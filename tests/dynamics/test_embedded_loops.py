@@ -7,8 +7,8 @@ import pytest
 
 import gauss
 from gauss.dynamics import traced_refinement
-from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism
-from gauss.dynamics.front_rank import Embedding, embedding
+from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism, Embedding
+from gauss.dynamics.front_rank import embedding
 from gauss.dynamics.generic_rank import dependent_rows, is_generic_rank
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism

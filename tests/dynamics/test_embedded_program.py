@@ -8,7 +8,7 @@ import pytest
 import gauss
 from gauss.codegen import Kernel, write
 from gauss.dynamics import programs
-from gauss.dynamics.front_rank import Embedding
+from gauss.dynamics.embedded_aba import Embedding
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.programs import EmbeddedProgram
 from gauss.dynamics.rules import Plan

@@ -11,6 +11,7 @@ from gauss import Plan, Sleeping
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.coordinate_groups import coordinate_groups
 from gauss.errors import SimulationError
+from gauss.simulation.motion_records import SleepRecord
 
 STEP = 1e-3  # [s]
 SOON = Sleeping(duration=0.05)
@@ -18,6 +19,7 @@ KERNELS = Plan("time stepping", "pair kernels")
 AS_AWAKE = 1e-6  # [m], [m/s], [rad], [rad/s]: rates at rest in steps that meet the laws to 1e-10, through impacts
 BALANCE = 1e-12  # [J] of 1 J, [m/s] of 1 m/s
 SHUT = 1e-3  # [N m] with which a lid is held shut, of 0.2 N m by its weight
+LINE = 300  # [characters]
 ENDS = 0.3  # [s]: until here no impact follows on another in which a change of 1e-12 grows
 
 
@@ -240,6 +242,26 @@ def test_the_record_of_a_motion_says_which_bodies_may_sleep_and_slept_and_when(t
     assert found.stats.plan.sleepers == 3 and Plan.from_json(found.stats.plan.to_json()).sleepers == 3
     awake = moved(scene, 2 * STEP, sleeping=False).stats
     assert awake.sleep is None and awake.plan.sleepers is None
+
+
+def test_a_record_of_many_bodies_is_shown_in_one_line_with_their_number():
+    names = tuple(f"ball {k}" for k in range(1000))
+    record = SleepRecord(names[:900], names[900:], dict.fromkeys(names[:800], 100), names[:700], 3)
+    stats = gauss.simulate(gauss.load("double_pendulum"), 0.01).stats._replace(sleep=record)
+    for shown in (str(record), repr(record), str(stats)):
+        assert len(shown) < LINE and "\n" not in shown and {"900", "800", "700"} <= set(re.findall(r"\d+", shown))
+
+
+MJCF_ARM = """<mujoco><worldbody><geom type="plane" size="5 5 1"/><body name="base" pos="0 0 0.1"><freejoint/>
+<geom type="sphere" size="0.1" mass="1"/><body name="arm" pos="0.3 0 -0.05"><joint axis="0 1 0" damping="5"/>
+<joint axis="1 0 0" damping="5"/><geom type="sphere" size="0.05" mass="0.3"/></body></body></worldbody></mujoco>"""
+
+
+def test_bodies_without_inertia_between_joints_are_not_counted(tmp_path):
+    (tmp_path / "arm.xml").write_text(MJCF_ARM)
+    system = gauss.compile_scene(gauss.load(tmp_path / "arm.xml", contacts=True))
+    assert system.structure.n_bodies == 3  # one of them between the two hinges
+    assert system.dynamics.sleepers(system) == (("base", "arm"), ())
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ without a branch before the end: compilers vectorise them over the angles of a m
 """
 
 from collections.abc import Iterator
-from math import isinf, isnan
+from math import isinf, isnan, nan
 
 from gauss.analysis.export.exported_function import ExportedFunction
 from gauss.codegen import LOOKUPS, Column, Expression, schedule
@@ -25,8 +25,8 @@ OPERATIONS = {
     "log": "log({})",
     "floor": "floor({})",
     "atan2": "atan2({}, {})",
-    "min": "{1} < {0} ? {1} : {0}",
-    "max": "{0} < {1} ? {1} : {0}",
+    "min": "{1} < {0} || {1} != {1} ? {1} : {0}",
+    "max": "{0} < {1} || {1} != {1} ? {1} : {0}",
     "less": "{} < {}",
     "less_equal": "{} <= {}",
     "select": "{} ? {} : {}",
@@ -59,10 +59,12 @@ PRELUDE = f"""#ifdef FP_FAST_FMA
 #define GAUSS_FMA(x, y, z) ((x) * (y) + (z))
 #endif
 
-/* numbers of an ascending array that lie below x, by bisection */
+/* numbers of an ascending array that lie below x, by bisection; n + 1 if x is not a number */
 static inline int gauss_row(int n, const double *breaks, double x)
 {{
     int row = 0;
+    if (x != x)
+        return n + 1;
     while (n > 0) {{
         const int half = n / 2, below = breaks[row + half] < x;
         row += below ? half + 1 : 0;
@@ -149,7 +151,7 @@ class CBody:
         name, size = column.name, column.numbers.size
         if column not in self.columns:
             self.columns.add(column)
-            yield f"static const double {name}[{size}] = {{{', '.join(map(c_number, column.numbers))}}};"
+            yield f"static const double {name}[{size + 1}] = {{{', '.join(map(c_number, [*column.numbers, nan]))}}};"
         found = f"gauss_row({size}, {name}, {x})" if node.op == "row" else f"{name}[{x}]"
         self.names[node.index] = f"x{node.index}"
         yield f"const {'int' if node.op == 'row' else 'double'} x{node.index} = {found};"

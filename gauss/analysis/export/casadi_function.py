@@ -80,8 +80,8 @@ def _operations(casadi) -> dict[str, Callable]:
         "less": lambda x, y: x < y,
         "less_equal": lambda x, y: x <= y,
         "atan2": casadi.atan2,
-        "min": casadi.fmin,
-        "max": casadi.fmax,
+        "min": lambda x, y: casadi.if_else(y < x, y, _unless_missing(casadi, x <= y, x)),
+        "max": lambda x, y: casadi.if_else(x < y, y, _unless_missing(casadi, y <= x, x)),
         "select": casadi.if_else,
     } | {op: getattr(casadi, op) for op in ("sqrt", "sin", "cos", "exp", "log", "floor")}
 
@@ -113,7 +113,12 @@ def _entry(casadi, column: Column, x, breaks: Column):
         middle = (first + last) // 2
         return casadi.if_else(x <= float(breaks.numbers[middle]), among(first, middle), among(middle + 1, last))
 
-    return among(0, breaks.numbers.size)
+    return _unless_missing(casadi, x <= np.inf, among(0, breaks.numbers.size))
+
+
+def _unless_missing(casadi, is_number, value):
+    """A value, or NaN where a comparison is false because a number is NaN."""
+    return casadi.if_else(is_number, value, np.nan)
 
 
 def _shaped(casadi, part: np.ndarray):

@@ -24,8 +24,8 @@ OPERATIONS = {
     "atan2": "jnp.arctan2({}, {})",
     "min": "jnp.minimum({}, {})",
     "max": "jnp.maximum({}, {})",
-    "row": "jnp.searchsorted({1}, {0})",
-    "entry": "{1}[{0}]",
+    "row": "jnp.searchsorted({1}, {0}) + jnp.isnan({0})",  # NaN has a row behind the others
+    "entry": "{1}.at[{0}].get(mode='fill', fill_value=jnp.nan)",
     "select": "jnp.where({} != 0, {}, {})",
 } | {op: f"jnp.{op}({{}})" for op in ("sqrt", "sin", "cos", "exp", "log", "floor")}
 

@@ -53,7 +53,7 @@ GROUPS = (
         "Forces and energy",
         "What joints, constraints, drives and contacts take, at one instant or along a motion.",
         _of("gauss", "reactions constraint_forces drive_forces contact_forces friction_forces set_valued_forces")
-        + _of("gauss", "inverse_dynamics energy"),
+        + _of("gauss", "contact_points inverse_dynamics energy"),
     ),
     Group(
         "analysis",

@@ -121,13 +121,20 @@ class FreeBodyFunctions:
 class _PointModes(ContactModes):
     """Record of changes of the contact mode, of points by their forces and rates."""
 
-    def write_points(self, m: Value, hits, rates):
-        """Compare the modes after a step with those before it; ``hits`` and ``rates`` are functions of a contact."""
+    def write_points(self, m: Value, hits, rates, drift):
+        """Compare the modes after a step with those before it.
+
+        Parameters
+        ----------
+        hits, rates, drift : callable
+            Of a contact: whether it has an impact, its velocities (3,) after the step, and what the laws add to them (3,).
+        """
         r, law, found, place = self.r, self.at.table("law"), self.at.table("found"), self.at.table("contact_place")
         self.counts[1] = 0
         with r.each(m) as c, r.when(self.at["f"][place[c] * 3] > 0.0):
             mode, u = r.variable(STICKING, INTEGER), rates(c)
-            slides = r.square_root(u[1] * u[1] + u[2] * u[2]) > self.at.settings["slow"]
+            one, other = (velocity + more for velocity, more in zip(u[1:], drift(c)[1:], strict=True))
+            slides = r.square_root(one * one + other * other) > self.at.settings["slow"]
             with r.when((self.at["mu"][place[c]] > 0.0) & slides):
                 mode[0] = SLIDING
             work = r.number(0.0)
@@ -246,7 +253,12 @@ class _FreeBodyStepWriter:
         for q in range(3):
             at["before"][c * 3 + q], at["after"][c * 3 + q] = first[q], free[q]
             least = r.choose(e > 0.0, elastic, plastic) if q == 0 else r.number(0.0)
-            at["b"][place * 3 + q] = free[q] + s["h"] * self.remaining * row[52 + q] - least
+            at["b"][place * 3 + q] = free[q] + self._drift(c)[q] - least
+
+    def _drift(self, c: Value) -> list[Value]:
+        """Changes (3,) of the velocities of a contact in the rest of a step at constant rates of the bodies."""
+        row = self.at.table("rows", POINTER).after(c * ROW)
+        return [self.settings["h"] * self.remaining * row[52 + q] for q in range(3)]
 
     def _rates(self, c: Value, name: str | None) -> list[Value]:
         """Relative velocities (3,) of a contact by the twists of its bodies."""
@@ -320,7 +332,7 @@ class _FreeBodyStepWriter:
         with r.each(at.n["n"]) as k:
             self._end(k)
         with r.when(at["loop"][LOOP_SETTINGS.index("recorded")] > 0.0):
-            self.modes.write_points(m, self._hits, lambda c: self._rates(c, "added"))
+            self.modes.write_points(m, self._hits, lambda c: self._rates(c, "added"), self._drift)
         found, known = at.table("found"), at.table("known_found")
         with r.each(m) as c:
             u = self._rates(c, "added")

@@ -3,7 +3,7 @@
 from llvmlite import ir
 
 from gauss.codegen import POINTER, external
-from gauss.codegen.library_symbols import symbol
+from gauss.codegen.linking import symbol
 
 WHOLE = ir.IntType(32).as_pointer()  # LAPACK takes all arguments by reference; its integers have 32 bits
 LETTER = ir.IntType(8).as_pointer()

@@ -139,11 +139,12 @@ def _groups(traced: TracedMechanism) -> CoordinateGroups:
 
 
 def bodies_of_groups(system: System, groups: CoordinateGroups) -> list[tuple[str, ...]]:
-    """Bodies that each group moves."""
+    """Bodies that each group moves, without those of no mass and inertia, as between the joints of one body of MJCF."""
     group = np.full(system.structure.n_bodies + 1, -1)  # the ground is the last one
     for edge in system.structure.tree:  # inner bodies come first
         v = system.joints[edge.constraint].v
         group[edge.outer] = groups.of_rate[v.start] if v.stop > v.start else group[edge.inner]
+    group[:-1][~system.Phi.reshape(-1, 6).any(axis=1)] = -1
     names = system.structure.bodies
     return [tuple(names[body] for body in np.flatnonzero(group[:-1] == k)) for k in range(groups.timed.size)]
 

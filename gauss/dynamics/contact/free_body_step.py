@@ -195,7 +195,8 @@ class FreeBodyStepper:
     ) -> ModesOfStep | None:
         """Contacts that bear a force in a step; None if their modes are those of the last step."""
         slow = sliding_above(self.system, begun.v)
-        modes = modes_of_contacts(self.table, near.law, force, np.hypot(reached[:, 1], reached[:, 2]), slow)
+        along = reached[:, 1:] + (h * (1.0 - share)) * near.bias[:, 1:]  # the velocities that the laws take
+        modes = modes_of_contacts(self.table, near.law, force, np.hypot(*along.T), slow)
         if self.record.is_same(near.key, modes):
             return None
         pushed, hits = np.flatnonzero(modes), self._impacts(near, begun, known, h, share)
@@ -289,11 +290,15 @@ class FreeBodyStepper:
         found, _ = ContactProblem(response @ rows.T, order[0], laws).solve(order[1])
         return np.column_stack([found[:m], found[m:].reshape(m, 2)]), (found @ response).reshape(self.n, 6)
 
-    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Forces over a step from a state, as of :meth:`forces_of`; it expects its own forces."""
+    def step_over(self, state: State, h: float) -> FreeBodyStep:
+        """Step of length h in Python that expects its own forces."""
         self.known = self.known._replace(expected=np.zeros((6, self.n)))
         found = self.python_step(state, h)
-        return self.forces_of(self.python_step(state, h) if self.known.expected.any() else found)
+        return self.python_step(state, h) if self.known.expected.any() else found
+
+    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Forces over a step from a state that expects its own forces, as of :meth:`forces_of`."""
+        return self.forces_of(self.step_over(state, h))
 
     def forces_of(self, step: FreeBodyStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""

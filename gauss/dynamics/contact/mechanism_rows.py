@@ -141,22 +141,22 @@ class MechanismRows:
         contacts[rows.rough, 1:] = force[m + g : end].reshape(-1, 2)
         return contacts, np.concatenate([force[m : m + g], force[end:]])
 
-    def modes(self, rows: StepRows, near: NearContacts, force, change, lost, hits, slow: float) -> ModesOfStep:
+    def modes(self, rows: StepRows, near: NearContacts, force, after, lost, hits, slow: float) -> ModesOfStep:
         """Elements that bear a force in a step.
 
         Parameters
         ----------
         force, lost : ndarray, shape (n,)
             Forces, and their work [J].
-        change : ndarray, shape (n_v,)
-            Change of the rates.
+        after : ndarray, shape (n,)
+            Rates of the rows after the step, as the laws take them.
         hits : ndarray of bool, shape (m,)
             Gaps with an impact.
         slow : float
             Speed below which a contact sticks, in units of the scene.
         """
         g, m, contacts = len(self.others), near.gap.size, len(self.table.contacts)
-        after, tangents = rows.rate + rows.K @ change, m + g + 2 * np.arange(rows.rough.size)
+        tangents = m + g + 2 * np.arange(rows.rough.size)
         mode, heat = np.full(m + g, STICKING), -lost[: m + g]
         mode[rows.rough[np.hypot(after[tangents], after[tangents + 1]) > slow]] = SLIDING
         heat[rows.rough] -= lost[tangents] + lost[tangents + 1]

@@ -160,6 +160,8 @@ class MechanismStepper:
         if self.memory is None:
             self._known = found
         else:
+            self.detection.expect(found.key.size)  # a new stepper that continues a motion has met no contacts yet
+            self.memory = self.memory.fitting()
             self.memory.known = found
 
     def rest(self, v: np.ndarray) -> float:
@@ -184,6 +186,7 @@ class MechanismStepper:
         """
         if self.memory is None:
             return LoopOfSteps(0, 0.0, [], False)
+        self.memory = self.memory.fitting()
         return self.memory.advance(state, work, ends, rows)
 
     def examined(self, state: State, h: float) -> list[Paradox]:
@@ -227,7 +230,8 @@ class MechanismStepper:
         name = partial(self.rows.name, near)
         paradoxes = paradoxes_of_step(rows, begun.H, begun.acceleration, force, self.slow(state.v), name)
         hits = self._impacts(rows, begun, h, rest, share)
-        modes = self.rows.modes(rows, near, force, h * acceleration, h * work, hits, self.slow(state.v))
+        after = rows.rate + h * (rows.K @ acceleration + (1.0 - share) * rows.bias)
+        modes = self.rows.modes(rows, near, force, after, h * work, hits, self.slow(state.v))
         return MechanismStep(q, v, near, contacts, others, power, error, paradoxes, modes)
 
     def _open(self, state: State, h: float, rest: float) -> tuple[float, FreeStep, NearContacts, StepRows, float]:
@@ -340,11 +344,15 @@ class MechanismStepper:
             refuse_jam(state.t, rows, begun.H, begun.terms.M.diagonal(), force, after, name)
         return force, added, error
 
-    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
-        """Forces over a step from a state, as of :meth:`forces_of`; it expects its own forces."""
+    def step_over(self, state: State, h: float) -> MechanismStep:
+        """Step of length h in Python that expects its own forces."""
         self.known = self.known._replace(share=0.0)
         found = self.python_step(state, h)
-        return self.forces_of(self.python_step(state, h) if self.known.share else found)
+        return self.python_step(state, h) if self.known.share else found
+
+    def forces_over(self, state: State, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Forces over a step from a state that expects its own forces, as of :meth:`forces_of`."""
+        return self.forces_of(self.step_over(state, h))
 
     def forces_of(self, step: MechanismStep) -> tuple[np.ndarray, np.ndarray]:
         """Forces of a step as normal forces (g,) of all gaps, and friction (g, 3) on the first bodies, world axes [N]."""

@@ -74,7 +74,7 @@ class StepModes:
         modes, impacts, works = parts
 
         def sliding(rows):
-            rates = [touch.rate[row] + h * (touch.J[row] @ total) for row in rows]
+            rates = [touch.rate[row] + h * (touch.J[row] @ total + (1.0 - share) * touch.bias[row]) for row in rows]
             return math.where(math.sqrt(sum(rate * rate for rate in rates)) > slow, SLIDING, STICKING)
 
         for gap, element in enumerate(self.of_gap):

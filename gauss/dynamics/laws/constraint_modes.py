@@ -306,8 +306,10 @@ def refuse_surfaces(system: System, what: str):
 
 def _has_any(system: System, ops: tuple[str, ...]) -> bool:
     """Whether constraints have operations of these kinds."""
-    outputs = system.relations.function.outputs
-    return cached(system, (_has_any, ops), lambda: any(node.op in ops for node in reachable(outputs)))
+    function = system.relations.function
+    if function is None:
+        return False
+    return cached(system, (_has_any, ops), lambda: any(node.op in ops for node in function.nodes))
 
 
 def _conditions(traced: tuple[np.ndarray, np.ndarray], view: Symbols) -> list[Expression]:

@@ -23,7 +23,8 @@ class Levels(NamedTuple):
         """Numbers between which a level lies."""
         if self.breaks is None:
             return level, level + 1.0
-        k, numbers = int(level), self.breaks.numbers
+        numbers = self.breaks.numbers
+        k = min(int(level), numbers.size)  # that of NaN is one more
         return float(numbers[k - 1]) if k else -np.inf, float(numbers[k]) if k < numbers.size else np.inf
 
     def nearest(self, x: float) -> float:

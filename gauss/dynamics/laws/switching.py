@@ -127,7 +127,7 @@ def _given_times(system: System, breaks, begin: float, end: float) -> Timetable:
 def prescribed_times(relations: Relations, begin: float, end: float, monotone: bool = False) -> Timetable:
     """Switching times and mesh of the laws of time in relations."""
     function = relations.function
-    if not relations.asks_time:
+    if function is None or not relations.asks_time:
         return NO_TIMES
     outputs = [x for x in function.outputs if isinstance(x, Expression)]
     return timetable(outputs, function.inputs[-1], begin, end, monotone)

@@ -17,7 +17,6 @@ from gauss.dynamics.stabilisation import Drift
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, method_state_of
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
-from gauss.simulation.compiled_runs import finished
 from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_size
 from gauss.simulation.moreau.contact_events import ContactEvents
@@ -69,7 +68,7 @@ class CompiledMoreauRun(CompiledFixedRun):
         """
         self.run()
         fallback = lambda start, samples: self.python_steps.collect(start, samples, False)  # noqa: E731
-        found = replace(finished(self, fallback), system=self.whole.system, step=self.step)
+        found = replace(self.finished(fallback), system=self.whole.system, step=self.step)
         relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
         warn_of_laws(self._law_error(), relaxed, found.stats.steps)
         warn_of_unseen_contacts(found)

@@ -20,7 +20,7 @@ from gauss.dynamics.laws.switching_times import COARSE
 from gauss.dynamics.rules import Plan
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import Point, Rates
-from gauss.simulation.compiled_runs import moreau_run
+from gauss.simulation.drivers import moreau_run
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from gauss.simulation.moreau.single_steps import CompiledSingleSteps, PairKernelSingleSteps, ReachedPoint, SingleSteps
 from gauss.simulation.moreau.step_errors import FAILED, LocalError, RateJumps, StepErrors

@@ -5,16 +5,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.analysis import contact_forces, friction_forces
+from gauss.analysis import contact_forces, contact_points, friction_forces
+from gauss.analysis.contact_forces import by_pair_kernels
+from gauss.dynamics.contact.contact_geometry import ContactGeometry, contact_geometry
 from gauss.errors import NonUniqueReactionWarning
-from gauss.scene import Box, Capsule, Collider, Contact, FeaturePair, Points, Sphere
+from gauss.scene import Contact
 from gauss.simulation import Trajectory
 
 NEAR = 1e-3  # of the size of a mechanism: what is no farther apart is drawn as touching
 
 
 class TouchingPoint(NamedTuple):
-    """One place where bodies may touch, in every picture."""
+    """One place where bodies touch, in every picture."""
 
     points: np.ndarray  # points, forces (k, 3): where [m], and the force on the first body [N]; world axes
     forces: np.ndarray
@@ -22,7 +24,7 @@ class TouchingPoint(NamedTuple):
 
 
 def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[TouchingPoint]:
-    """Places of all contacts.
+    """Places that are closed in some picture.
 
     Parameters
     ----------
@@ -33,46 +35,55 @@ def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[Touch
     size : float
         Size of the mechanism [m].
     """
-    scene, found = motion.system.scene, []
-    for contact in scene.contacts.values():
-        if not isinstance(contact, Contact):
-            continue
-        places = contact.places(scene)
-        bounds = [_ball_around(scene.shapes[name]) for name in (contact.shape, contact.other)]
-        near = [k for k, at in enumerate(pictures.motions) if not _are_apart(bounds, at, NEAR * size)]
-        for place, force in zip(places, _forces(motion, contact, places).transpose(1, 0, 2), strict=True):
-            points, gap = np.zeros((len(pictures.t), 3)), np.full(len(pictures.t), np.inf)
-            for k in near:
-                gap[k], points[k], _ = place.touch(pictures.motions[k])
-            smooth = np.stack([np.interp(pictures.t, motion.t, part) for part in force.T], axis=1)
-            found.append(TouchingPoint(points, smooth, gap < NEAR * size))
-    return found
+    return _of_steps(motion, pictures.t) if by_pair_kernels(motion) else _of_gaps(motion, pictures, NEAR * size)
 
 
-def _ball_around(shape: Collider) -> tuple[str, np.ndarray, float] | None:
-    """Body, centre [m] in its frame, and radius [m] of a ball around a shape with corners; None of other shapes."""
-    if not isinstance(shape, Box | Capsule | Points | Sphere):
-        return None
-    corners = np.reshape(np.asarray(shape.corners, dtype=float), (-1, 3))
-    centre = corners.mean(axis=0)
-    return shape.body, centre, float(np.linalg.norm(corners - centre, axis=1).max()) + shape.radius
+def _of_steps(motion: Trajectory, times: np.ndarray) -> list[TouchingPoint]:
+    """Contacts of the samples that are nearest to some times [s], one after the other; a place has many in its time."""
+    samples = np.searchsorted(0.5 * (motion.t[1:] + motion.t[:-1]), times).tolist()
+    found = {k: contact_points(motion, k) for k in dict.fromkeys(samples)}
+    count = max((len(one) for one in found.values()), default=0)
+    points, forces = np.zeros((2, count, len(samples), 3))
+    closed = np.zeros((count, len(samples)), dtype=bool)
+    for picture, k in enumerate(samples):
+        here = slice(len(found[k]))
+        points[here, picture], forces[here, picture], closed[here, picture] = found[k].point, found[k].force, True
+    return [TouchingPoint(*place) for place in zip(points, forces, closed, strict=True)]
 
 
-def _are_apart(bounds: list, at, distance: float) -> bool:
-    """Whether the balls around two shapes are farther apart than a distance: most pairs of many bodies never meet."""
-    if None in bounds:
-        return False
-    (one, x, radius), (other, y, other_radius) = bounds
-    return np.linalg.norm(at.position(one, x) - at.position(other, y)) > radius + other_radius + distance
+def _of_gaps(motion: Trajectory, pictures: Trajectory, reach: float) -> list[TouchingPoint]:
+    """Gaps that are not wider than a reach [m] in some picture."""
+    if not any(isinstance(contact, Contact) for contact in motion.system.scene.contacts.values()):
+        return []
+    geometry = contact_geometry(motion.system)
+    near = [geometry.find(at, reach) for at in pictures.motions]
+    gaps = np.unique(np.concatenate([one.place for one in near]))
+    points, closed = np.zeros((len(gaps), len(near), 3)), np.zeros((len(gaps), len(near)), dtype=bool)
+    for picture, one in enumerate(near):
+        row = np.searchsorted(gaps, one.place)
+        points[row, picture], closed[row, picture] = one.point, True
+    forces = _forces(motion, geometry, gaps)
+    smooth = np.array([[np.interp(pictures.t, motion.t, part) for part in force.T] for force in forces])
+    drawn = np.moveaxis(smooth.reshape(len(gaps), 3, len(near)), 1, 2)
+    return [TouchingPoint(*place) for place in zip(points, drawn, closed, strict=True)]
 
 
-def _forces(motion: Trajectory, contact: Contact, places: list[FeaturePair]) -> np.ndarray:
-    """Forces on the first body of a contact (samples, places, 3) [N]."""
+def _forces(motion: Trajectory, geometry: ContactGeometry, gaps: np.ndarray) -> np.ndarray:
+    """Forces on the first bodies of contacts at some gaps (g, samples, 3) [N]; none of a scene that is not simulated.
+
+    Gaps of a scene that is not simulated need not have a closed form.
+    """
+    found = np.zeros((len(gaps), len(motion), 3))
+    if not motion.stats.steps:
+        return found
+    named = [geometry.contact_of(gap) for gap in gaps.tolist()]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NonUniqueReactionWarning)  # a picture sizes nothing
-        normal = contact_forces(motion, contact.name)
-        along = np.zeros((*normal.shape, 3))
-        for k, place in np.argwhere(normal).tolist():  # most places of many bodies bear nothing most of the time
-            along[k, place] = places[place].touch(motion.motions[k]).normal
-        sliding = friction_forces(motion, contact.name) if motion.step is not None else 0.0
-    return normal[..., None] * along + sliding
+        for row, (contact, number) in enumerate(named):
+            place = contact.places(motion.system.scene)[number]
+            normal = contact_forces(motion, contact.name)[:, number]
+            for k in np.flatnonzero(normal).tolist():  # most places bear nothing most of the time
+                found[row, k] = normal[k] * place.touch(motion.motions[k]).normal
+            if motion.step is not None:
+                found[row] += friction_forces(motion, contact.name)[:, number]
+    return found

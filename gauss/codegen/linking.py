@@ -1,28 +1,55 @@
-"""Routines of SciPy's LAPACK, and Python itself, that machine code calls by name.
+"""Object code, made here or read from disk, → machine code in memory.
 
-Their addresses are those of this process: they are registered whenever object code that calls them is linked, made here or
-read from the disk.
+Machine code calls routines of SciPy's LAPACK, and Python itself, by name. Their addresses are those of this process: they
+are registered whenever object code that calls them is linked.
 """
 
 import ctypes
+import gc
 import re
 import sys
 from functools import cache
 from importlib import import_module
 from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, FileFinder
 from importlib.util import module_from_spec
+from itertools import count
 from pathlib import Path
 from threading import Lock
 from types import ModuleType
 
 import llvmlite.binding as llvm
 
+from gauss.codegen.processor import prepare_llvm
+
+LINKS_PER_COLLECTION = 32  # modules linked between two collections, which take 30 ms
 PREFIX = "gauss_lapack_"
 CALLBACK = b"gauss_python_callback"  # see :mod:`gauss.codegen.python_callback`
 LAPACK = "scipy.linalg.cython_lapack"
 SYMBOL = re.compile(rb"gauss_lapack_([a-z0-9]+)")
 
+_links = count(1)
 _loading = Lock()
+
+
+def linked(objects: list[bytes]) -> llvm.ExecutionEngine:
+    """Machine code in memory, owned by the engine."""
+    prepare_llvm()
+    machine = llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
+    )
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    _register_symbols_of(objects)
+    for content in objects:
+        engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+    engine.finalize_object()
+    _collect_engines_that_are_gone()
+    return engine
+
+
+def _collect_engines_that_are_gone():
+    """Collect garbage from time to time: few Python objects hold much machine code, and the collector counts objects."""
+    if next(_links) % LINKS_PER_COLLECTION == 0 and gc.isenabled():
+        gc.collect()
 
 
 def symbol(routine: str) -> str:
@@ -30,7 +57,7 @@ def symbol(routine: str) -> str:
     return PREFIX + routine
 
 
-def register_symbols_of(objects: list[bytes]):
+def _register_symbols_of(objects: list[bytes]):
     """Register the addresses of the routines that object code calls with LLVM."""
     for content in objects:
         if CALLBACK in content:
