@@ -21,9 +21,11 @@ The last scenes have many contacts: a stack, dominoes, balls and convex meshes t
 deepest penetration at the end [m], of boxes and meshes into the floor and of balls into each other and the walls. Rows
 of 30, 100 and 1000 balls show how a step grows with their number.
 
-Robots of Gymnasium follow, with stops and contacts, stepped for 1 s under random inputs that change every 5 steps. Their
-first motion includes reading the file. Their error is the deepest penetration at the end: the largest change of a coordinate
-that moves the shapes apart [m, rad] for gauss, the least distance of a contact for MuJoCo.
+Robots of Gymnasium and of dm_control follow, with stops and contacts, stepped for 1 s under random inputs that change every
+5 steps: the quadruped stands on terrain, with a ball above it, the manipulator is an arm with a gripper between loose
+objects. Those whose packages are not installed are left out. Their first motion includes reading the file. Their error is
+the deepest penetration at the end: the largest change of a coordinate that moves the shapes apart [m, rad] for gauss, the
+least distance of a contact for MuJoCo.
 
 Writes benchmarks/results/contacts.md and .csv.
 """
@@ -198,7 +200,7 @@ def crowded() -> list[list[Way]]:
 
 
 def robots() -> list[list[Way]]:
-    """Walking robots under random inputs."""
+    """Walking robots, and an arm with a gripper, under random inputs."""
     steps, found = walkers.ACTIONS * walkers.HOLD, []
     for name, file in walkers.models().items():
         one, other = walkers.ours(file), walkers.theirs(file)

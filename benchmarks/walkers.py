@@ -1,4 +1,8 @@
-"""Walking robots of Gymnasium with contacts, stepped with inputs by a simulator, beside MuJoCo at the same step."""
+"""Public models with contacts, stepped with inputs by a simulator, beside MuJoCo at the same step.
+
+They are read where their packages are installed: walking robots of Gymnasium; a quadruped with a ball, a walker, and an arm
+with a gripper of dm_control, of which files alone are needed (``pip install --no-deps dm_control``).
+"""
 
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -11,16 +15,28 @@ import gauss
 
 STEP, HOLD, ACTIONS = 1e-3, 5, 200  # s, steps of an action, actions of a motion
 SHARE = 0.2  # of the largest inputs
-MODELS = ("hopper", "walker2d_v5", "half_cheetah", "ant", "humanoid")
+MODELS = (  # package, folder in it, names of files
+    ("gymnasium", "envs/mujoco/assets", ("hopper", "walker2d_v5", "half_cheetah", "ant", "humanoid")),
+    ("dm_control", "suite", ("walker", "quadruped", "manipulator")),
+)
 
 
 def models() -> dict[str, Path]:
-    """Files of the robots; none where Gymnasium has none of MuJoCo."""
-    package = find_spec("gymnasium")
-    if package is None or package.origin is None:
-        return {}
-    folder = Path(package.origin).parent / "envs" / "mujoco" / "assets"
-    return {name: folder / f"{name}.xml" for name in MODELS if (folder / f"{name}.xml").exists()}
+    """Files of the models by their names; what is not installed is said and left out."""
+    found: dict[str, Path] = {}
+    for package, folder, names in MODELS:
+        spec = find_spec(package)
+        place = None if spec is None or spec.origin is None else Path(spec.origin).parent / folder
+        files = {} if place is None else {_title(package, name): place / f"{name}.xml" for name in names}
+        there = {name: file for name, file in files.items() if file.exists()}
+        found |= there
+        if len(there) < len(names):
+            print(f"left out, as {package} is not installed or has no such files: {', '.join(names)}")
+    return found
+
+
+def _title(package: str, name: str) -> str:
+    return name if package == MODELS[0][0] else f"{name} of {package}"
 
 
 def ours(file: Path) -> tuple[Callable, Callable]:

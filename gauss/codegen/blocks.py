@@ -15,9 +15,9 @@ from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.outlined_pieces import pieces_of
 from gauss.codegen.schedule import Schedule
 
-STATES = 32  # of a block: of those of a robot arm 160 values cross pieces, in 41 kB
-PIECE_LENGTH = 100  # operations of a piece: those of two vectors wait for their operands together
-SHORTEST = 2 * PIECE_LENGTH  # operations of a function that has blocks
+STATES = 16  # of a block: of those of a robot arm 150 values cross pieces, in 19 kB of a nearest cache of 32
+PIECE_LENGTH = 150  # operations of a piece: those of two vectors wait for their operands together
+SHORTEST = 200  # operations of a function that has blocks
 SHORTEST_OF_ROWS = 2_000  # the same where rows are transposed: their buffers, too, are in the nearest cache of data
 
 

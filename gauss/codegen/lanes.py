@@ -17,6 +17,9 @@ LANE = ir.IntType(32)  # index of a lane
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
 COMPARISONS = {"less": "<", "less_equal": "<="}
+# full vectors whose sines and cosines one call computes: the operations of one depend on each other for a hundred cycles,
+# and the scheduler of a processor does not reach the next call; two take a quarter less
+SIDE_BY_SIDE = 2
 # fast-math flags of loops written for one state only: LLVM may fuse multiply–adds; gauss.codegen.multiply_add decides
 # elsewhere
 FLAGS = ("contract",)
@@ -209,8 +212,9 @@ class Lanes:
         return self.b.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), lane_indices(lanes))
 
     def sincos_together(self, angles: dict):
-        """Compute sines and cosines of angles {node: value}, a vector register of angles at a time."""
-        at_once = vector_width(self.module) // self.width
+        """Compute sines and cosines of angles {node: value}, one or two vector registers of angles at a time."""
+        registers = vector_width(self.module) // self.width
+        at_once = SIDE_BY_SIDE if registers == 1 < self.width else registers
         nodes = list(angles) if at_once > 1 else []
         for start in range(0, len(nodes), at_once):
             part = nodes[start : start + at_once]

@@ -72,7 +72,7 @@ class Accelerations:
 
     def __init__(self, system: System):
         self.system, laws = system, Laws(system, trace=False)
-        self.loads = LoadForces(system, laws.called) if laws.called else None
+        self.loads, self._shapes = LoadForces(system, laws.called) if laws.called else None, ((system.n_q,), (system.n_v,))
         self.plan = ACCELERATIONS.plan(Question(system, laws))
         self.compiled = None if self.plan.dynamics == "certified" else compiled(system, laws, self.plan)
 
@@ -86,7 +86,10 @@ class Accelerations:
         return self.compiled(state.q, state.v, load, None, state.t)
 
     def _fits(self, state: State) -> bool:
-        return (np.shape(state.q), np.shape(state.v)) == ((self.system.n_q,), (self.system.n_v,))
+        q, v, shapes = state.q, state.v, self._shapes
+        if type(q) is np.ndarray is type(v):  # the usual case, quickly
+            return (q.shape, v.shape) == shapes
+        return (np.shape(q), np.shape(v)) == shapes
 
 
 def forward_dynamics(system: System) -> Callable:

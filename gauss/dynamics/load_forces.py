@@ -75,10 +75,19 @@ class LoadForces:
 
     def __call__(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces, and power [W]."""
-        found, numbers = np.empty(self.system.n_v + 3), self.room()
+        n_v = self.system.n_v
+        found = np.empty(n_v + 3)
+        if self.is_of_time:
+            self.write_of_time(state, address(found))
+        else:
+            numbers = self.room()
+            self._fill(numbers, state)
+            self.write(state, numbers, address(numbers), address(found))
+        return found[:n_v], found[n_v:]
+
+    def _fill(self, numbers: np.ndarray, state: State):
+        """Write a state to a room."""
         numbers[0], numbers[1 : self.n_q], numbers[self.n_q : self.n_in] = state.t, state.q, state.v
-        self.write(state, numbers, address(numbers), address(found))
-        return found[: self.system.n_v], found[self.system.n_v :]
 
     def room(self) -> np.ndarray:
         """Array for the numbers of a state, which are followed by the values of laws."""
@@ -112,14 +121,17 @@ class LoadForces:
         total = parts[0] if len(parts) == 1 else sum(parts, np.zeros(self.system.n_v + 3))
         ctypes.memmove(found, address(total), total.nbytes)
 
-    def write_of_time(self, given: int, found: int):
-        """The same of laws of the time alone, for a state at an address: they need no objects of it."""
+    def write_of_time(self, given: int | State, found: int):
+        """The same of laws of the time alone, for a state or one at an address: they need no objects of it."""
         try:
             numbers, place = self._rooms.pop()
         except IndexError:  # not asked for before: another thread may take the last one in between
             numbers = self.room()
             place = address(numbers)
-        ctypes.memmove(place, given, 8 * self.n_in)
+        if type(given) is int:
+            ctypes.memmove(place, given, 8 * self.n_in)
+        else:
+            self._fill(numbers, given)  # type: ignore[arg-type]  # it is a state
         t, end = (numbers.item(0),), self.n_in
         for law, what, size in self._timed:
             put(law, t, what, size, numbers, end)

@@ -155,8 +155,9 @@ def trial_length(system: System, size: Scalar, slope: Scalar) -> Scalar:
     T = system.scale.time  # the formula compares first and second derivatives: it needs a unit of time
     size, d1 = (np.sqrt(square / (2 * system.n_v)) for square in (size, slope))
     d1 = T * d1
-    h = math.maximum(0.01 * size / math.maximum(d1, SMALLEST_NORM), SHORTEST_TRIAL)
-    return T * math.where(math.minimum(size, d1) < SMALLEST_NORM, SHORTEST_FIRST_STEP, h)
+    h = 0.01 * size / math.maximum(d1, SMALLEST_NORM)
+    h = math.where(h > SHORTEST_TRIAL, h, SHORTEST_TRIAL)  # of sizes that are not finite, too
+    return T * math.where(math.where(size < d1, size, d1) < SMALLEST_NORM, SHORTEST_FIRST_STEP, h)
 
 
 def first_length(system: System, order: int, h: Scalar, slope: Scalar, change: Scalar) -> Scalar:
@@ -164,7 +165,7 @@ def first_length(system: System, order: int, h: Scalar, slope: Scalar, change: S
     T = system.scale.time
     d1, d2 = (np.sqrt(square / (2 * system.n_v)) for square in (slope, change))
     d1, d2 = T * d1, T * T * d2 / h
-    largest = math.maximum(d1, d2)
+    largest = math.where(d2 > d1, d2, d1)  # without d2 where the trial is not finite
     free = math.maximum(SHORTEST_FIRST_STEP, h * (1e-3 / T))
     longest = T * math.where(largest <= STATIONARY_SLOPE, free, _root(0.01 / math.maximum(largest, SMALLEST_DIVISOR), order))
-    return math.minimum(100 * h, longest)
+    return math.where(longest < 100 * h, longest, 100 * h)

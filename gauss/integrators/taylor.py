@@ -102,7 +102,7 @@ def reach(
             largest = math.maximum(largest, entry)
         further = share * math.minimum(1.0 / (order - 1.0) - 1.0 / k, 0.0)
         longest = math.minimum(longest, further - np.log(largest) / k)
-    return math.where(whole <= LARGEST_ERROR, np.exp(longest - SAFETY_EXPONENT / (order - 1.0)), np.nan)  # maxima ignore NaN
+    return math.where(whole <= LARGEST_ERROR, np.exp(longest - SAFETY_EXPONENT / (order - 1.0)), np.nan)
 
 
 def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from gauss.rotors.network import Network
 from gauss.rotors.reduced import CYCLE, REST_SPEED, GearBranch, ReducedNetwork
 
 RUN_UP_ANGLE = 0.1  # rad: a network that starts at rest is given the speed it reaches over this angle, as scale
+LEAST_TORQUE = 1e-100  # [N m]: the foot of a smooth pulse, exp(-700) of its height, is no scale of a network
 
 
 def reduce(network: Network) -> ReducedNetwork:
@@ -71,7 +72,7 @@ def _run_up_speed(network: Network, K: np.ndarray) -> float:
     """Speed of all inertias under the largest torque, else the stiffest spring, after a run-up; 1 rad/s without any."""
     stiffest = max((getattr(link, "stiffness", 0.0) for link in network.links.values()), default=0.0)
     torques = [_torque_at_rest(torque) for torque in network.torques.values()]
-    largest = max((torque for torque in torques if np.isfinite(torque)), default=0.0) or stiffest
+    largest = max((torque for torque in torques if LEAST_TORQUE < torque < np.inf), default=0.0) or stiffest
     inertia = sum(shaft.inertia * k**2 for shaft, k in zip(network.shafts.values(), K, strict=True))
     return float(np.sqrt(RUN_UP_ANGLE * largest / inertia)) if largest and inertia else 1.0
 

@@ -3,6 +3,7 @@
 import ctypes
 from bisect import bisect_right
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ PAIR_BYTES = 16  # of a time of the grid and its :class:`Due`
 
 class CompiledFixedRun(CompiledRun):
     """One motion by a fixed-step method in machine code."""
+
+    fastest = inf  # largest speed of a point of a shape: not known
 
     @property
     def method(self) -> FixedStep:

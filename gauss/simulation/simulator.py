@@ -249,7 +249,7 @@ class Simulator:
             self._look_for_passing()
 
     def _look_for_passing(self):
-        self._watch.look(self._rates, self._steps, lambda: self.state)
+        self._watch.look(self._rates, self._steps, lambda: self.state, self._run.fastest)
 
     def _set(self, u):
         given = u if type(u) is np.ndarray and u.dtype is FLOAT else real_numbers(u)

@@ -39,10 +39,13 @@ class StepEnds:
         """
         refuse_beyond_memory(STEP_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
         self.grid = np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
-        self.times = self.grid[:, 0]
+        self.times, self._numbers = self.grid[:, 0], self.grid.data.cast("B").cast("d")
 
     def write(self, begin: float, first: int, n: int):
         """Write the ends of n steps of a motion that began at a time [s], from step ``first`` on."""
         h, last = self.step, first + n
-        few = n <= FEW_STEPS
-        self.times[:n] = [begin + h * k for k in range(first, last)] if few else begin + h * np.arange(first, last)
+        if n > FEW_STEPS:
+            self.times[:n] = begin + h * np.arange(first, last)
+        else:
+            for k in range(n):
+                self._numbers[2 * k] = begin + h * (first + k)

@@ -66,9 +66,13 @@ class StepWatch:
         begins = self.has_pairs and self._passing.due == FIRST
         self.seen = 0.0 if begins else self._ahead.seen_from(t)
 
-    def look(self, rates: np.ndarray, steps: int, state: Callable[[], State]):
-        """Look at the shapes of a state () → State after some steps, where its rates (n_v,) or the steps make that due."""
-        self._passing.examine(rates.dot(rates), steps, lambda: [("", state())])
+    def look(self, rates: np.ndarray, steps: int, state: Callable[[], State], fastest: float):
+        """Look at the shapes of a state () → State after some steps, where its rates (n_v,) or the steps make that due.
+
+        It is left out where ``fastest``, the largest speed of a point of a shape [m/s], says that none moves far in a step.
+        """
+        if not self._passing.is_slow(fastest):
+            self._passing.examine(rates.dot(rates), steps, lambda: [("", state())])
 
     def look_ahead(self, state: State, begun: float, steps: int):
         """Look for switching of laws of time up to the end of so many steps from a time [s], and beyond it."""

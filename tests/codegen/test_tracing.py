@@ -176,6 +176,14 @@ def test_huge_angles_and_non_numbers():
     assert np.allclose(kernel(x[None]), expected, rtol=1e-15, atol=0, equal_nan=True)
 
 
+def test_angles_side_by_side_are_those_of_single_states():
+    """Vectors of three angles, of which one call takes two; some lanes are huge, or no numbers."""
+    kernel = trace(lambda x: np.concatenate([np.sin(x), np.cos(x)]), 3)
+    x = np.random.default_rng(5).uniform(-9.0, 9.0, (3, 24))
+    x[[0, 1, 1, 2, 0], [1, 2, 9, 9, 23]] = 1e22, -3e7, np.nan, 2e5, np.inf
+    assert np.array_equal(kernel(x), np.transpose([kernel(column) for column in x.T]), equal_nan=True)
+
+
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("angle", [0.7, -2.5, np.pi / 2, np.pi, 0.0])
 def test_a_congruence_about_a_coordinate_axis_costs_less(axis, angle):

@@ -76,6 +76,14 @@ def test_impulses(law, make, method):
     assert motion.speed("a")[-1] == pytest.approx(impulse / INERTIA, rel=EXACT)
 
 
+@pytest.mark.slow
+def test_the_foot_of_a_pulse_is_no_scale_of_a_network():
+    """At rest the torque is 1e-308 N m: energies are not controlled against those of such a torque."""
+    pulses = [OF_TIME["smooth"][0], lambda t, a, w: math.where(t > 5.0, smooth_step(t), 0.0)]
+    steps = [simulate(shaft(law), DURATION, method="radau", **TIGHT).stats.steps for law in pulses]
+    assert steps[0] <= 1.5 * steps[1]
+
+
 # law, speed at the start [rad/s], work that it does on the way [J]
 OF_STATE = {
     "narrow angle": (lambda t, a, w: 10.0 if 50.0 < a < 50.01 else 0.0, 3.0, 0.1),

@@ -10,6 +10,7 @@ import gauss
 from gauss import Plan
 from gauss.bench.fuzz.scenes import moved_scene
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
+from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.errors import ContactLawWarning, PainleveWarning, StateError
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
 from tests.support import mechanisms
@@ -247,3 +248,38 @@ def test_a_loop_in_which_nothing_moves_rests():
     motion = gauss.simulate(given.scene, 0.02, integrator="time_stepping", step=given.step)
     assert not motion.q.any()
     assert not motion.v.any()
+
+
+def lying_chain(n: int):
+    """Boxes on hinges that lie on a floor and turn there."""
+    scene = gauss.Scene("lying chain")
+    scene.half_space("floor")
+    for k in range(n):
+        scene.body(f"link {k}", mass=0.1, inertia=(1e-4,) * 3, position=(0.2 * k, 0.0, 0.03))
+        scene.box(f"box {k}", f"link {k}", (0.12, 0.06, 0.06))
+        if k:
+            scene.revolute(f"hinge {k}", f"link {k - 1}", f"link {k}", axis=(0, 0, 1), at=(0.2 * k - 0.1, 0.0, 0.03))
+    scene.free("floats", "ground", "link 0", at=(0.0, 0.0, 0.03))
+    scene.start("floats", rate=(0.0, 0.3, 0.0, 0.0, 0.0, 1.0))
+    scene.contacts_all(friction=0.4)
+    return gauss.compile_scene(scene)
+
+
+@pytest.mark.slow
+def test_machine_code_holds_as_many_contacts_as_there_are():
+    system = lying_chain(18)
+    stepper, state = new_contact_stepper(system), system.initial_state()
+    rows, work = np.empty((2, 4 + system.n_q + system.n_v)), np.zeros(3)
+    assert stepper.run(state, work, state.t + STEP * np.arange(1, 3), rows).steps == 0  # there is no room
+    stepper.python_step(state, STEP)
+    assert stepper.known.key.size == 4 * 18 > FIRST_ROOM
+    assert stepper.run(state, work, state.t + STEP * np.arange(1, 3), rows).steps == 2
+    slow = new_contact_stepper(system)
+    slow.memory, at = None, state  # all steps by Python
+    slow.forget()
+    for _ in range(8):
+        step = slow.python_step(at, STEP)
+        at = replace(at, t=at.t + STEP, q=step.q, v=step.v)
+    motion = gauss.simulate(system, 8 * STEP, integrator="time_stepping", step=STEP, plan=KERNELS)
+    np.testing.assert_allclose(motion.v[-1], at.v, atol=SAME_STEPS)
+    assert len(gauss.contact_points(motion, -1)) == 4 * 18

@@ -4,7 +4,9 @@ from llvmlite import ir
 
 from gauss.codegen import INTEGER
 from gauss.codegen.kernels.arrays import Array, Value
+from gauss.codegen.kernels.contact_rows import ContactRows
 from gauss.codegen.kernels.free_motion import FreeMotion
+from gauss.codegen.kernels.interleaved_sums import each_sum
 from gauss.codegen.kernels.step_memory import StepMemory
 
 ROUNDS = 20  # of activating gaps
@@ -19,22 +21,24 @@ class ActiveContacts:
         Arrays of the step.
     free : FreeMotion
         Emitter of accelerations.
+    rows : ContactRows
+        Emitter of the rows.
     functions : StepFunctions
         Traced functions of a step.
     """
 
-    def __init__(self, memory: StepMemory, free: FreeMotion, functions, solver: ir.Function):
+    def __init__(self, memory: StepMemory, free: FreeMotion, rows: ContactRows, functions, solver: ir.Function):
         self.at, self.r = memory, memory.r
-        self.free, self.functions, self.solver = free, functions, solver
+        self.free, self.rows, self.functions, self.solver = free, rows, functions, solver
 
     def solve(self, m: Value) -> Value:
         """Forces of the active rows; returned is whether they obey their laws, and no other gap closes."""
-        r, n, s, n_v, g = self.r, self.at.n, self.at.settings, self.at.n["n_v"], self.at.n["g"]
+        r, n, s, g = self.r, self.at.n, self.at.settings, self.at.n["g"]
         rows = m * 3 + g + n["s"]
         scale = r.variable(0.0)
+        push = self.rows.products(rows, self.at["a"])
         with r.each(rows) as i:
-            push = self.at.dot(self.at["K"].after(i * n_v), self.at["a"], n_v)
-            self.at["after"][i] = self.at["rate"][i] + s["h"] * (push + self.at.remaining * self.at["bias"][i])
+            self.at["after"][i] = self.at["rate"][i] + s["h"] * (push[i] + self.at.remaining * self.at["bias"][i])
             scale[0] = r.maximum(r.absolute(self.at["rate"][i]), scale[0])
         removal = r.maximum(s["h"], s["removal"])
         with r.each(m + g) as i:
@@ -49,9 +53,9 @@ class ActiveContacts:
             leave_if((again[0] < 1) | (tries[0] > ROUNDS) | (solved[0] < 0.0))
             self._solve_active(m, solved)
             again[0], tries[0] = 0, tries[0] + 1
+            push = self.rows.products(m + g, self.at["added"])
             with r.each(m + g) as i:
-                push = self.at.dot(self.at["K"].after(i * n_v), self.at["added"], n_v)
-                closes = self.at["after"][i] + s["h"] * push < s["missed"] * (scale[0] + 1.0) * -1.0
+                closes = self.at["after"][i] + s["h"] * push[i] < s["missed"] * (scale[0] + 1.0) * -1.0
                 with r.when(closes & (self.at["active"][i] < 1.0)):
                     self.at["active"][i], again[0] = 1.0, 1
         return (solved[0] >= 0.0) & (again[0] < 1)
@@ -59,6 +63,7 @@ class ActiveContacts:
     def _solve_active(self, m: Value, solved: Array):
         """Problem of the active rows, its forces, and the accelerations that they add."""
         r, n, k, n_v, g = self.r, self.at.n, self.at.n["r"], self.at.n["n_v"], self.at.n["g"]
+        z_begin, z_end = self.at.table("z_begin"), self.at.table("z_end")
         under, which = self.at.table("under"), self.at.table("under").after(n["capacity"] * 2)
         normals, rough, count = (r.variable(0, INTEGER) for _ in range(3))
         order = which.after(n["capacity"] * 3 + g + n["s"])
@@ -79,13 +84,18 @@ class ActiveContacts:
             self.at["b"][i], self.at["f"][i] = self.at["after"][row], self.at["force"][row]
             with r.each(k) as j:
                 Y[j] = 0.0
-            with r.each(n_v) as p:
+            begin, end = self.rows.bounds.around([row])
+            with r.each(end, begin) as p:
                 entry = self.at["K"][row * n_v + p]
-                with r.when(r.absolute(entry) > 0.0), r.each(k) as j:
+                with r.when(r.absolute(entry) > 0.0), r.each(z_end[p], z_begin[p]) as j:
                     Y[j] = Y[j] + entry * self.at["Z"][p * k + j]
-            with r.each(i + 1) as j:
-                value = self.at.dot(Y, self.at["Y"].after(j * k), k) * self.at.settings["h"]
+
+            def respond(j: Value, product: Value):
+                value = product * self.at.settings["h"]
                 self.at["W"][i * total + j], self.at["W"][j * total + i] = value, value
+
+            every = Value(r.b, INTEGER(0)), k
+            each_sum(r, i + 1, lambda lanes: every, lambda sum_, j, p: sum_ + Y[p] * self.at["Y"][j * k + p], respond)
         self.at["residual"][0] = 0.0
         with r.when(total > 0):
             sizes = normals[0], rough[0], n["s"]

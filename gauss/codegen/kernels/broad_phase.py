@@ -6,7 +6,6 @@ for collision detection of deformable objects, 2003). Cost grows with the number
 """
 
 from collections.abc import Callable
-from itertools import product
 
 import numpy as np
 
@@ -17,7 +16,6 @@ CELLS = 2.0 + 1e-6  # edge of a cell over the largest half edge of boxes in it; 
 OUTLIER = 4.0  # times the mean size: larger boxes are compared with all others
 FARTHEST = 2.0**31  # cells from the origin: farther ones count as the last
 HASH = 73856093, 19349663, 83492791  # primes, of Teschner et al.
-NEIGHBOURING_CELLS = list(product((-1, 0, 1), repeat=3))
 TABLE, NONE = 1, -1  # first entry of the hash table in its array, end of a list
 
 
@@ -46,6 +44,11 @@ class GridWriter:
         Part → whether it has no box.
     is_near : callable
         (first, second) → whether the boxes of two parts of a pair are near each other.
+
+    Attributes
+    ----------
+    near, count : Array
+        Parts that are near the one that was looked at last, and their number.
     """
 
     def __init__(
@@ -64,8 +67,8 @@ class GridWriter:
         self.next, self.cell, self.large, self.near = (lists.after(parts * k) for k in (0, 1, 4, 5))
         self.larger, self.count = r.variable(0, INTEGER), r.variable(0, INTEGER)
 
-    def write(self, examine: Callable[[Value, Value], None]):
-        """Emit ``examine(first, second)`` for all near pairs, in their order."""
+    def fill(self):
+        """Emit the cells of all parts."""
         r = self.r
         half = self._half_edge()
         edge = half * CELLS
@@ -74,17 +77,22 @@ class GridWriter:
         self.larger[0] = 0
         with r.each(self.parts) as k:
             self._insert(k, half, edge)
-        with r.each(self.parts) as first:
-            self.count[0] = 0
-            is_small = self.next[first] >= NONE
+
+    def collect(self, first: Value):
+        """Emit the list ``near`` of the later parts that are near one, in their order, and its length ``count``."""
+        r = self.r
+        self.count[0] = 0
+        is_small = self.next[first] >= NONE
+        with r.when(is_small):
+            self._look_around(first)
+        length = r.variable(self.larger[0], INTEGER)
+        with r.when(~is_small):
+            length[0] = self.parts - first - 1
+        with r.each(length[0]) as x:
+            second = r.variable(first + 1 + x, INTEGER)
             with r.when(is_small):
-                self._look_around(first)
-                with r.each(self.larger[0]) as x:
-                    self._compare(first, self.large[x])
-            with r.when(~is_small), r.each(self.parts, first + 1) as second:
-                self._compare(first, second)
-            with r.each(self.count[0]) as x:
-                examine(first, self.near[x])
+                second[0] = self.large[x]
+            self._compare(first, second[0])
 
     def _size(self, k: Value) -> Value:
         """Largest half edge of the box of a part."""
@@ -127,8 +135,9 @@ class GridWriter:
     def _look_around(self, first: Value):
         """Compare a part with those of the cells around it."""
         r, own, place = self.r, [self.cell[first * 3 + i] for i in range(3)], self.r.variable(NONE, INTEGER)
-        for shift in NEIGHBOURING_CELLS:
-            cell = [number + step for number, step in zip(own, shift, strict=True)]
+        three = Value(r.b, INTEGER(3))
+        with r.each(three) as i, r.each(three) as j, r.each(three) as k:
+            cell = [number + step - 1 for number, step in zip(own, (i, j, k), strict=True)]
             place[0] = self.table[self._hash(cell)]
             with r.loop() as leave_if:
                 second = place[0]

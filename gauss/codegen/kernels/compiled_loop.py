@@ -141,5 +141,10 @@ def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
 
 
 def address(array: np.ndarray) -> int:
-    """Address of a contiguous array; through its buffer, four times as fast as ``array.ctypes``."""
-    return ctypes.addressof(BYTE.from_buffer(array.data)) if array.size and array.flags.writeable else array.ctypes.data
+    """Address of a contiguous array; through its buffer, a tenth of the time of ``array.ctypes``."""
+    try:
+        return ctypes.addressof(BYTE.from_buffer(array))  # type: ignore[arg-type]  # buffers have no type before Python 3.12
+    except (TypeError, ValueError):
+        if array.size and array.flags.writeable:  # it is not contiguous
+            raise
+        return array.ctypes.data

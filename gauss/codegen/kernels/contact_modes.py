@@ -4,6 +4,8 @@ An element is a contact of the scene with all its points, another gap, or a set-
 no force, 1 while it sticks, or bears a force without friction, and 2 while one of its points slides.
 """
 
+from collections.abc import Callable
+
 from gauss.codegen import INTEGER, Function
 from gauss.codegen.kernels.arrays import Value
 from gauss.codegen.kernels.step_memory import CHANGE, StepMemory
@@ -51,17 +53,24 @@ class ContactModes:
 
     def _rate(self, row: Value) -> Value:
         """Rate of a row after the step, as the laws take it."""
-        K, n_v, s = self.at["K"].after(row * self.at.n["n_v"]), self.at.n["n_v"], self.at.settings
-        after = self.at["rate"][row] + self.r.sum(n_v, lambda i: K[i] * (self.at["end_v"][i] - self.at["v"][i]))
-        return after + s["h"] * (self.r.number(1.0) - s["share"]) * self.at["bias"][row]
+        at, s = self.at, self.at.settings
+        after = at["rate"][row] + self._product(row, lambda i: at["end_v"][i] - at["v"][i])
+        return after + s["h"] * (self.r.number(1.0) - s["share"]) * at["bias"][row]
 
     def _hits(self, row: Value) -> Value:
         """Whether a gap has an impact in the step."""
-        s, n_v = self.at.settings, self.at.n["n_v"]
-        push = self.at.dot(self.at["K"].after(row * n_v), self.at["a"], n_v) + self.at["bias"][row]
+        s = self.at.settings
+        push = self._product(row, lambda i: self.at["a"][i]) + self.at["bias"][row]
         speed = self.r.absolute(push) * 2.0 * s["h"] + s["rest"]
         (hit,) = self.r.inline(self.impact, self.at["gap"][row], self.at["rate"][row], speed, s["h"], s["share"])
         return hit
+
+    def _product(self, row: Value, factor: Callable[[Value], Value]) -> Value:
+        """Product of a row with numbers, one for each rate."""
+        K, total = self.at["K"].after(row * self.at.n["n_v"]), self.r.variable(0.0)
+        with self.r.each(self.at.table("k_end")[row], self.at.table("k_begin")[row]) as i:
+            total[0] = total[0] + K[i] * factor(i)
+        return total[0]
 
     def _mark(self, element: Value, mode: Value, hit: Value, work: Value):
         r, count = self.r, self.counts[1]

@@ -7,6 +7,7 @@ Each row is in its unit, so that the laws compare forces and rates of all rows.
 
 from gauss.codegen import POINTER
 from gauss.codegen.kernels.arrays import Array, Value
+from gauss.codegen.kernels.interleaved_sums import RowBounds, higher, lower, row_products
 from gauss.codegen.kernels.near_pairs import BODY, ROW, parts_of
 from gauss.codegen.kernels.step_memory import StepMemory
 
@@ -49,12 +50,21 @@ class ContactRows:
 
     def _row_of_contact(self, at: Value, J: Array, bias: Value, bodies, unit: Value):
         r, n_v = self.r, self.at.n["n_v"]
+        begins, ends = ([self.at.table(name)[body] for body in bodies] for name in ("body_begin", "body_end"))
+        K = self.at["K"].after(at * n_v)
         with r.each(n_v) as j:
-            total = r.number(0.0)
-            for side, body in enumerate(bodies):
+            K[j] = 0.0
+        for side, body in enumerate(bodies):
+            own = self.at["flat:J"].after(body * 6 * n_v)
+            with r.each(ends[side], begins[side]) as j:
+                total = K[j]
                 for i in range(6):
-                    total = total + J[24 * side + i] * self.at["flat:J"][(body * 6 + i) * n_v + j]
-            self.at["K"][at * n_v + j] = total * unit
+                    total = total + J[24 * side + i] * own[n_v * i + j]
+                K[j] = total
+        begin, end = lower(*begins), higher(*ends)
+        with r.each(end, begin) as j:
+            K[j] = K[j] * unit
+        self._bound(at, begin, end)
         rate = r.number(0.0)
         for side, body in enumerate(bodies):
             for i in range(6):
@@ -65,8 +75,23 @@ class ContactRows:
         n_v = self.at.n["n_v"]
         with self.r.each(n_v) as i:
             self.at["K"][at * n_v + i] = self.at["flat:K"][j * n_v + i] * unit
+        self._bound(at, self.at.table("row_begin")[j], self.at.table("row_end")[j])
         self.at["rate"][at], self.at["bias"][at] = self.at["flat:rate"][j] * unit, self.at["flat:bias"][j] * unit
         self.at["unit"][at], self.at["force"][at] = unit, self.at["known_others"][j] / unit
+
+    def _bound(self, at: Value, begin: Value, end: Value):
+        """Keep the bounds of what differs from zero in a row."""
+        self.at.table("k_begin")[at], self.at.table("k_end")[at] = begin, end
+
+    @property
+    def bounds(self) -> RowBounds:
+        """Bounds of what differs from zero in the rows."""
+        return RowBounds(self.at.table("k_begin"), self.at.table("k_end"))
+
+    def products(self, count: Value, rates: Array) -> Array:
+        """Products of the first rows with rates or accelerations (n_v,)."""
+        row_products(self.r, self.at["K"], self.at.n["n_v"], count, rates, self.bounds, self.at["product"])
+        return self.at["product"]
 
     def _known_force(self, m: Value, c: Value):
         """Initial forces of a contact, those of the last step."""

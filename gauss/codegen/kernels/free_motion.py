@@ -5,13 +5,17 @@
 with the Cholesky factor C of Nᵀ M N; N are the rates of independent coordinates, given by its entries alone.
 """
 
-from gauss.codegen import INTEGER
-from gauss.codegen.kernels.arrays import Array, Value
+from llvmlite import ir
+
+from gauss.codegen import INTEGER, POINTER
+from gauss.codegen.kernels.arrays import INTEGERS, Array, Value, subroutine
+from gauss.codegen.kernels.interleaved_sums import RowBounds, each_sum, higher, row_products
 from gauss.codegen.kernels.step_memory import StepMemory
 
 # Sum of h d over the inertias that single forces meet, above which damping of joints is implicit. It bounds the largest rate
 # of decay times the step: explicit steps diverge beyond 2, and overshoot beyond 1.
 STIFF_DAMPING = 1.0
+SPEED = "speed"  # function of a module
 
 
 def implicit_inertia(inertia, damped, maximum):
@@ -122,53 +126,86 @@ class FreeMotion:
         r, n = self.r, self.at.n
         value, C, E, Z, M = (self.at[name] for name in ("value", "C", "E", "Z", "flat:M"))
         k, n_v, links, row, column = n["r"], n["n_v"], n["links"], self.at.table("row"), self.at.table("column")
+        first, least = self.at.table("first"), self.at.table("lowest")
+        gathered, weight = self.at.table("gathered"), self.at["weight"]
         with r.each(k * k) as i:
-            C[i], E[i] = 0.0, 0.0
-        with r.each(links) as i, r.each(links) as j:
-            at = column[i] * k + column[j]
-            C[at] = C[at] + value[i] * value[j] * M[row[i] * n_v + row[j]]
+            C[i] = 0.0
+        with r.each(n["gathers"]) as i:
+            at = gathered[i * 2]
+            C[at] = C[at] + weight[i] * M[gathered[i * 2 + 1]]
         with r.each(k) as j:
-            with r.each(j) as p:
-                C[j * k + j] = C[j * k + j] - C[j * k + p] * C[j * k + p]
-            C[j * k + j] = r.square_root(C[j * k + j])
-            with r.each(k, j + 1) as i:
-                C[i * k + j] = (C[i * k + j] - self.at.dot(C.after(i * k), C.after(j * k), j)) / C[j * k + j]
-        with r.each(k) as i, r.each(k, i) as j:
-            total = r.variable(0.0)
-            with r.when(j <= i):
-                total[0] = 1.0
-            with r.each(j, i) as p:
-                total[0] = total[0] - E[i * k + p] * C[j * k + p]
-            E[i * k + j] = total[0] / C[j * k + j]
-        with r.each(n_v * k) as i:
-            Z[i] = 0.0
-        with r.each(links) as i, r.each(k) as j:
+            begin, own, row_of = first[j], j * k + j, C.after(j * k)
+            with r.each(j, begin) as p:
+                C[own] = C[own] - row_of[p] * row_of[p]
+            C[own] = r.square_root(C[own])
+            each_sum(
+                r,
+                k,
+                lambda lanes: (begin, j),
+                lambda total, i, p: total + C[i * k + p] * row_of[p],
+                lambda i, total: C.__setitem__(i * k + j, (C[i * k + j] - total) / C[own]),
+                first=j + 1,
+            )
+        with r.each(k) as j:
+            begin, own, row_of = first[j], j * k + j, C.after(j * k)
+            each_sum(
+                r,
+                j + 1,
+                lambda lanes: (higher(begin, lanes[0]), j),
+                lambda total, i, p: total - E[i * k + p] * row_of[p],
+                lambda i, total: E.__setitem__(i * k + j, total / C[own]),
+                first=least[j],
+                initial=lambda i: r.choose(i >= j, 1.0, 0.0),
+            )
+        z_begin, z_end = self.at.table("z_begin"), self.at.table("z_end")
+        with r.each(n_v) as i, r.each(z_end[i], z_begin[i]) as j:
+            Z[i * k + j] = 0.0
+        with r.each(links) as i, r.each(z_end[row[i]], column[i]) as j:
             at = row[i] * k + j
             Z[at] = Z[at] + value[i] * E[column[i] * k + j]
 
     def _accelerate(self, tau: Array):
         """Accelerations a = Z Zᵀ τ."""
-        r, k, n_v = self.r, self.at.n["r"], self.at.n["n_v"]
+        r, k, z, begin, end = self.r, self.at.n["r"], self.at["z"], self.at.table("z_begin"), self.at.table("z_end")
         with r.each(k) as j:
-            self.at["z"][j] = r.sum(n_v, lambda i: self.at["Z"][i * k + j] * tau[i])
+            z[j] = 0.0
+        with r.each(self.at.n["n_v"]) as i:
+            row, push = self.at["Z"].after(i * k), tau[i]
+            with r.each(end[i], begin[i]) as j:
+                z[j] = z[j] + row[j] * push
         self.spread(self.at["a"])
 
     def spread(self, target: Array):
         """Accelerations Z z."""
-        r, k = self.r, self.at.n["r"]
-        with r.each(self.at.n["n_v"]) as i:
-            target[i] = self.at.dot(self.at["Z"].after(i * k), self.at["z"], k)
+        at = self.at
+        bounds = RowBounds(at.table("z_begin"), at.table("z_end"))
+        row_products(self.r, at["Z"], at.n["r"], at.n["n_v"], at["z"], bounds, target)
 
     def speed(self, v: Array) -> Value:
         """Largest speed of a point of a shape."""
-        r, n_v, largest = self.r, self.at.n["n_v"], self.r.variable(0.0)
-        with r.each(self.at.n["bodies"] - 1) as b:
-            squares = []
-            for half in range(2):
-                total = r.variable(0.0)
-                for i in range(3):
-                    rate = self.at.dot(self.at["flat:J"].after((b * 6 + (3 * half + i)) * n_v), v, n_v)
-                    total[0] = total[0] + rate * rate
-                squares.append(r.square_root(total[0]))
-            largest[0] = r.maximum(squares[1] + squares[0] * self.at["reach"][b], largest[0])
-        return largest[0]
+        r, at, found = self.r, self.at, self.r.buffer(1)
+        bodies = at.n["bodies"] - 1, at.n["n_v"], at["flat:J"], at["reach"], at.table("body_begin"), at.table("body_end")
+        r.call(r.module.globals.get(SPEED) or _write_speed(r.module), *bodies, v, found)
+        return found[0]
+
+
+def _write_speed(module: ir.Module) -> ir.Function:
+    """Emit the largest speed of a point of a shape, by Jacobians of bodies and the reach of their shapes."""
+    kinds = [INTEGER, INTEGER, POINTER, POINTER, INTEGERS, INTEGERS, POINTER, POINTER]
+    r = subroutine(module, SPEED, kinds)
+    (bodies, n_v), (J, reach, begin, end, v, found) = r.integers, r.arrays
+    largest = r.variable(0.0)
+    with r.each(bodies) as b:
+        rates = [r.variable(0.0) for _ in range(6)]
+        with r.each(end[b], begin[b]) as p:
+            for i, rate in enumerate(rates):
+                rate[0] = rate[0] + J[(b * 6 + i) * n_v + p] * v[p]
+        squares = []
+        for half in range(2):
+            total = r.number(0.0)
+            for rate in rates[3 * half : 3 * half + 3]:
+                total = total + rate[0] * rate[0]
+            squares.append(r.square_root(total))
+        largest[0] = r.maximum(squares[1] + squares[0] * reach[b], largest[0])
+    found[0] = largest[0]
+    return r.done()

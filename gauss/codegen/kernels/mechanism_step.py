@@ -22,7 +22,7 @@ from gauss.codegen.kernels.free_motion import FreeMotion
 from gauss.codegen.kernels.mechanism_loop import CompiledSteps
 from gauss.codegen.kernels.near_pairs import INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS, write_near
 from gauss.codegen.kernels.sliding_contacts import SlidingContacts
-from gauss.codegen.kernels.step_memory import FINISHED, IMPACT, LOOP_SETTINGS, REPEATED, StepMemory
+from gauss.codegen.kernels.step_memory import FINISHED, IMPACT, LOOP_SETTINGS, REPEATED, RESULTS, StepMemory
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class _StepWriter:
         self.at = memory = StepMemory(r, r.arrays)
         self.status = memory.table("status")
         self.free, self.rows, self.sliding = FreeMotion(memory), ContactRows(memory), SlidingContacts(memory)
-        self.contacts = ActiveContacts(memory, self.free, functions, solver)
+        self.contacts = ActiveContacts(memory, self.free, self.rows, functions, solver)
         self.modes = ContactModes(memory, functions.impact)
 
     def write(self) -> ir.Function:
@@ -86,12 +86,14 @@ class _StepWriter:
 
     def _impact(self, m: Value) -> Value:
         """Whether a gap has an impact in the rest of a step of which the bodies moved a share; then it begins anew."""
-        r, s, n_v, found = self.r, self.at.settings, self.at.n["n_v"], self.r.variable(0.0)
-        with r.when(s["share"] > 0.0), r.each(m + self.at.n["g"]) as i:
-            push = self.at.dot(self.at["K"].after(i * n_v), self.at["a"], n_v) + self.at["bias"][i]
-            speed = r.absolute(push) * 2.0 * s["h"] + s["rest"]
-            (hit,) = r.inline(self.functions.impact, self.at["gap"][i], self.at["rate"][i], speed, s["h"], s["share"])
-            found[0] = r.maximum(hit, found[0])
+        r, s, found = self.r, self.at.settings, self.r.variable(0.0)
+
+        with r.when(s["share"] > 0.0):
+            push = self.rows.products(m + self.at.n["g"], self.at["a"])
+            with r.each(m + self.at.n["g"]) as i:
+                speed = r.absolute(push[i] + self.at["bias"][i]) * 2.0 * s["h"] + s["rest"]
+                (hit,) = r.inline(self.functions.impact, self.at["gap"][i], self.at["rate"][i], speed, s["h"], s["share"])
+                found[0] = r.maximum(hit, found[0])
         with r.when(found[0] > 0.0):
             self.status[0] = IMPACT
         return found[0]
@@ -110,8 +112,9 @@ class _StepWriter:
             self.at["end_v"][i] = self.at["v"][i] + s["h"] * acceleration
             self.at["total"][i] = self.at["v"][i] + s["h"] * 0.5 * acceleration
         lossy, other = r.variable(0.0), r.variable(0.0)
+        rate = self.rows.products(rows, self.at["total"])
         with r.each(rows) as i:
-            work = self.at["force"][i] * self.at.dot(self.at["K"].after(i * n_v), self.at["total"], n_v)
+            work = self.at["force"][i] * rate[i]
             self.at["row_work"][i] = work
             with r.when(i < m * 3 + g):
                 lossy[0] = lossy[0] + work
@@ -122,8 +125,9 @@ class _StepWriter:
         self.free.add_damping_over(self.at["total"])
         results[3], results[4] = self.at["residual"][0], 0.0
         self.sliding.examine(m)
-        fits = self.free.speed(self.at["end_v"]) <= s["margin"] * speed
-        with r.when(fits):
+        fastest = self.free.speed(self.at["end_v"])
+        with r.when(fastest <= s["margin"] * speed):
+            results[RESULTS.index("fastest")] = fastest
             self.at.copy(given, self.at["end_q"], n["n_q"])
             with r.each(n_v) as i:
                 given[n["n_q"] + i] = self.at.remaining * s["h"] * self.at["end_v"][i]

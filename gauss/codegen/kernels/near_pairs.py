@@ -57,12 +57,23 @@ class _NearPairsWriter:
         self.count[0], self.count[1], self.count[2] = 0, 0, 0
         with r.each(self.parts) as k:
             self._move(k)
-        with r.each(self.pairs) as p:
-            first, second = self.pair[p * 2], self.pair[p * 2 + 1]
-            with r.when(self._is_near(first, second)):
-                self._examine(first, second)
-        with r.when(self.pairs < 1):
-            self._grid().write(self._examine)
+        grid, listed = self._grid(), self.pairs > 0
+        begins = r.variable(self.pairs, INTEGER)  # numbers of pairs, or of their first parts
+        with r.when(~listed):
+            grid.fill()
+            begins[0] = self.parts
+        with r.each(begins[0]) as k:
+            first, second = r.variable(k, INTEGER), r.variable(0, INTEGER)
+            with r.when(listed):
+                first[0], second[0], grid.count[0] = self.pair[k * 2], self.pair[k * 2 + 1], 0
+                with r.when(self._is_near(first[0], second[0])):
+                    grid.count[0] = 1
+            with r.when(~listed):
+                grid.collect(k)
+            with r.each(grid.count[0]) as x:
+                with r.when(~listed):
+                    second[0] = grid.near[x]
+                self._examine(first[0], second[0])
         return r.done()
 
     def _grid(self) -> GridWriter:

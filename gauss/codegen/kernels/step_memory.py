@@ -16,13 +16,17 @@ from gauss.codegen.kernels.near_pairs import INTEGERS, NEAR_INTEGERS, NEAR_NUMBE
 
 SIZES = (
     *("n_q", "n_v", "r", "links", "bodies", "g", "s", "entries", "flat", "parts", "pairs", "capacity", "loops", "input"),
-    *("laws", "sleepers"),
+    *("laws", "sleepers", "gathers"),
+)
+PATTERNS = (  # which terms may differ from zero: of gauss.dynamics.contact.step_patterns
+    *("gathered", "first", "lowest", "z_begin", "z_end", "body_begin", "body_end", "row_begin", "row_end"),
 )
 ADDRESSES = (
     *("begin", "forces", "move", "entries"),
     *NEAR_INTEGERS,
     *NEAR_NUMBERS,
     *("known_found", "known_count", "under", "status", "row", "column", "asleep"),
+    *(*PATTERNS, "k_begin", "k_end"),
     *("modes", "next_modes", "closed", "fresh", "counts"),
 )
 TERMS = ("M", "tau", "power", "bodies", "J", "gap", "rate", "K", "bias")  # of the mechanism, in this order
@@ -31,7 +35,7 @@ STEP_SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "missed", "jammed"
 LOOP_SETTINGS = ("pace", "resting", "sliding", "shares", "recorded", "largest")
 CHANGE = 5  # step, element, its mode, whether it had an impact, energy lost
 CHANGES_ROOM = 256  # changes of the contact mode that are kept, beside those of one step
-RESULTS = ("power0", "power1", "power2", "error", "doubtful")
+RESULTS = ("power0", "power1", "power2", "error", "doubtful", "fastest")
 MOST_SLIDING = 6  # sliding contacts that are examined for Painlevé's paradox
 
 
@@ -52,6 +56,7 @@ def slots(n: dict[str, int]) -> dict[str, int]:
         "flat": n["flat"],
         "reach": n["bodies"],
         "value": n["links"],
+        "weight": n["gathers"],
         "C": r * r,
         "E": r * r,
         "Z": v * r,
@@ -75,6 +80,7 @@ def slots(n: dict[str, int]) -> dict[str, int]:
         "known_others": others,
         "K": rows * v,
         "Y": rows * r,
+        "product": rows,
         "rate": rows,
         "bias": rows,
         "gap": m + n["g"],

@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.codegen import from_disk
 from gauss.codegen.kernels import CallingSteps, CompiledMechanismStep, StepFunctions
-from gauss.codegen.kernels.step_memory import MECHANISM, STEP_SETTINGS, TERMS
+from gauss.codegen.kernels.step_memory import MECHANISM, PATTERNS, RESULTS, STEP_SETTINGS, TERMS
 from gauss.dynamics.contact.compiled_step_memory import CompiledStepMemory, LoopOfSteps
 from gauss.dynamics.contact.contact_step import contact_solver
 from gauss.dynamics.contact.free_bodies import place_function
@@ -17,8 +17,11 @@ from gauss.dynamics.contact.mechanism_kernels import MechanismTerms
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.dynamics.contact.paradox import SLIDING as SLIDING_SPEED
 from gauss.dynamics.contact.shape_table import MOST_FEATURES
+from gauss.dynamics.contact.step_patterns import step_patterns
 from gauss.dynamics.gap_functions import RESTING
 from gauss.system import State
+
+SPEED_PLACE = RESULTS.index("fastest")
 
 
 class KnownForces(NamedTuple):
@@ -37,12 +40,15 @@ class MechanismMemory(CompiledStepMemory):
     ----------
     stepper : MechanismStepper
         The stepper, of a tree, with couplings or without.
+    room : int
+        Contacts that there is room for.
     """
 
-    def __init__(self, stepper):
+    def __init__(self, stepper, room: int = FIRST_ROOM):
         self.stepper, self.detection, self.record = stepper, stepper.detection, stepper.record
         smooth, kernels = stepper.smooth, stepper.kernels
         table, N = stepper.table, stepper.compliance.free_columns
+        self.patterns = step_patterns(kernels.layout, N)
         sizes = {
             "n_q": smooth.n_q,
             "n_v": smooth.n_v,
@@ -55,11 +61,12 @@ class MechanismMemory(CompiledStepMemory):
             "flat": kernels.layout.flat.size,
             "parts": len(table.parts),
             "pairs": len(self.detection.pair),
-            "capacity": FIRST_ROOM,
+            "capacity": room,
             "loops": int(smooth.closes),
             "laws": len(table.contacts),
             "input": stepper.inputs.size,
             "sleepers": stepper.asleep.sum(),
+            "gathers": self.patterns.weight.size,
         }
         parts = dict(zip(MechanismTerms._fields, kernels.layout.parts, strict=True))
         terms = {f"flat:{name}": ("flat", parts[name][0].start) for name in TERMS}
@@ -70,13 +77,13 @@ class MechanismMemory(CompiledStepMemory):
     def _fill(self, N: np.ndarray):
         stepper, at, table, rows = self.stepper, self.at, self.stepper.table, self.stepper.rows
         row, column = np.nonzero(N)
-        at["value"][:] = N[row, column]
+        at["value"][:], at["weight"][:] = N[row, column], self.patterns.weight
         at["fixed"][:] = stepper.kernels.layout.flat
         at["reach"][:], at["damping"][:] = stepper.reach, stepper.damping.d
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
         at["other_restitution"][:], at["other_unit"][:] = rows.other_restitution, rows.other_unit
         at["set_unit"][:], at["limit"][:], at["lossy"][:] = rows.set_unit, rows.limit, rows.lossy
-        room, n = FIRST_ROOM, self.sizes
+        room, n = self.sizes["capacity"], self.sizes
         self.integers = {
             "entries": stepper.kernels.layout.entries.astype(np.int64),
             "known_found": np.zeros((room, 2), dtype=np.int64),
@@ -86,10 +93,23 @@ class MechanismMemory(CompiledStepMemory):
             "row": row.astype(np.int64),
             "column": column.astype(np.int64),
             "asleep": stepper.asleep.astype(np.int64),
+            "k_begin": np.zeros(3 * room + n["g"] + n["s"], dtype=np.int64),
+            "k_end": np.zeros(3 * room + n["g"] + n["s"], dtype=np.int64),
         }
+        found = self.patterns._asdict()
+        self.integers |= {name: np.ascontiguousarray(found[name], dtype=np.int64) for name in PATTERNS}
         time = stepper.system.scale.time
         rates = time * RESTING, time * SLIDING_SPEED
         self.set_first(stepper.system, *rates, stepper.shares[0], STEP_SETTINGS, stepper.constants)
+
+    def fitting(self) -> "MechanismMemory":
+        """Return the memory, or a larger one if contacts lack room."""
+        room = len(self.detection.rows)
+        if room <= self.sizes["capacity"]:
+            return self
+        larger = MechanismMemory(self.stepper, room)
+        larger.known = self.known
+        return larger
 
     def kernels(self) -> dict[str, int]:
         """Addresses of kernels of the scene."""
@@ -137,6 +157,11 @@ class MechanismMemory(CompiledStepMemory):
         return self._calling(state, work, ends[:sound], rows) if sound else LoopOfSteps(0, 0.0, [], False)
 
     @property
+    def fastest(self) -> float:
+        """Largest speed of a point of a shape at the end of the last step [m/s]; infinite if another one was the last."""
+        return float(self.at["results"][SPEED_PLACE])
+
+    @property
     def known(self) -> KnownForces:
         """Forces of the last step."""
         m = int(self.integers["known_count"][0])
@@ -148,8 +173,9 @@ class MechanismMemory(CompiledStepMemory):
 
     @known.setter
     def known(self, found: KnownForces):
+        self.at["results"][SPEED_PLACE] = np.inf
         key, force, others, self.at["before"][0] = found
-        m = min(key.size, FIRST_ROOM)
+        m = key.size
         self.integers["known_found"][:m] = np.column_stack(np.divmod(key[:m], MOST_FEATURES))
         self.integers["known_count"][0] = m
         self.at["known"][: 3 * m], self.at["known_others"][:] = force[:m].ravel(), others

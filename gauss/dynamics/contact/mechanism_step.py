@@ -160,6 +160,8 @@ class MechanismStepper:
         if self.memory is None:
             self._known = found
         else:
+            self.detection.expect(found.key.size)  # a new stepper that continues a motion has met no contacts yet
+            self.memory = self.memory.fitting()
             self.memory.known = found
 
     def rest(self, v: np.ndarray) -> float:
@@ -184,6 +186,7 @@ class MechanismStepper:
         """
         if self.memory is None:
             return LoopOfSteps(0, 0.0, [], False)
+        self.memory = self.memory.fitting()
         return self.memory.advance(state, work, ends, rows)
 
     def examined(self, state: State, h: float) -> list[Paradox]:

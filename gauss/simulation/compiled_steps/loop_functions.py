@@ -148,7 +148,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         begin = begun(equations, x)
         reached, cost = method.step(equations, begin, h[0])
         seen = program.watch.passes(begin, reached), program.watch.oscillates(begin, reached), missed(begin, reached)
-        unseen = reduce(math.maximum, seen)
+        unseen = reduce(lambda one, other: math.where(other > one, other, one), seen, 0.0)  # NaN is no jump: its step fails
         reached = replace(reached, rates=begin.rates) if program.inputs else reached  # the next step computes its own
         if method.state_size:  # it satisfies the constraints itself, and a projection would spoil its compensated sums
             residual = equations.largest_violation(reached.state)

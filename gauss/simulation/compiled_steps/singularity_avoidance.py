@@ -54,7 +54,7 @@ class StageNodes:
         inner = [(c[i - 1] * d[i + 1] + c[i + 1] * d[i - 1]) / (d[i - 1] + d[i + 1]) for i in range(1, len(c) - 1)]
         found, least = 0.0, d[0]
         for place, own in zip([*inner, last], d[1:], strict=True):
-            found, least = math.where(own < least, place, found), math.minimum(own, least)
+            found, least = math.where(own < least, place, found), math.where(own < least, own, least)
         return found
 
     def ahead(self, sigma: np.ndarray) -> Scalar:

@@ -62,7 +62,8 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         added = H @ (touch.J.T @ force)
         jam, rates = stepper.forbids(state, added), stepper.over(state, touch, free, v, h, force, added, damped)
         found, _ = time_step(KnownRates(system, rates, share), point, h)
-        kept, losses = [*(force * stepper.unit), share, math.maximum(method_state[n + 1], error)], np.zeros(0)
+        worst = math.where(error > method_state[n + 1], error, method_state[n + 1])
+        kept, losses = [*(force * stepper.unit), share, worst], np.zeros(0)
         if noted:
             modes = stepper.modes.after(touch, free.acceleration, added, force, v, h, rest, share)
             kept, losses = [*kept, *modes[:noted]], modes[noted:]
@@ -76,7 +77,8 @@ def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
         reached = Point(found.state, found.work, rates)
-        unseen = math.maximum(program.watch.passes(point, reached), program.watch.oscillates(point, reached))
+        passed, oscillated = program.watch.passes(point, reached), program.watch.oscillates(point, reached)
+        unseen = math.where(oscillated > passed, oscillated, passed)
         return packed, violation, [1.0, 0.0, doubtful + jam + normals + sum(lost), unseen, *losses], hits
 
     def check(x):

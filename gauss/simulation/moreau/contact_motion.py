@@ -56,7 +56,7 @@ class ContactMotion:
 
     def __init__(self, system: System, held: bool = False, stepper: FreeBodyStepper | MechanismStepper | None = None):
         self.system, self.stepper = system, stepper or new_contact_stepper(system, held)
-        self.row = 4 + system.n_q + system.n_v
+        self.n_q, self.row = system.n_q, 4 + system.n_q + system.n_v
         self.paradoxes, self.warned = ParadoxWarnings(), set[bytes]()
 
     def begin(self, start: State):
@@ -122,8 +122,8 @@ class ContactMotion:
             self.warned |= {key} if found else set()
 
     def _state_of(self, row: np.ndarray) -> State:
-        n_q = self.system.n_q
-        return State(float(row[0]), row[1 : 1 + n_q].copy(), row[1 + n_q : -3].copy())
+        own, n_q = row.copy(), self.n_q
+        return State(float(own[0]), own[1 : 1 + n_q], own[1 + n_q : -3])
 
     def _by_python(self, t: float) -> np.ndarray:
         begin, h = self.state, t - self.state.t

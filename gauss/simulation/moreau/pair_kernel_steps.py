@@ -1,5 +1,7 @@
 """Steps of a simulator by kernels of pairs of shapes: its point holds the mean accelerations of the last step."""
 
+from math import inf, isfinite
+
 import numpy as np
 
 from gauss.codegen.kernels import Control, LoopStatus
@@ -60,6 +62,13 @@ class PairKernelSteps:
         """The steps themselves: they are called as machine code is."""
         return self
 
+    @property
+    def fastest(self) -> float:
+        """Largest speed of a point of a shape at the end of the last step [m/s], infinite where it is not known."""
+        stepper = self.motion.stepper
+        memory = stepper.memory if isinstance(stepper, MechanismStepper) else None
+        return inf if memory is None else memory.fastest
+
     def arrays(self, point: np.ndarray, confirmed: np.ndarray, grid: np.ndarray, out: np.ndarray) -> tuple:
         """Arguments of :meth:`call`."""
         return point, grid
@@ -93,11 +102,12 @@ class PairKernelSteps:
         self.control.status = float(LoopStatus.DONE if len(rows) == n else LoopStatus.UNSOLVED)
         row = rows[-2] if len(rows) > 1 else row
         last = rows[-1]
-        if not np.isfinite(last).all():
+        if not isfinite(last.dot(last)) and not np.isfinite(last).all():
             self.control.status = float(LoopStatus.NOT_FINITE)
             return
-        point[reached] = last
-        point[means] = (last[rates] - row[rates]) / (last[0] - row[0])  # of rates and work
+        point[reached], mean = last, point[means]
+        np.subtract(last[rates], row[rates], out=mean)  # of rates and work
+        mean /= last[0] - row[0]
         if self.gaps:
             point[means.stop :][: self.gaps] = motion.stepper.gap_forces()
 

@@ -18,6 +18,7 @@ EXAMINED = 4  # samples of a motion with the largest rates that are examined, an
 MOTIONS = 16  # of a batch, those with the largest rates, that are examined
 GROWTH = 2.0  # of the sum of squares of the rates between two looks at a motion that is stepped
 STEPS_BETWEEN = 1000  # of two looks otherwise: a look takes as long as some ten steps
+SLOW = 0.25  # share of the thickness of two shapes that each moves in a step at speeds that need no look: half of the limit
 FIRST, NEVER = (-np.inf, 0.0), (np.inf, np.inf)  # when looks are due: before a motion, and after a warning
 
 
@@ -51,6 +52,8 @@ class StepLimit:
 
     def passing(self, state: State, h: float) -> tuple[str, str] | None:
         """Names of two shapes that move by more than they are thick within a step of length h; None if no shapes do."""
+        if not state.v.any():
+            return None
         _, velocity, turning = self._motions(state)
         one, other = self.pairs.T
         speed = np.linalg.norm(velocity[one] - velocity[other], axis=1) + turning[one] + turning[other]
@@ -145,12 +148,18 @@ class PassingWatch:
     """
 
     def __init__(self, system: System, step: float):
-        self.system, self.step, self.has_pairs = system, step, bool(system.n_v and step_limit(system).thickness.size)
+        limit = step_limit(system)
+        self.system, self.step, self.has_pairs = system, step, bool(system.n_v and limit.thickness.size)
+        self.slow = SLOW * limit.thickness.min(initial=np.inf) / step
         self.begin()
 
     def begin(self):
         """Begin a motion, whose first rates are looked at."""
         self.due: tuple[float, float] = FIRST
+
+    def is_slow(self, fastest: float) -> bool:
+        """Whether no two shapes can pass through each other at the largest speed of a point of a shape [m/s]."""
+        return fastest <= self.slow
 
     def examine(self, square: float, steps: int, states: Callable[[], Iterable[tuple[str, State]]]):
         """Look at states of motions where that is due, and warn once.
