@@ -22,8 +22,8 @@ PACKAGE = __name__.partition(".")[0]
 FOLDER = Path(__file__).parent.parent
 READ = 1 << 16  # bytes at a time: more than most sources have
 INNER = frozenset(
-    "arguments backends codegen dynamics errors export integrators interruption lazy math rotations scene shapes".split()
-    + "simulation system versions".split()
+    "arguments backends codegen dynamics errors integrators interruption lazy linked_groups math rotations scene".split()
+    + "shapes simulation system versions".split()
 )
 
 

@@ -5,9 +5,6 @@ import subprocess
 
 import numpy as np
 import pytest
-from gauss.export.c_code import PRELUDE, CBody
-from gauss.export.casadi_function import casadi_function
-from gauss.export.exported_function import ExportedFunction
 from scipy.interpolate import CubicSpline
 
 from gauss import math

@@ -143,7 +143,7 @@ def _addresses(arrays: Sequence[np.ndarray]) -> list[int]:
 def address(array: np.ndarray) -> int:
     """Address of a contiguous array; through its buffer, a tenth of the time of ``array.ctypes``."""
     try:
-        return ctypes.addressof(BYTE.from_buffer(array))
+        return ctypes.addressof(BYTE.from_buffer(array))  # type: ignore[arg-type]  # buffers have no type before Python 3.12
     except (TypeError, ValueError):
         if array.size and array.flags.writeable:  # it is not contiguous
             raise
