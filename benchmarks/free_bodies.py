@@ -79,7 +79,8 @@ def packed_balls(n: int, row: int, jolt: float = 0.0) -> tuple[Scene, float]:
     """
     apart, rng = 2.02 * RADIUS, np.random.default_rng(0)
     rise, wall = np.sqrt(4.0 * RADIUS**2 - 0.5 * apart**2), 0.5 * (row - 1) * apart + RADIUS
-    scene, places = walled_floor("packed balls", wall), []
+    scene = walled_floor("packed balls", wall)
+    places: list[tuple[int, float, float]] = []
     while len(places) < n:
         layer = places[-1][0] + 1 if places else 0
         across = (np.arange(row - layer % 2) - 0.5 * (row - 1 - layer % 2)) * apart
