@@ -100,6 +100,10 @@ class CompiledRun:
         """Whether accelerations are checked body by body, which joints that close loops do not allow."""
         return not self.system.has_closures and self.program.checks_bodies
 
+    def run(self):
+        """Run until the end, or a status of :data:`UNTRUSTED`."""
+        raise NotImplementedError
+
     def _on_system(self) -> MethodOnSystem:
         """What depends on the method and the system alone."""
         system, method = self.system, self.problem.method

@@ -17,6 +17,7 @@ from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
+from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 
@@ -90,7 +91,8 @@ def _constant(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
-    run = (fixed_run if isinstance(problem.method, FixedStep) else adaptive_run)(problem, plan.dynamics)
+    made = fixed_run if isinstance(problem.method, FixedStep) else adaptive_run
+    run: CompiledRun = made(problem, plan.dynamics)
     run.run()
     return run.finished(lambda start, samples: _fallback(problem._replace(start=start, samples=samples), plan))
 
