@@ -104,7 +104,7 @@ class ContactMotion:
         if not loop.steps:
             return 0, False
         if loop.changes:
-            self._note([begin.t, *ends], loop.changes)
+            self._note([begin.t, *ends.tolist()], loop.changes)
         self.steps, self.largest = self.steps + loop.steps, max(self.largest, loop.largest)
         if loop.doubtful:
             before = begin if loop.steps == 1 else self._state_of(rows[loop.steps - 2])
