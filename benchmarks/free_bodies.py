@@ -50,11 +50,17 @@ def dominoes(n: int, push: float = 1.0) -> Scene:
     return scene
 
 
+def walled_floor(name: str, wall: float) -> Scene:
+    """Scene with a plane and four walls, each so far from its middle [m]."""
+    scene = floor(name)
+    for side, x, y in (("west", 1, 0), ("east", -1, 0), ("south", 0, 1), ("north", 0, -1)):
+        scene.half_space(side, at=(-wall * x, -wall * y, 0.0), normal=(x, y, 0.0))
+    return scene
+
+
 def bin_of_balls(n: int, friction: float = 0.5, wall: float = WALL, seed: int = 0) -> Scene:
     """Balls in layers above each other that fall into a bin of four walls."""
-    rng, scene = np.random.default_rng(seed), floor("bin of balls")
-    for name, x, y in (("west", 1, 0), ("east", -1, 0), ("south", 0, 1), ("north", 0, -1)):
-        scene.half_space(name, at=(-wall * x, -wall * y, 0.0), normal=(x, y, 0.0))
+    rng, scene = np.random.default_rng(seed), walled_floor("bin of balls", wall)
     row = int(2.0 * wall / (2.2 * RADIUS))
     for i in range(n):
         layer, place = divmod(i, row * row)
@@ -63,6 +69,28 @@ def bin_of_balls(n: int, friction: float = 0.5, wall: float = WALL, seed: int = 
         scene.sphere(f"sphere {i}", f"ball {i}", RADIUS)
     scene.contacts_all(friction=friction)
     return scene
+
+
+def packed_balls(n: int, row: int, jolt: float = 0.0) -> tuple[Scene, float]:
+    """Balls at rest in a bin, and the half width of the bin [m].
+
+    Each lies in the hollow of four below, in layers of row² and (row − 1)² balls by turns, neighbours 1 % of their diameter
+    apart; a jolt gives each a velocity at random [m/s].
+    """
+    apart, rng = 2.02 * RADIUS, np.random.default_rng(0)
+    rise, wall = np.sqrt(4.0 * RADIUS**2 - 0.5 * apart**2), 0.5 * (row - 1) * apart + RADIUS
+    scene = walled_floor("packed balls", wall)
+    places: list[tuple[int, float, float]] = []
+    while len(places) < n:
+        layer = places[-1][0] + 1 if places else 0
+        across = (np.arange(row - layer % 2) - 0.5 * (row - 1 - layer % 2)) * apart
+        places += [(layer, east, north) for east in across for north in across]
+    for i, (layer, east, north) in enumerate(places[:n]):
+        rate = (*jolt * rng.standard_normal(3), 0.0, 0.0, 0.0)
+        free_body(scene, f"ball {i}", 0.4 * RADIUS**2, (east, north, RADIUS + rise * layer), rate=rate)
+        scene.sphere(f"sphere {i}", f"ball {i}", RADIUS)
+    scene.contacts_all(friction=0.5)
+    return scene, wall
 
 
 def box_depth(q: np.ndarray, size) -> float:

@@ -12,6 +12,7 @@ Vector = Shaped[np.ndarray, " 3"]
 Matrix = Shaped[np.ndarray, "3 3"]
 Quaternion = Shaped[np.ndarray, " 4"]
 
+AXIS_NAMES = ("x", "y", "z")
 SMALL_ANGLE = 0.03  # rad: below it the power series are exact to round-off with the terms kept here
 ROUNDED_ENTRY = 1e-15  # distance of an entry of a constant rotation from 0 or ±1 that is round-off
 SMALL_SINE = 1e-8  # of half an angle: below it sin and angle agree to round-off

@@ -17,7 +17,7 @@ from gauss.bench.table import ResultTable
 QUICK_PROBLEMS = 8  # problems of a class in a quick run, and of levels other than the main one, evenly spread
 OTHER_LEVELS = ("low", "mid")
 LARGE_CLASS = "large"  # class whose problems take solvers seconds each
-TOGETHER = {"friction": ("cones", "coulomb")}  # names of several classes
+CLASSES_OF_NAME = {"friction": ("cones", "coulomb")}  # names of several classes
 STORIES = {
     "equality": "Accelerations of open and closed mechanisms: equality rows alone.",
     "inequality": "Joints at stops and boxes on points.",
@@ -76,7 +76,7 @@ def compare_class(
 
 def classes_named(kinds: Iterable[str]) -> list[str]:
     """Classes by name, with those that a name stands for in its place, each once."""
-    return list(dict.fromkeys(one for kind in kinds for one in TOGETHER.get(kind, (kind,))))
+    return list(dict.fromkeys(one for kind in kinds for one in CLASSES_OF_NAME.get(kind, (kind,))))
 
 
 def problems_of(kind: str) -> tuple[str, ...]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from gauss.codegen import expression
 from gauss.codegen.expression import Expression
+from gauss.codegen.graph import COMPARISONS
 
 MOST_PATHS, LONGEST_PATH = 64, 64  # calls of a function, and comparisons in one call: a loop over time has no end
-ORDERS = ("less", "less_equal")
 
 
 class TooManyBranches(TypeError):
@@ -42,17 +42,17 @@ class _Path:
 
 def _condition_key(condition: Expression) -> tuple | int:
     """Key of a condition: of a comparison its kind and its sides, so that implied comparisons are found."""
-    return (condition.op, *[x.index for x in condition.operands]) if condition.op in ORDERS else condition.index
+    return (condition.op, *[x.index for x in condition.operands]) if condition.op in COMPARISONS else condition.index
 
 
 def _implied(condition: Expression, answer: bool) -> dict[tuple | int, bool]:
     """Implied truth values of other comparisons of the same two sides: contradictory paths are not traced."""
-    if condition.op not in ORDERS:
+    if condition.op not in COMPARISONS:
         return {}
     strict, (x, y) = condition.op == "less", [operand.index for operand in condition.operands]
-    found: dict[tuple | int, bool] = {(ORDERS[strict], y, x): not answer}  # x < y or y ≤ x, and not both
+    found: dict[tuple | int, bool] = {(COMPARISONS[strict], y, x): not answer}  # x < y or y ≤ x, and not both
     if answer == strict:  # x < y is x ≤ y, too, and not y < x; not x ≤ y is not x < y, and y ≤ x
-        found |= {(ORDERS[strict], x, y): answer, (condition.op, y, x): not answer}
+        found |= {(COMPARISONS[strict], x, y): answer, (condition.op, y, x): not answer}
     return found
 
 

@@ -36,6 +36,8 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "less_equal": lambda x, y: float(x <= y),
 }
 COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
+COMPARISONS = ("less", "less_equal")
+TURNS = frozenset({"sin", "cos"})
 # Operations on zero and another expression: what folding and the rules of simplification give, sooner; or None. The product
 # of zero and a constant is not a number where that is infinite.
 WITH_ZERO: dict[str, Callable[[Expression, Expression, Expression], Expression | None]] = {

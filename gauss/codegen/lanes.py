@@ -16,7 +16,7 @@ DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
 LANE = ir.IntType(32)  # index of a lane
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
-COMPARISONS = {"less": "<", "less_equal": "<="}
+PREDICATES = {"less": "<", "less_equal": "<="}
 # full vectors whose sines and cosines one call computes: the operations of one depend on each other for a hundred cycles,
 # and the scheduler of a processor does not reach the next call; two take a quarter less
 SIDE_BY_SIDE = 2
@@ -156,8 +156,8 @@ class Lanes:
             return b.call(self._intrinsic("llvm.fabs", 1), x[:1])
         if op in ("min", "max"):
             return self._extreme(op, *x)
-        if op in COMPARISONS:
-            return b.fcmp_ordered(COMPARISONS[op], *x)
+        if op in PREDICATES:
+            return b.fcmp_ordered(PREDICATES[op], *x)
         if op in ("exp", "log", "atan2") and isinstance(self.module, DeviceModule):
             return b.call(elementary(self.module, op), x)
         if op == "atan2":

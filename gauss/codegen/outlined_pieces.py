@@ -15,12 +15,12 @@ from llvmlite import ir
 
 from gauss.codegen.device_module import DeviceModule
 from gauss.codegen.expression import INDEX_OF, Expression
+from gauss.codegen.graph import TURNS
 from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.schedule import Schedule
 from gauss.codegen.straight_line import Results, calling, passed_on, straight_line
 
-TURNS = frozenset({"sin", "cos"})
 LONGEST_UNCUT = 2_000  # operations above which a function is outlined into pieces
 PIECE_LENGTH = (
     800  # operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones

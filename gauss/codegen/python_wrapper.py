@@ -8,10 +8,10 @@ from math import prod
 
 import numpy as np
 
+from gauss.codegen.recurrences import LINE
 from gauss.errors import ArgumentError, GaussError, StateError
 
 CONVERTIBLE_KINDS = "biufO"  # kinds of numpy dtypes converted to float; complex would lose its imaginary part
-LINE = 64  # bytes of a cache line
 Shape = tuple[int, ...]
 
 

@@ -14,7 +14,7 @@ from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.constraint_leak import refused_where_leaking
 from gauss.dynamics.given_link_frames import GivenLinkFrames, with_moved_joint
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
-from gauss.dynamics.kinematics import AXES, kinematics
+from gauss.dynamics.kinematics import WORLD_AXES, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_residual
 from gauss.dynamics.parameters import changed
@@ -127,7 +127,7 @@ def _moved(system: System, parameter: str, place) -> tuple[System, GivenLinkFram
     kind, _, name = parameter.partition(":")
     index, joint = next((i, joint) for i, joint in enumerate(system.joints) if joint.name == name)
     field, body = ("p_parent", joint.parent) if kind == "parent_at" else ("p_child", joint.child)
-    shift = (system.frames[system.structure.bodies[body]].R if body >= 0 else AXES) @ place
+    shift = (system.frames[system.structure.bodies[body]].R if body >= 0 else WORLD_AXES) @ place
     joints = (*system.joints[:index], changed(joint, {field: getattr(joint, field) + shift}), *system.joints[index + 1 :])
     return changed(system, {"joints": joints}), with_moved_joint(whole(system), index, body, shift)
 
@@ -150,7 +150,7 @@ def _along_axes(parts: Callable, state: State, moving: np.ndarray, *more: np.nda
 
     def changes(t, q, v, place, moving, *more):
         outputs, given = parts(t[0], q, v, place, *more), [*q, *v, *place]
-        pairs = zip(AXES, moving.reshape(3, -1), strict=True)
+        pairs = zip(WORLD_AXES, moving.reshape(3, -1), strict=True)
         return tuple(forward(outputs, given, np.concatenate([own, axis])) for axis, own in pairs)
 
     sizes = 1, q.size, v.size, 3, moving.size, *(one.size for one in more)

@@ -13,7 +13,7 @@ from gauss.rotations import cross
 from gauss.system import PlacedJoint, State, System, View
 
 ORIGIN = np.zeros(3)
-AXES = np.eye(3)
+WORLD_AXES = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class KinematicsOnAccess(Kinematics):
 
 def _of_bodies(system: System, state: State, R, x, W, u) -> _Poses:
     """Poses and velocities of the bodies, and those of the ground; without joints."""
-    return _Poses(state, [*R, AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints))
+    return _Poses(state, [*R, WORLD_AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints))
 
 
 def kinematics(system: System, state: State) -> Kinematics:
@@ -169,7 +169,7 @@ def _outward(system: System, state: State) -> _Poses:
             f"and {len(state.v)}; system.state(q, v) makes one that fits."
         )
     places = system.structure.n_bodies + 1
-    at = ([AXES] * places, [ORIGIN] * places, [ORIGIN] * places, [ORIGIN] * places)
+    at = ([WORLD_AXES] * places, [ORIGIN] * places, [ORIGIN] * places, [ORIGIN] * places)
     found = _Poses(state, *at, [None] * len(system.joints))
     for edge in system.structure.tree:
         joint = system.joints[edge.constraint]

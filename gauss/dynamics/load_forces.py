@@ -15,7 +15,7 @@ import numpy as np
 from gauss.codegen import Kernel, write
 from gauss.codegen.kernels import address
 from gauss.dynamics.inverse_dynamics_residual import along_rates
-from gauss.dynamics.kinematics import AXES, ORIGIN, Kinematics, KinematicsOnAccess, kinematics
+from gauss.dynamics.kinematics import ORIGIN, WORLD_AXES, Kinematics, KinematicsOnAccess, kinematics
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied, values_of_laws
 from gauss.dynamics.store import cached_on_disk
@@ -158,7 +158,7 @@ class LoadForces:
 
         def poses(t, q, v):
             motion, places = kinematics(system, State(t[0], q, v)), range(system.structure.n_bodies)
-            parts = (motion.R, AXES), (motion.x, ORIGIN), (motion.W, ORIGIN), (motion.u, ORIGIN)
+            parts = (motion.R, WORLD_AXES), (motion.x, ORIGIN), (motion.W, ORIGIN), (motion.u, ORIGIN)
             return tuple(np.concatenate([*(np.ravel(part[body]) for body in places), end.ravel()]) for part, end in parts)
 
         make = lambda: Kernel(write(poses, 1, system.n_q, system.n_v, name="poses"), batch=False)  # noqa: E731

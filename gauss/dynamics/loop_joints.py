@@ -14,7 +14,7 @@ from gauss.rotations import cross
 from gauss.scene import Pair
 from gauss.system import Subsystem
 
-AXES = np.eye(6)
+UNIT_TWISTS = np.eye(6)
 
 
 class LinkStates(NamedTuple):
@@ -141,20 +141,20 @@ class LoopJoint:
 def _directions(pair: Pair, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Constrained directions of a pair, and the dual of its motion subspace E (6, k)."""
     if pair.kind == "free":
-        return AXES[:, :0], E
+        return UNIT_TWISTS[:, :0], E
     if pair.kind == "ball":
-        return AXES[:, 3:], E
+        return UNIT_TWISTS[:, 3:], E
     if pair.kind == "universal":
-        return np.column_stack([np.concatenate([cross(E[:3, 0], E[:3, 1]), np.zeros(3)]), AXES[:, 3:]]), E
+        return np.column_stack([np.concatenate([cross(E[:3, 0], E[:3, 1]), np.zeros(3)]), UNIT_TWISTS[:, 3:]]), E
     if pair.kind == "screw":
         pitch, length = E[5, 0], np.sqrt(E[:, 0] @ E[:, 0])
-        along = (AXES[:, 5] - pitch * AXES[:, 2]) / length
-        return np.column_stack([AXES[:, [0, 1, 3, 4]], along]), E / length**2
+        along = (UNIT_TWISTS[:, 5] - pitch * UNIT_TWISTS[:, 2]) / length
+        return np.column_stack([UNIT_TWISTS[:, [0, 1, 3, 4]], along]), E / length**2
     free = [int(np.argmax(column)) for column in E.T]  # axes of the joint frame
-    return AXES[:, [axis for axis in range(6) if axis not in free]], E
+    return UNIT_TWISTS[:, [axis for axis in range(6) if axis not in free]], E
 
 
 def _axis(direction) -> int | None:
     """Axis of the joint frame along a direction; None for other directions."""
     numbers = [as_number(entry) for entry in direction]
-    return numbers.index(1.0) if sorted(map(str, numbers)) == sorted(map(str, AXES[0])) else None
+    return numbers.index(1.0) if sorted(map(str, numbers)) == sorted(map(str, UNIT_TWISTS[0])) else None

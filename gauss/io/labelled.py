@@ -7,6 +7,7 @@ import numpy as np
 from gauss.analysis import energy, reactions
 from gauss.io.joined_names import joined
 from gauss.io.rotors import toml_text
+from gauss.rotations import AXIS_NAMES
 from gauss.rotors import RotorMotion
 from gauss.servo import Tracking
 from gauss.servo.effort_units import effort_units
@@ -15,7 +16,7 @@ from gauss.simulation.provenance import library, made_by, plain, provenance, sce
 from gauss.system.coordinate_names import axis_labels
 
 RESIDUALS = "m, rad or rates of these"
-AXES, COMPONENTS = ("x", "y", "z"), ("w", "x", "y", "z")
+COMPONENTS = ("w", *AXIS_NAMES)  # of a quaternion
 
 
 def of_motion(trajectory: Trajectory, joints=()):
@@ -26,7 +27,7 @@ def of_motion(trajectory: Trajectory, joints=()):
         "time": ("time", trajectory.t, {"units": "s", "long_name": "time"}),
         **axis_labels(system),
         "body": list(system.structure.bodies),
-        "axis": list(AXES),
+        "axis": list(AXIS_NAMES),
         "component": list(COMPONENTS),
     }
     data: dict[str, tuple] = {

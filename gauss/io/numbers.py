@@ -8,6 +8,7 @@ from gauss.errors import FileError, did_you_mean
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 LIMITS = ("start", "stops")  # how limits of joints are read: for the search of the initial state, or as stops, too
+UNIT_VECTORS = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}  # by the names that formats use
 UNLIMITED = 1e16  # rad or m: formats write this, the largest double or infinity where there is no limit
 
 

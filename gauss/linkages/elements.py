@@ -11,7 +11,7 @@ from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 
 KINDS = ("revolute", "prismatic")
-AXES = ("world", "link")
+FORCE_AXES = ("world", "link")
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Load:
         object.__setattr__(self, "viscous", values.number(self.viscous, f"{what}: viscous", "N m s/rad", non_negative=True))
         if self.at is not None:
             object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m", 2))
-        if self.axes not in AXES:
+        if self.axes not in FORCE_AXES:
             raise SceneError(f"{what}: axes must be 'world' or 'link', got {self.axes!r}.")
         if not isinstance(self.resisting, bool):
             raise SceneError(f"{what}: resisting must be true or false, got {self.resisting!r}.")

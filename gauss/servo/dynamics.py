@@ -20,7 +20,7 @@ from gauss.system import State, System
 
 CANCELLATION = 1e-3  # of the terms that cancel: least scale of accelerations
 AVOID = "Choose a motion that avoids this configuration, or add an actuator."
-AGREEMENT = 1e-9  # relative difference of compiled accelerations and the saddle system, times the conditioning
+SADDLE_AGREEMENT = 1e-9  # relative difference of compiled accelerations and the saddle system, times the conditioning
 
 
 class ServoQuestion(NamedTuple):
@@ -145,7 +145,7 @@ class ServoEngine(Engine):
         largest = np.maximum(np.abs(exact.qdd), CANCELLATION * terms[-exact.qdd.size :]).max(initial=0.0)
         error = np.abs(exact.qdd - point.rates.acceleration).max(initial=0.0)
         sigma = np.linalg.svd(here.cosines, compute_uv=False).min(initial=1.0)
-        if not self.certified and not error <= AGREEMENT * largest / sigma:
+        if not self.certified and not error <= SADDLE_AGREEMENT * largest / sigma:
             self.certified, self.handed_over = True, number(point.state.t)
             raise DistrustError(f"t = {point.state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
         self.worst = max(self.worst, exact.error, float(error / max(largest, np.finfo(float).tiny)))

@@ -25,7 +25,7 @@ from gauss.system import State, System, retract
 Trial = TypeVar("Trial")
 
 ROUNDING_RESIDUAL = 1e-13  # residual relative to the size of its row, and its rate relative to the rates: rounding
-ACCEPTED = 1e-10  # the same: largest one of a consistent start
+CONSISTENT_START = 1e-10  # the same: largest one of a consistent start
 AROUND, LOOKED = 0.1, 4  # units of the scene, and states: how far from the start, and how often, rows are evaluated
 SMALLEST_RELATION_SHARE = 1e-3  # of a Newton step: where none larger lowers the residual, it cannot be removed
 
@@ -65,7 +65,7 @@ def initial_state(servo: Servo, state: State | None = None) -> State:
     plan = planned(servo, state)
     state = projected(servo, plan, state, NEWTON_STEPS)
     name, share, size = worst(servo, plan, state)
-    if share > ACCEPTED:
+    if share > CONSISTENT_START:
         raise StateError(
             f"relation {name!r} cannot be met from this start: off by {size:.3g} in the closest state "
             "found. Start nearer to it, or check the relation."

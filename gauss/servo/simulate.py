@@ -15,7 +15,7 @@ from gauss.interruption import interruption_keeps
 from gauss.servo.dynamics import AVOID, ServoEngine
 from gauss.servo.instant import number
 from gauss.servo.plan import RelationPlan
-from gauss.servo.project import ACCEPTED, initial_state, residuals, worst
+from gauss.servo.project import CONSISTENT_START, initial_state, residuals, worst
 from gauss.servo.realisable import planned, realisable
 from gauss.servo.servo import Servo
 from gauss.servo.switching import servo_switching
@@ -168,7 +168,7 @@ class ServoRun(PythonRun):
 
     def crossed_to(self, point: Point, t: float) -> Point:
         """Point across a switching time; relations that jump there are refused."""
-        self._refuse_jump(replace(point.state, t=t), ACCEPTED)
+        self._refuse_jump(replace(point.state, t=t), CONSISTENT_START)
         return super().crossed_to(point, t)
 
     def _advance(self, method: FixedStep, point: Point, t: float) -> Point:

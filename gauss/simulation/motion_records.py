@@ -102,9 +102,10 @@ class Event:
     t : float
         When [s].
     kind : str
-        "impact": a gap closes with a velocity, or a prescribed velocity jumps; "opens" or "closes" without impact; "slips"
-        or "holds" of joint friction and limited drives; "power reversal", "starts", "stuck" of links with losses;
-        "contact" or "separate" of backlash sides; "sleeps" or "wakes" of bodies.
+        "impact": a gap closes with a velocity, in time stepping of a contact that was open at all its points, or a
+        prescribed velocity jumps; "opens" or "closes" without impact; "slips" or "holds" of contacts, joint friction and
+        limited drives; "power reversal", "starts", "stuck" of links with losses; "contact" or "separate" of backlash
+        sides; "sleeps" or "wakes" of bodies.
     gaps : tuple of str
         Names of the gaps, elements or bodies, and of drives and constraints whose velocity jumps.
     loss : float

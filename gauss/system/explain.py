@@ -66,11 +66,12 @@ def _time_step(system) -> list[str]:
         return [f"  time stepping: {plan.dynamics} dynamics, contacts in the machine code of the scene"]
     solver = "free bodies, Newton's method on a block-sparse matrix" if step.free else "a mechanism, Newton's method"
     kinds = f" ({listed(step.kinds, MOST_REASONS)})" if step.kinds else ""
-    islands = f" in {len(step.islands)} islands of up to {max(step.islands)} bodies" if step.islands else ""
+    groups = len(step.islands)
+    islands = f" in {groups} island{'s' * (groups > 1)}, the largest of {max(step.islands)}" if groups else ""
     return [
         f"  time stepping: {plan.dynamics}, the step of {solver}",
         f"    at the start {step.points} near points of {step.pairs} pairs{kinds}{islands}: about "
-        f"{1e6 * step.cost:.2g} µs a step of {step.step:.2g} s (CPU time, measured); more where more bodies touch",
+        f"{max(1.0, 1e6 * step.cost):.0f} µs a step of {step.step:.2g} s (CPU time, measured); more where more bodies touch",
     ]
 
 

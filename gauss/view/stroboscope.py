@@ -5,12 +5,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from gauss.errors import StateError
+from gauss.rotations import AXIS_NAMES
 from gauss.scene import GROUND
 from gauss.simulation import Trajectory
 from gauss.view.skeleton import lines, placed
 from gauss.view.style import COLOURS, INK, check_format, legend, saved
 
-AXES = "xyz"
 FAINTEST = 0.15
 MARGIN = 0.05
 
@@ -61,7 +61,7 @@ def plot_stroboscope(trajectory: Trajectory, flashes: int = 12, plane: str | Non
         axes.plot([], [], color=colour, label=name)
     ground = shapes[GROUND][0][:, [right, up]]
     axes.plot(*ground.T, "^", color=INK, markersize=8, zorder=4, label=GROUND if len(ground) else None)
-    axes.set(xlabel=f"{AXES[right]} [m]", ylabel=f"{AXES[up]} [m]")
+    axes.set(xlabel=f"{AXIS_NAMES[right]} [m]", ylabel=f"{AXIS_NAMES[up]} [m]")
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(MARGIN)
     axes.grid(alpha=0.3)
@@ -72,9 +72,9 @@ def plot_stroboscope(trajectory: Trajectory, flashes: int = 12, plane: str | Non
 
 def _plane(shapes: dict, plane: str | None) -> tuple[int, int]:
     if plane is not None:
-        if len(plane) != 2 or plane[0] == plane[1] or not set(plane) <= set(AXES):
+        if len(plane) != 2 or plane[0] == plane[1] or not set(plane) <= set(AXIS_NAMES):
             raise StateError(f"plane: expected two axes such as 'xy' or 'xz', got {plane!r}.")
-        return AXES.index(plane[0]), AXES.index(plane[1])
+        return AXIS_NAMES.index(plane[0]), AXIS_NAMES.index(plane[1])
     everything = np.concatenate([points.reshape(-1, 3) for points in shapes.values()])
     first, second = sorted(np.argsort(-np.ptp(everything, axis=0), kind="stable")[:2])
     return int(first), int(second)

@@ -53,7 +53,7 @@ CLOUDS = {
 def test_a_grid_finds_the_contacts_of_all_pairs(name, monkeypatch):
     system, found = gauss.compile_scene(CLOUDS[name]()), []
     for most in (10**9, 0):
-        monkeypatch.setattr(near_detection, "MOST_LISTED", most)
+        monkeypatch.setattr(near_detection, "MOST_LISTED_PAIRS", most)
         stepper = FreeBodyStepper(system)
         assert (len(stepper.detection.pair) > 0) == (most > 0)
         bodies = stepper.begin(system.initial_state(), 0.0, 0.0).bodies
@@ -68,7 +68,7 @@ def test_a_grid_finds_the_contacts_of_all_pairs(name, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("most", [10**9, 0])
 def test_positions_without_a_number_have_no_contacts(most, monkeypatch):
-    monkeypatch.setattr(near_detection, "MOST_LISTED", most)
+    monkeypatch.setattr(near_detection, "MOST_LISTED_PAIRS", most)
     system = gauss.compile_scene(CLOUDS["sizes alike"]())
     stepper = FreeBodyStepper(system)
     bodies = stepper.begin(system.initial_state(), 0.0, 0.0).bodies

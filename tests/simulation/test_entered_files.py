@@ -8,8 +8,8 @@ import gauss
 from gauss.backends import registry
 
 ROOT = gauss.__file__.removesuffix("__init__.py")
-AGAIN = 25  # files of the second motion of a compiled system: checks of the arguments, plan, driver, run, trajectory
-ANEW = 60  # those, the scene made a system, and its machine code read from disk
+AGAIN = 24  # files of the second motion of a compiled system: checks of the arguments, plan, driver, run, trajectory
+ANEW = 51  # those, the scene made a system, and its machine code read from disk
 DEEPEST = 25  # calls of gauss within each other, from `simulate` to the reading of a file of the cache
 # what a four-bar does not have: laws, contacts, events, time stepping, inputs, rigid loops
 ABSENT = "laws/switching", "laws/prescribed", "laws/constraint", "contact/", "phases/", "moreau/", "history", "rigid"

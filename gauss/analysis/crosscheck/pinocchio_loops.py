@@ -26,7 +26,7 @@ with extra():
 SINGULAR_VALUE_CUTOFF = 1e-9  # of rows of unit length; redundant rows of consistent states lie near 1e-13
 ROW_ROUNDOFF = 1e-13  # length of a row that is zero but for rounding, relative to the longest
 REFINEMENTS = 1  # removes the rounding error by the condition of Zᵀ M Z
-AXES = pin.LOCAL_WORLD_ALIGNED  # motion of the origin of a frame, in world axes
+WORLD_ALIGNED = pin.LOCAL_WORLD_ALIGNED  # motion of the origin of a frame, in world axes
 
 
 def constrained_accelerations(now: PinocchioInstant, state: State) -> np.ndarray:
@@ -125,9 +125,15 @@ def _side_motion(model: pin.Model, data: pin.Data, side):
     """Rotation, origin, Jacobian, velocity and classical acceleration of a frame behind a joint, in world axes."""
     index, frame = side.joint, side.central
     pose = data.oMi[index] * frame
-    J = pin.getFrameJacobian(model, data, index, frame, AXES).reshape(6, -1)
-    velocity = pin.getFrameVelocity(model, data, index, frame, AXES)
-    return pose.rotation, pose.translation, J, velocity, pin.getFrameClassicalAcceleration(model, data, index, frame, AXES)
+    J = pin.getFrameJacobian(model, data, index, frame, WORLD_ALIGNED).reshape(6, -1)
+    velocity = pin.getFrameVelocity(model, data, index, frame, WORLD_ALIGNED)
+    return (
+        pose.rotation,
+        pose.translation,
+        J,
+        velocity,
+        pin.getFrameClassicalAcceleration(model, data, index, frame, WORLD_ALIGNED),
+    )
 
 
 def _alone(joint: PlacedJoint, state: State) -> tuple[np.ndarray, np.ndarray]:
@@ -139,6 +145,6 @@ def _alone(joint: PlacedJoint, state: State) -> tuple[np.ndarray, np.ndarray]:
     pin.computeJointJacobians(model, data, joint_map.configuration(q))
     pin.forwardKinematics(model, data, joint_map.configuration(q), T @ v, joint_map.bias(q, v))
     # of a model with one freedom Pinocchio returns a vector
-    E = pin.getJointJacobian(model, data, index, AXES).reshape(6, -1) @ T
-    bias = pin.getClassicalAcceleration(model, data, index, AXES)
+    E = pin.getJointJacobian(model, data, index, WORLD_ALIGNED).reshape(6, -1) @ T
+    bias = pin.getClassicalAcceleration(model, data, index, WORLD_ALIGNED)
     return E, np.concatenate([bias.linear, bias.angular])

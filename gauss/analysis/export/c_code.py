@@ -10,6 +10,7 @@ from math import isinf, isnan, nan
 
 from gauss.analysis.export.exported_function import ExportedFunction
 from gauss.codegen import LOOKUPS, Column, Expression, schedule
+from gauss.codegen.graph import COMPARISONS
 from gauss.codegen.sincos import COS, LARGEST_REDUCED_ANGLE, P1, P2, P2_TAIL, SIN, TWO_OVER_PI
 
 ROUND = 6755399441055744.0  # 3·2⁵¹: a double of this size has no fractional bits, so adding and subtracting it rounds
@@ -33,7 +34,6 @@ OPERATIONS = {
     "fms": "GAUSS_FMA({}, {}, -{})",
     "fnma": "GAUSS_FMA(-{}, {}, {})",
 }
-CONDITIONS = ("less", "less_equal")
 LETTERS = {"sin": "s", "cos": "c"}  # of the arrays of sines and cosines
 
 
@@ -141,7 +141,7 @@ class CBody:
         if node.op in LOOKUPS:
             yield from self._lookup(node)
             return
-        kind = "int" if node.op in CONDITIONS else "double"
+        kind = "int" if node.op in COMPARISONS else "double"
         self.names[node.index] = f"x{node.index}"
         yield f"const {kind} x{node.index} = {OPERATIONS[node.op].format(*map(self._value, node.operands))};"
 

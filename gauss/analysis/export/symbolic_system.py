@@ -18,11 +18,11 @@ from gauss.dynamics.rnea import KinematicTree
 from gauss.dynamics.state_terms import StateTerms
 from gauss.dynamics.traced_system import applied_loads
 from gauss.errors import SimulationError
+from gauss.rotations import AXIS_NAMES
 from gauss.scene import Drive, ElasticLink, JointSpring
 from gauss.system import BoundLoad, State, System, whole
 
 ZERO = 1e-12  # numbers below this share of the unit of the scene are round-off of rotated axes
-AXES = "xyz"
 OF_JOINTS = (Drive, ElasticLink, JointSpring)  # loads that act along coordinates, whatever the lengths
 TERMS_OF_TREES = ("mass_matrix", "bias_forces", "gravity_forces", "coriolis_matrix", "kinetic_energy", "inverse_dynamics")
 
@@ -95,7 +95,7 @@ class _Symbols:
     def vector(self, name: str, values) -> np.ndarray:
         """Symbols of the components of a vector."""
         return np.array(
-            [self.symbol(f"{name}_{axis}", value) for axis, value in zip(AXES, values, strict=True)], dtype=object
+            [self.symbol(f"{name}_{axis}", value) for axis, value in zip(AXIS_NAMES, values, strict=True)], dtype=object
         )
 
     def of_load(self, load):

@@ -28,6 +28,8 @@ CONTACT = 2 * SIDE
 MASS = 20  # inertia (3, 3) [kg m²], its inverse, mass, its inverse
 LEAST_NUMBER = 1e-60  # forces and velocities that are set to zero: their squares may not be inverted
 ELIMINATED = 12  # K (3, 3) and g (3,) of a contact
+APART, STICKING, SLIPPING = 0.0, 1.0, 2.0  # modes of a contact
+LEAST_REGULARISATION = 1e-7  # of contacts that keep their mode: their forces are hardly held back
 ORDER = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 7)
 SOLVE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 14)
 
@@ -40,8 +42,10 @@ class BlockContactLaws:
     ----------
     normal, friction, project_normal, project_friction : Function
         As of :class:`gauss.codegen.kernels.ContactSolver`.
-    rounds : tuple of Round
-        What is tried one after the other, each from the best forces so far.
+    rounds, rounds_of_many : tuple of Round
+        What is tried one after the other, each from the best forces so far: of few and of many contacts.
+    many : int
+        Number of contacts from which on they are many.
     """
 
     normal: Function
@@ -49,6 +53,8 @@ class BlockContactLaws:
     project_normal: Function
     project_friction: Function
     rounds: tuple[Round, ...]
+    rounds_of_many: tuple[Round, ...]
+    many: int
 
 
 class _BlockContactWriter:
@@ -61,19 +67,30 @@ class _BlockContactWriter:
         self.bodies, self.slot, self.order, self.start, self.listed = r.arrays[:5]
         self.J, self.mass, self.b, self.mu, self.f, self.T, self.A, room, self.result = r.arrays[5:]
         m = self.m
-        self.w, self.best, self.error = room, room.after(m * 3), room.after(m * 6)
+        self.w, self.best, self.eps, self.mode = (room.after(m * k) for k in (0, 3, 6, 7))
         self.eliminated = room.after(m * 9)
         self.x = room.after(m * (9 + ELIMINATED))
-        self.tolerance, self.eps = self.result[0], r.variable(0.0)
+        self.tolerance, self.highest, self.decay = self.result[0], r.variable(0.0), r.variable(1.0)
 
     def write(self) -> ir.Function:
         r = self.r
         self._measure()
-        least, total, rounds = write_rounds(self, "sparse", self.laws.rounds, self.m * 3, lambda: self.tolerance)
+        few, many = self.laws.rounds, self.laws.rounds_of_many
+        first, end = r.variable(0, INTEGER), r.variable(len(few), INTEGER)
+        with r.when(self.m >= self.laws.many):
+            first[0], end[0] = len(few), len(few) + len(many)
+        span = first[0], end[0]
+        least, total, rounds = write_rounds(self, "sparse", few + many, self.m * 3, lambda: self.tolerance, span)
         self.accumulate()
         self.result[0], self.result[1] = least[0], total[0]
         self.result[2] = r.as_double(rounds[0])
         return r.done()
+
+    def begin_round(self, regularisation: Value, decay: Value):
+        """The same ε for all contacts at first."""
+        self.highest[0], self.decay[0] = regularisation, decay
+        with self.r.each(self.m) as c:
+            self.eps[c], self.mode[c] = regularisation, APART
 
     def _sides(self, c: Value):
         """Body and rows of both sides of a contact."""
@@ -156,14 +173,15 @@ class _BlockContactWriter:
 
     def residuals(self) -> Value:
         """Residuals of the laws and the elimination of each contact; returns the largest residual, as a velocity."""
-        r, f, w, eps = self.r, self.f, self.w, self.eps[0]
+        r, f, w = self.r, self.f, self.w
         largest, total = r.variable(0.0), r.variable(0.0)
         with r.each(self.m) as c:
             i = c * 3
             u = [self._flushed(rate) for rate in self._rates(c)]
             error, by_force, by_rate = r.inline(self.laws.normal, f[i], u[0], w[i])
-            trial = [r.absolute(f[i + k] - u[k] / w[i + k]) for k in (1, 2)]
-            moved = r.choose(trial[0] + trial[1] < LEAST_NUMBER, LEAST_NUMBER, 0.0)  # away from where |f_t| has no slope
+            trial = [f[i + k] - u[k] / w[i + k] for k in range(3)]
+            eps, small = self._regularisation(c, trial), r.absolute(trial[1]) + r.absolute(trial[2]) < LEAST_NUMBER
+            moved = r.choose(small, LEAST_NUMBER, 0.0)  # away from where |f_t| has no slope
             known = f[i + 1] + moved, f[i + 2], u[1], u[2], w[i + 1], f[i], u[0], w[i], self.mu[c]
             e1, e2, *slopes = r.inline(self.laws.friction, *known)
             alpha = by_force + by_rate * w[i] * eps
@@ -186,6 +204,16 @@ class _BlockContactWriter:
                 size = r.absolute(value * w[i + k])
                 largest[0], total[0] = r.maximum(size, largest[0]), total[0] + size
         return r.choose(total[0] <= LARGEST_RESIDUAL_SUM, largest[0], np.inf)  # the maximum ignores NaN, the sum does not
+
+    def _regularisation(self, c: Value, trial: list[Value]) -> Value:
+        """Regularisation ε of a contact: that of the round after a change of its mode, else less than in the last step."""
+        r, radius = self.r, self.mu[c] * trial[0]
+        slips = trial[1] * trial[1] + trial[2] * trial[2] > radius * radius
+        mode = r.choose(trial[0] > 0.0, r.choose(slips, SLIPPING, STICKING), APART)
+        lowered = r.maximum(self.eps[c] * self.decay[0], r.number(LEAST_REGULARISATION))
+        stays = r.absolute(mode - self.mode[c]) < 0.5 * STICKING
+        self.mode[c], self.eps[c] = mode, r.choose(stays | (self.decay[0] >= 1.0), lowered, self.highest[0])
+        return self.eps[c]
 
     def _flushed(self, x: Value) -> Value:
         return self.r.choose(self.r.absolute(x) < LEAST_NUMBER, 0.0, x)

@@ -92,6 +92,10 @@ class _ContactSolverWriter:
         self.residual[0] = r.choose(least[0] <= scale[0] * laws.accepted, least[0], -1.0)
         return r.done()
 
+    def begin_round(self, regularisation: Value, decay: Value):  # noqa: ARG002
+        """One ε for all rows, which stays."""
+        self.eps[0] = regularisation
+
     def accumulate(self):
         """Velocities are found where they are needed."""
 

@@ -50,7 +50,8 @@ class FreeMotion:
         self.at.copy(given.after(1), self.at["end_q"], n_q)
         self.at.copy(given.after(n_q + 1), self.at["v"], n_v)
         self.at.call("begin", given, self.at["out"])
-        self.at.copy(self.at["flat"], self.at["fixed"], n["flat"])
+        with r.each(n_v) as i:  # of all constants, implicit damping alone changes some
+            self.at["flat:M"][i * n_v + i] = self.at["fixed:M"][i * n_v + i]
         entries = self.at.table("entries")
         with r.each(n["entries"]) as i:
             self.at["flat"][entries[i]] = self.at["out"][i]

@@ -24,7 +24,7 @@ FOUND, INSIDE, FAR, LEFT, PLACELESS = (
 NEAREST = 7  # distance, normal out of the second hull (3), point on it (3)
 ROUNDS = 64
 BOUND_GAP = 1e-14  # relative to the size of both hulls: difference of both bounds that is rounding
-ACCEPTED = 1e-12  # the same, where no better corner is found
+ACCEPTED_GAP = 1e-12  # the same, where no better corner is found
 TOUCHING = 4e-15  # the same: distance that has no direction
 LEAST_TRIANGLE = 1e-4  # relative to the square of the size: twice the area of a triangle
 ODD = (
@@ -42,7 +42,7 @@ class _DistanceWriter:
         self.records, (self.pose, self.reach, self.result, self.status) = r.arrays[:2], r.arrays[2:]
         self.first, self.second = (Hull(r, record) for record in self.records)
         self.farthest, self.nearest = write_farthest(module), write_nearest(module)
-        self.penetration = write_penetration(module, (FOUND, PLACELESS, LEFT), BOUND_GAP, ACCEPTED)
+        self.penetration = write_penetration(module, (FOUND, PLACELESS, LEFT), BOUND_GAP, ACCEPTED_GAP)
         self.corners, self.vertices, self.shares = r.buffer(12), r.buffer(8, INTEGER), r.buffer(4)
         self.v, self.count = r.buffer(3), r.variable(0, INTEGER)
         self.direction, self.tried, self.tried_shares = r.buffer(3), r.buffer(3), r.buffer(3)
@@ -105,7 +105,7 @@ class _DistanceWriter:
                 normal = across / (size * sign)
                 self._search(-normal, 3)
                 low = normal @ vector(self.corners, 9)
-                with r.when(low >= self.scale[0] * -ACCEPTED):
+                with r.when(low >= self.scale[0] * -ACCEPTED_GAP):
                     self._write(low, normal)
         self._end(self.count[0] > 2, INSIDE)
         self._end(self.status[0] < 1, LEFT)
@@ -137,7 +137,7 @@ class _DistanceWriter:
             ]
             is_known[0] = is_known[0] + r.as_integer(same[0] & same[1])
         between = length - low
-        is_found = (between <= self.scale[0] * BOUND_GAP) | ((is_known[0] > 0) & (between <= self.scale[0] * ACCEPTED))
+        is_found = (between <= self.scale[0] * BOUND_GAP) | ((is_known[0] > 0) & (between <= self.scale[0] * ACCEPTED_GAP))
         with r.when(is_found & (self.status[0] < 1)):
             self._write(length, v / length)
         self._end(is_known[0] > 0, LEFT)
@@ -153,7 +153,7 @@ class _DistanceWriter:
                 normal = axes @ vector(hull.normals, face * 3) * sign
                 self._search(-normal, 3)
                 low = normal @ vector(self.corners, 9)
-                with r.when(r.absolute(length - low) <= self.scale[0] * ACCEPTED):
+                with r.when(r.absolute(length - low) <= self.scale[0] * ACCEPTED_GAP):
                     self._write(low, normal)
 
     def _write(self, distance: Value, normal: np.ndarray):

@@ -27,20 +27,30 @@ class Round(NamedTuple):
         linearly where small ones may cycle.
     steps : int
         Newton steps.
+    decay : float
+        Factor of the ε of a contact in each step in which its mode (open, sticking, slipping) stays; a change sets ε back.
+        So contacts that cycle move little, and the others as far as without regularisation. 1 keeps ε.
+    above, below : float
+        Residuals, in units of the target, between which the round is made.
     """
 
     sweeps: int
     regularisation: float
     steps: int
+    decay: float = 1.0
+    above: float = 1.0
+    below: float = np.inf
 
 
 class ContactIteration(Protocol):
-    """Writer of what a round consists of; ``f`` are the forces, ``best`` the best ones, ``eps`` the regularisation."""
+    """Writer of what a round consists of; ``f`` are the forces, ``best`` the best ones."""
 
     r: Routine
     f: Array
     best: Array
-    eps: Array
+
+    def begin_round(self, regularisation: Value, decay: Value):
+        """Emit what sets the regularisation of a round."""
 
     def accumulate(self):
         """Emit the velocities under new forces, where they are kept."""
@@ -56,7 +66,7 @@ class ContactIteration(Protocol):
 
 
 def write_rounds(
-    code: ContactIteration, name: str, rounds: tuple[Round, ...], n: Value, target: Callable[[], Value]
+    code: ContactIteration, name: str, rounds: tuple[Round, ...], n: Value, target: Callable[[], Value], span=None
 ) -> tuple[Array, Array, Array]:
     """Emit rounds until the residual is at most a target.
 
@@ -70,6 +80,8 @@ def write_rounds(
         Number of forces.
     target : callable
         Emits the target of the residual.
+    span : pair of Value, optional
+        First round that is made, and the end of these; all by default.
 
     Returns
     -------
@@ -79,18 +91,23 @@ def write_rounds(
     r, f, best = code.r, code.f, code.best
     with r.each(n) as i:
         best[i] = f[i]
-    least, done, round_, total = r.variable(np.inf), r.variable(0, INTEGER), r.variable(0, INTEGER), r.variable(0.0)
+    first, end = span or (0, len(rounds))
+    least, done, round_, total = r.variable(np.inf), r.variable(0, INTEGER), r.variable(first, INTEGER), r.variable(0.0)
     columns = zip(Round._fields, zip(*rounds, strict=True), strict=True)
-    sweeps, regularisation, steps = (_table(r, f"{name}_{column}", values) for column, values in columns)
+    sweeps, regularisation, steps, decay, above, below = (
+        _table(r, f"{name}_{column}", values) for column, values in columns
+    )
     with r.loop() as leave_if:
-        leave_if((round_[0] >= len(rounds)) | (done[0] > 0))
-        with r.each(n) as i:
-            f[i] = best[i]
-        code.accumulate()
-        code.eps[0] = regularisation[round_[0]]
-        with r.each(sweeps[round_[0]]):
-            code.sweep()
-        tries = r.variable(0, INTEGER)
+        leave_if((round_[0] >= end) | (done[0] > 0))
+        tries = r.variable(steps[round_[0]], INTEGER)
+        with r.when((least[0] > target() * above[round_[0]]) & (least[0] <= target() * below[round_[0]])):
+            tries[0] = 0
+            with r.each(n) as i:
+                f[i] = best[i]
+            code.accumulate()
+            code.begin_round(regularisation[round_[0]], decay[round_[0]])
+            with r.each(sweeps[round_[0]]):
+                code.sweep()
         with r.loop() as leave_round_if:
             leave_round_if((tries[0] >= steps[round_[0]]) | (done[0] > 0))
             residual = code.residuals()
@@ -109,6 +126,7 @@ def write_rounds(
         round_[0] = round_[0] + 1
     with r.each(n) as i:
         f[i] = best[i]
+    round_[0] = round_[0] - first
     return least, total, round_
 
 

@@ -8,9 +8,10 @@ from copy import copy
 
 import numpy as np
 
+from gauss.dynamics.contact.block_contact_laws import block_contact_laws
 from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_memory
 from gauss.dynamics.contact.contact_changes import ModeRecord
-from gauss.dynamics.contact.free_body_step import FreeBodyStepper, block_contact_laws
+from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.linked_groups import linked_groups

@@ -70,6 +70,7 @@ class MechanismMemory(CompiledStepMemory):
         }
         parts = dict(zip(MechanismTerms._fields, kernels.layout.parts, strict=True))
         terms = {f"flat:{name}": ("flat", parts[name][0].start) for name in TERMS}
+        terms["fixed:M"] = "fixed", parts["M"][0].start
         steps = compiled_mechanism_step() if kernels.receiver is None else CallingSteps(compiled_mechanism_step())
         super().__init__(steps, MECHANISM, sizes, terms)
         self._fill(N)
@@ -78,7 +79,7 @@ class MechanismMemory(CompiledStepMemory):
         stepper, at, table, rows = self.stepper, self.at, self.stepper.table, self.stepper.rows
         row, column = np.nonzero(N)
         at["value"][:], at["weight"][:] = N[row, column], self.patterns.weight
-        at["fixed"][:] = stepper.kernels.layout.flat
+        at["fixed"][:] = at["flat"][:] = stepper.kernels.layout.flat
         at["reach"][:], at["damping"][:] = stepper.reach, stepper.damping.d
         at["friction"][:-1], at["restitution"][:-1] = table.friction, table.restitution
         at["other_restitution"][:], at["other_unit"][:] = rows.other_restitution, rows.other_unit

@@ -11,11 +11,12 @@ from functools import cache
 
 import numpy as np
 
-from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, NearPairs, Round
+from gauss.codegen.kernels import BlockContactSolver, ContactGraph, NearPairs
+from gauss.dynamics.contact.block_contact_laws import block_contact_laws
 from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, compiled_free_body_step, first_memory
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
-from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem, contact_solver
+from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
 from gauss.dynamics.contact.free_body_step_parts import BegunStep, FreeBodyStep
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
@@ -30,22 +31,6 @@ from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.errors import SimulationError
 from gauss.system import State, System
 
-# Newton steps with hardly any regularisation nearly always converge; where they cycle, much of it leads near the solution.
-ROUNDS = (
-    Round(0, 1e-7, 12),
-    Round(0, 1e-2, 30),
-    Round(0, 1e-4, 10),
-    Round(0, 1e-7, 10),
-    Round(30, 1e-3, 30),
-    Round(0, 1e-7, 10),
-    Round(100, 1e-2, 30),
-    Round(0, 1e-5, 10),
-    # Redundant contacts between which forces move far at small residuals: much regularisation stands still, little cycles.
-    Round(0, 1e-5, 30),
-    Round(0, 3e-6, 40),
-    Round(0, 1e-3, 20),
-    Round(0, 1e-5, 30),
-)
 UNSOLVED = 1e-3  # error of the laws, relative: beyond it the convex relaxation is solved
 REACH_MARGIN = 1.5  # of the distance that bodies approach within a step by their speeds before contact
 ATTEMPTS = 8  # steps with ever larger bounds of the speeds
@@ -372,10 +357,3 @@ def rates(near: NearContacts, twists: np.ndarray) -> np.ndarray:
 def block_contact_solver() -> BlockContactSolver:
     """Machine code of the contact problem: that of the step."""
     return BlockContactSolver(compiled_free_body_step(block_contact_laws()).code)
-
-
-@cache
-def block_contact_laws() -> BlockContactLaws:
-    """Laws of contact and friction of the block-sparse problem."""
-    laws = contact_solver()
-    return BlockContactLaws(laws.normal, laws.friction, laws.project_normal, laws.project_friction, ROUNDS)

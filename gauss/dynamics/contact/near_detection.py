@@ -25,7 +25,7 @@ from gauss.scene.patch_distances import patch_points
 from gauss.system import System
 
 FIRST_ROOM = 64  # contacts that there is room for at first
-MOST_LISTED = 4000  # pairs that are tried one by one; more are found by a grid
+MOST_LISTED_PAIRS = 4000  # pairs that are tried one by one; more are found by a grid
 
 
 class CandidatePairs(NamedTuple):
@@ -48,7 +48,7 @@ def candidate_pairs(system: System) -> CandidatePairs:
     """Pairs that the steps of a system look at."""
     table = ShapeTable(system)
     pairs = int(np.count_nonzero(np.triu(table.law)))
-    return CandidatePairs(len(table.parts), pairs, pairs > MOST_LISTED)
+    return CandidatePairs(len(table.parts), pairs, pairs > MOST_LISTED_PAIRS)
 
 
 class NearDetection:
@@ -69,7 +69,7 @@ class NearDetection:
         self.version = 0  # changes with the addresses of the arrays
         n = len(table.parts)
         self.law = np.ascontiguousarray(table.law)
-        is_listed = 0 < np.count_nonzero(self.law) <= 2 * MOST_LISTED  # each pair stands there twice
+        is_listed = 0 < np.count_nonzero(self.law) <= 2 * MOST_LISTED_PAIRS  # each pair stands there twice
         self.pair = np.column_stack(np.nonzero(np.triu(self.law))) if is_listed else np.zeros((0, 2), dtype=np.int64)
         self.grid = grid_room(0 if is_listed else n)
         self.body = np.column_stack([table.body, table.kind == KINDS.index(HalfSpace), table.kind]).astype(np.int64)

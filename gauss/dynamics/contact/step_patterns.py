@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms, SparseArrays
+from gauss.linked_groups import linked_groups
 
 
 class StepPatterns(NamedTuple):
@@ -63,24 +64,15 @@ def step_patterns(layout: SparseArrays, N: np.ndarray) -> StepPatterns:
     gathered = np.column_stack([column[i] * r + column[j], row[i] * len(M) + row[j]])
     C = np.eye(r, dtype=bool)
     C[column[i], column[j]] = True
-    of = _components(C)
-    members = [np.flatnonzero(of == one) for one in of]
+    least = linked_groups(r, zip(*np.nonzero(C), strict=True))
+    members = [np.flatnonzero(least == one) for one in least]
     z_begin, z_end = np.zeros((2, len(M)), dtype=np.int64)
     for one in np.unique(row):
         linked = column[row == one]
         z_begin[one], z_end[one] = linked.min(), 1 + max(members[k].max() for k in linked)
-    least = np.array([mine.min() for mine in members], dtype=np.int64)
     bodies, others = _bounds(J.any(axis=1)), _bounds(K)
     values = N[row, column]
     return StepPatterns(gathered, values[i] * values[j], _bounds(C)[0], least, z_begin, z_end, *bodies, *others)
-
-
-def _components(C: np.ndarray) -> np.ndarray:
-    """Number of the connected component (r,) of each coordinate."""
-    of = np.arange(len(C))
-    for i, j in zip(*np.nonzero(C), strict=True):
-        of[of == of[i]] = of[j]
-    return of
 
 
 def _bounds(differs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

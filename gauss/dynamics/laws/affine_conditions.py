@@ -10,11 +10,11 @@ from itertools import product
 import numpy as np
 
 from gauss.codegen import Expression, numbers_of, reachable
+from gauss.codegen.graph import COMPARISONS
 from gauss.dynamics.laws.intervals import Interval, enclose
 
 MOST_PIECES = 4  # of a function: a clipped one has three
 SAME_SLOPE = 1e-9  # relative difference of slopes below which rounding tells where lines meet
-COMPARISONS = ("less", "less_equal")
 
 Pieces = tuple[tuple[float, float], ...]  # of a function: value at the begin, and slope
 

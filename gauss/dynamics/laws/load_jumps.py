@@ -13,7 +13,7 @@ from gauss.scene.values import ConstantLaw
 from gauss.system import State, System
 
 SAMPLE_PLACES = np.array([-2.0, -1.0, 1.0, 2.0])  # places of samples beside a switching time, in distances of ends of steps
-TOGETHER = 32  # switching times: all operations of a law are kept for each
+TIMES_IN_A_PASS = 32  # switching times: all operations of a law are kept for each
 
 
 def first_jump(system: System, laws: Laws, start: State, end: float, times: np.ndarray) -> float:
@@ -29,8 +29,8 @@ def _traced(system: System, laws: Laws, start: State, times: np.ndarray, apart: 
     if laws.motion is None or not any(map(jumps, reachable(laws.outputs))):
         return np.inf
     states = start, generic_state(system, start)
-    for first in range(0, times.size, TOGETHER):
-        part = times[first : first + TOGETHER]
+    for first in range(0, times.size, TIMES_IN_A_PASS):
+        part = times[first : first + TIMES_IN_A_PASS]
         found = np.any([_jumps(_values(laws, state, part[:, None] + apart * SAMPLE_PLACES)) for state in states], axis=0)
         if found.any():
             return float(part[found][0])

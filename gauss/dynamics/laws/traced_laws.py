@@ -14,7 +14,7 @@ from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import BoundLoad, State, System, retract
 
 PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # times of comparison, in the time of the scene
-AGREEMENT = 1e-6  # relative: traced functions may have other round-off
+SAME_VALUE = 1e-6  # relative: traced functions may have other round-off
 PROBE_ROUNDOFF = 1e-12  # of the values at all probes, relative to the largest: poses at the end of a chain sum up round-off
 TRIAL_DISTANCE = 0.3  # distance of another state from the reference, in units of the coordinates
 UNTRACEABLE = ("TypeError: ", "TracerError: ")
@@ -176,7 +176,8 @@ def _agrees(law, traced: Function, motion: Kinematics, probe: Probe) -> bool:
     sizes = [max(np.abs(called).max(initial=0.0), np.abs(found).max(initial=0.0)) for called, found in pairs]
     floor = PROBE_ROUNDOFF * max(filter(np.isfinite, sizes), default=0.0)
     return not any(
-        (np.abs(called - found) > AGREEMENT * size + floor).any() for (called, found), size in zip(pairs, sizes, strict=True)
+        (np.abs(called - found) > SAME_VALUE * size + floor).any()
+        for (called, found), size in zip(pairs, sizes, strict=True)
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from gauss import rotations
 from gauss.errors import FileError, SceneError, UnphysicalInertiaWarning, did_you_mean, extra, listed
 from gauss.io.guard import Source
+from gauss.io.numbers import UNIT_VECTORS
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.joint_file import joint_file
 from gauss.io.urdf.link_tree import require_tree
@@ -25,7 +26,6 @@ from gauss.scene.body import unphysical
 with extra():
     import pinocchio as pin
 
-AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 ROOTS = ("fixed", "free")
 INERTIAS = ("physical", "as given")
 # Radius of gyration [m] of a point mass: exporters subtract m c² from moments about a joint, which leaves ± 2⁻⁵³ m c² of
@@ -184,8 +184,8 @@ def _kind(joint, name: str) -> tuple[str, dict]:
     """Kind and axis of a joint of Pinocchio."""
     short = joint.shortname().removeprefix("JointModel")
     for prefix, kind in (("RUB", "revolute"), ("R", "revolute"), ("P", "prismatic")):
-        if short.removeprefix(prefix) in AXES:
-            return kind, {"axis": AXES[short.removeprefix(prefix)]}
+        if short.removeprefix(prefix) in UNIT_VECTORS:
+            return kind, {"axis": UNIT_VECTORS[short.removeprefix(prefix)]}
     if short in ("RevoluteUnaligned", "RevoluteUnboundedUnaligned", "PrismaticUnaligned"):
         return short.partition("Un")[0].lower(), {"axis": _axis(joint)}
     kinds = {"FreeFlyer": "free", "Spherical": "ball", "Planar": "planar"}

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import inf, radians
 
 from gauss.errors import FileError, extra
+from gauss.io.numbers import UNIT_VECTORS
 from gauss.io.usd.bodies import body_of, moving_prims
 from gauss.io.usd.poses import GROUND_POSE, FramePose, StageUnits, number
 from gauss.scene import GROUND
@@ -12,18 +13,17 @@ with extra("usd"):
     from pxr import Usd, UsdPhysics
 
 Axis = tuple[float, float, float]
-AXES: dict[str, Axis] = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-FREEDOMS: tuple[str, ...] = tuple(f"{kind}{axis}" for kind in ("trans", "rot") for axis in AXES)
+FREEDOMS: tuple[str, ...] = tuple(f"{kind}{axis}" for kind in ("trans", "rot") for axis in UNIT_VECTORS)
 PAIRS_OF: dict[tuple[str, ...], tuple[str, Axis]] = {  # kind and axis by the freedoms that a D6 joint leaves
-    (): ("fixed", AXES["Z"]),
-    FREEDOMS: ("free", AXES["Z"]),
-    FREEDOMS[3:]: ("ball", AXES["Z"]),
-    **{(f"rot{name}",): ("revolute", axis) for name, axis in AXES.items()},
-    **{(f"trans{name}",): ("prismatic", axis) for name, axis in AXES.items()},
-    **{(f"trans{name}", f"rot{name}"): ("cylindrical", axis) for name, axis in AXES.items()},
-    ("transX", "transY", "rotZ"): ("planar", AXES["Z"]),
-    ("transX", "transZ", "rotY"): ("planar", AXES["Y"]),
-    ("transY", "transZ", "rotX"): ("planar", AXES["X"]),
+    (): ("fixed", UNIT_VECTORS["Z"]),
+    FREEDOMS: ("free", UNIT_VECTORS["Z"]),
+    FREEDOMS[3:]: ("ball", UNIT_VECTORS["Z"]),
+    **{(f"rot{name}",): ("revolute", axis) for name, axis in UNIT_VECTORS.items()},
+    **{(f"trans{name}",): ("prismatic", axis) for name, axis in UNIT_VECTORS.items()},
+    **{(f"trans{name}", f"rot{name}"): ("cylindrical", axis) for name, axis in UNIT_VECTORS.items()},
+    ("transX", "transY", "rotZ"): ("planar", UNIT_VECTORS["Z"]),
+    ("transX", "transZ", "rotY"): ("planar", UNIT_VECTORS["Y"]),
+    ("transY", "transZ", "rotX"): ("planar", UNIT_VECTORS["X"]),
 }
 
 
@@ -88,9 +88,9 @@ def _end(joint: Usd.Prim, targets, at, turned, bodies: dict[str, Usd.Prim], unit
 def _kind(prim: Usd.Prim, units: StageUnits) -> tuple:
     """Kind, axis, limits and name of the drive."""
     if prim.IsA(UsdPhysics.FixedJoint):
-        return "fixed", AXES["Z"], None, ""
+        return "fixed", UNIT_VECTORS["Z"], None, ""
     if prim.IsA(UsdPhysics.SphericalJoint):
-        return "ball", AXES["Z"], None, ""
+        return "ball", UNIT_VECTORS["Z"], None, ""
     for schema, kind, drive in (
         (UsdPhysics.RevoluteJoint, "revolute", "angular"),
         (UsdPhysics.PrismaticJoint, "prismatic", "linear"),
@@ -98,7 +98,7 @@ def _kind(prim: Usd.Prim, units: StageUnits) -> tuple:
         if prim.IsA(schema):
             joint = schema(prim)
             low, high = number(prim, joint.GetLowerLimitAttr(), inf), number(prim, joint.GetUpperLimitAttr(), inf)
-            return kind, AXES[joint.GetAxisAttr().Get()], limits_of(prim, low, high, kind, units), drive
+            return kind, UNIT_VECTORS[joint.GetAxisAttr().Get()], limits_of(prim, low, high, kind, units), drive
     if prim.GetTypeName() != "PhysicsJoint":
         raise FileError(f"{prim.GetPath()}: a joint of type {prim.GetTypeName()} is not modelled.")
     return _by_freedoms(prim, units)

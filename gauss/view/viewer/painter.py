@@ -14,7 +14,7 @@ from gauss.view.style import COLOURS, INK
 from gauss.view.viewer.forms import BodyMesh, forms, size
 from gauss.view.viewer.framing import FIELD, framing
 from gauss.view.viewer.shown import Shown
-from gauss.view.viewer.stage import own_colour, rgb
+from gauss.view.viewer.stage import ARROW, own_colour, rgb
 from gauss.view.viewer.touches import TouchingPoint, touches
 
 DPI = 100
@@ -25,7 +25,7 @@ SHADE = 0.5  # brightness of what no light falls on
 TOP, BOTTOM = np.array([214, 224, 236]), np.array([250, 250, 251])  # colours of the background
 SHADOW, GRID, TRACE = "#dde1e7", "#d3d8df", 1.6  # colours of shadow and floor, width of a trace [points]
 CELLS = 10  # of the floor, over all that is seen
-ARROW, ARROWS = 0.35, ("#C81E1E", "#EB7814")  # longest arrow, of the size of the mechanism; reactions and contact forces
+ARROWS = ("#C81E1E", "#EB7814")  # of reactions and contact forces
 
 
 @dataclass(frozen=True)

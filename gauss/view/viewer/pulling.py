@@ -9,6 +9,7 @@ import copy
 import numpy as np
 
 from gauss.dynamics.kinematics import kinematics
+from gauss.rotations import AXIS_NAMES
 from gauss.scene import Force, Input, Scene
 from gauss.simulation import Simulator
 from gauss.system import State
@@ -17,7 +18,7 @@ FREQUENCY = 12.0  # ω of the point on its spring [rad/s]
 DAMPING = 0.7  # ζ
 HEAVIEST = 20.0  # mass of the spring over that of the point: 2 ζ ω · 20 · 2 ms stays below 1
 LEAST_ANSWER = 1e-9  # m/s in a step of 1 ms: a point that answers less does not move
-AXES, WRENCH = ("x", "y", "z"), 6  # inputs of a pull: force and moment
+WRENCH = 6  # inputs of a pull: force and moment
 
 
 class BodyPull:
@@ -74,7 +75,7 @@ class BodyPull:
 def pull_simulator(scene: Scene, body: str, step: float) -> Simulator:
     """Simulator of a scene with a force at the centre of mass of a body and a moment on it as its last six inputs."""
     pulled = copy.deepcopy(scene)
-    units = [(axis, tuple(unit)) for axis, unit in zip(AXES, np.eye(3), strict=True)]
+    units = [(axis, tuple(unit)) for axis, unit in zip(AXIS_NAMES, np.eye(3), strict=True)]
     loads = [Force(f"pull {axis}", body, force=unit) for axis, unit in units]
     loads += [Force(f"turn {axis}", body, moment=unit) for axis, unit in units]
     for load in loads:

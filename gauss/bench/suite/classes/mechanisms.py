@@ -13,8 +13,8 @@ from gauss.errors import NotImportedWarning
 from gauss.io import load
 from gauss.system import System, random_state
 
-AXES = ("ax", "ay", "az")
-TURNS = ("alpha_x", "alpha_y", "alpha_z")
+LINEAR = ("ax", "ay", "az")
+ANGULAR = ("alpha_x", "alpha_y", "alpha_z")
 
 
 def of_compulsion(
@@ -27,7 +27,7 @@ def of_compulsion(
         names = {"variables": tuple(f"joint{i}.acceleration" for i in range(n)), "units": ("rad/s² or m/s²",) * n}
     else:
         names = {
-            "variables": tuple(f"{body}.{axis}" for body in compulsion.structure.bodies for axis in (*TURNS, *AXES)),
+            "variables": tuple(f"{body}.{axis}" for body in compulsion.structure.bodies for axis in (*ANGULAR, *LINEAR)),
             "units": ((units[0],) * 3 + (units[1],) * 3) * (n // 6),
         }
     return programme(name, kind, story, found.H, found.c, A=found.C, b=found.d, G=found.K, h=found.k, **names)
