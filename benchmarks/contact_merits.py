@@ -5,9 +5,10 @@ Run it with:
     python -m benchmarks.contact_merits [--only SCENE]
 
 Every figure is the worst over all steps and contacts of a motion. gauss repeats the steps of its time stepping one by one:
-forces are means over a step, rates those at its end, gaps those that the rates give at its end. MuJoCo is asked at the end
-of each ``mj_step``: its forces, rates and gaps are those of that instant. Its model is that of ``gauss.save``: contacts as
-stiff as its step bears, RK4, elliptic friction cones, Newton solver.
+forces are means over a step, rates those at its end, gaps those that the rates give at its end, before positions are
+projected; penetration is that of the states. MuJoCo is asked at the end of each ``mj_step``: its forces, rates and gaps are
+those of that instant. Its model is that of ``gauss.save``: contacts as stiff as its step bears, RK4, elliptic friction
+cones, Newton solver.
 
 | figure | of contacts with force f, rate u, gap g, least mass m of the bodies, step h |
 |---|---|
@@ -39,6 +40,7 @@ from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
 from gauss.dynamics.contact.asleep_bodies import BodySleepers
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
+from gauss.dynamics.contact.gap_laws import gap_after
 from gauss.system import State
 
 STEP, g = 1e-3, 9.81
@@ -66,8 +68,8 @@ class Recorder(FreeBodyStepper):
     """Steps of free bodies that keep the rates and gaps at which their laws hold."""
 
     def _changed_modes(self, near, begun, known, force, reached, work, h, share):
-        rate = reached + (1.0 - share) * h * near.bias
-        self.reached = rate, near.gap + (1.0 - share) * h * rate[:, 0]
+        time = (1.0 - share) * h
+        self.reached = reached + time * near.bias, gap_after(near.gap, reached[:, 0], near.bias[:, 0], time)
         return super()._changed_modes(near, begun, known, force, reached, work, h, share)
 
 

@@ -23,7 +23,8 @@ from gauss.codegen.kernels.first_accepted import FirstAccepted
 from gauss.codegen.kernels.fixed_point import FixedPoint
 from gauss.codegen.kernels.fixed_step import Due, Fixed, Notes
 from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, FixedStepBatchLoop
-from gauss.codegen.kernels.free_body_step import CompiledFreeBodyStep, FreeBodyFunctions
+from gauss.codegen.kernels.free_body_poses import FreeBodyFunctions
+from gauss.codegen.kernels.free_body_step import CompiledFreeBodyStep
 from gauss.codegen.kernels.free_motion import STIFF_DAMPING, implicit_inertia
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
 from gauss.codegen.kernels.mechanism_loop import CallingSteps, CompiledSteps

@@ -43,7 +43,9 @@ class ActiveContacts:
         removal = r.maximum(s["h"], s["removal"])
         with r.each(m + g) as i:
             closed = r.choose(s["removal"] > 0.0, self.at["force"][i], 0.0)
-            given = self.at["gap"][i], self.at["rate"][i], s["h"], s["rest"], s["share"], removal, closed
+            (left,) = r.inline(self.functions.to_close, self.at["gap"][i], self.at["bias"][i], s["h"] * self.at.remaining)
+            gap = r.choose(s["removal"] > 0.0, self.at["gap"][i], left)
+            given = gap, self.at["rate"][i], s["h"], s["rest"], s["share"], removal, closed
             (plastic,) = r.inline(self.functions.plastic, *given)
             (elastic,) = r.inline(self.functions.elastic, *given[:2], self.at["e"][i], *given[2:])
             self.at["after"][i] = self.at["after"][i] - r.choose(self.at["e"][i] > 0.0, elastic, plastic)

@@ -5,117 +5,28 @@ finished here: where pairs of kinds of shapes are met for the first time, arrays
 bodies asleep are pushed.
 """
 
-from dataclasses import dataclass
-
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function
-from gauss.codegen.kernels.arrays import Routine, Value
+from gauss.codegen import INTEGER, POINTER
+from gauss.codegen.kernels.arrays import Array, Value
 from gauss.codegen.kernels.asleep import pushes_asleep
-from gauss.codegen.kernels.block_contacts import CONTACT, ELIMINATED, MASS, BlockContactLaws, write_block_contacts
+from gauss.codegen.kernels.block_contacts import CONTACT, write_block_contacts
 from gauss.codegen.kernels.block_lu import write_order
-from gauss.codegen.kernels.contact_islands import ISLANDS, ContactIslands
 from gauss.codegen.kernels.contact_modes import SLIDING, STICKING, ContactModes
+from gauss.codegen.kernels.free_body_poses import (
+    COORDINATES,
+    FREE_BODIES,
+    RATES,
+    STEP,
+    BodiesOfStep,
+    FreeBodyFunctions,
+    write_parts,
+)
 from gauss.codegen.kernels.mechanism_loop import CompiledSteps
-from gauss.codegen.kernels.near_pairs import BODY, INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS, ROW, parts_of, write_near
-from gauss.codegen.kernels.step_memory import (
-    CHANGE,
-    CHANGES_ROOM,
-    FINISHED,
-    IMPACT,
-    LOOP_SETTINGS,
-    REPEATED,
-    RESULTS,
-    MemoryLayout,
-    StepMemory,
-)
-from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH
-
-SIZES = ("n_q", "n_v", "n", "bodies", "parts", "pairs", "capacity", "blocks", "laws", "constants", "sleepers")
-ADDRESSES = (
-    *NEAR_INTEGERS,
-    *NEAR_NUMBERS,
-    *("known_found", "known_count", "status", "q_start", "v_start"),
-    *("touching", "ordered", "within", "ordered_count", "slot", "order", "start", "list", "degree", "needed"),
-    *ISLANDS,
-    *("modes", "next_modes", "closed", "fresh", "counts"),
-)
-SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "unit", "tolerance", "unsolved", "removal")
-POSE, COORDINATES, RATES = 24, 7, 6  # pose and velocities of a body, coordinates and rates of its joint
-
-
-def slots(n: dict[str, int]) -> dict[str, int]:
-    """Lengths of the arrays of working memory by name."""
-    bodies, m = n["n"], n["capacity"]
-    return {
-        "settings": len(SETTINGS),
-        "results": len(RESULTS),
-        "q": n["n_q"],
-        "v": n["n_v"],
-        "end_q": n["n_q"],
-        "end_v": n["n_v"],
-        "own": n["n_v"],
-        "loop": len(LOOP_SETTINGS),
-        "work": 3,
-        "constants": bodies * n["constants"],
-        "gravity": 3,
-        "reach": bodies,
-        "bodies": POSE * n["bodies"],
-        "at": COORDINATES * bodies,
-        "mass": MASS * bodies,
-        "first": WIDTH * bodies,
-        "free": WIDTH * bodies,
-        "added": WIDTH * bodies,
-        "expected": SIX * bodies,
-        "friction": n["laws"] + 1,
-        "restitution": n["laws"] + 1,
-        "hit": n["laws"],
-        "lost": n["laws"],
-        "changes": CHANGE * (CHANGES_ROOM + 2 * n["laws"]),
-        "J": CONTACT * m,
-        "before": 3 * m,
-        "after": 3 * m,
-        "b": 3 * m,
-        "mu": m,
-        "f": 3 * m,
-        "known": 3 * m,
-        "island:mass": MASS * bodies,
-        "island:added": WIDTH * bodies,
-        "A": BLOCK * n["blocks"],
-        "room": (9 + ELIMINATED) * m + WIDTH * bodies,
-        "result": 3,
-    }
-
-
-FREE_BODIES = MemoryLayout(SIZES, ADDRESSES, slots)
-
-
-@dataclass(frozen=True, eq=False)
-class FreeBodyFunctions:
-    """Traced functions of a step.
-
-    Parameters
-    ----------
-    place : Function
-        As of :class:`gauss.codegen.kernels.NearPairs`.
-    begin, end : Function
-        Of one body, as of :class:`gauss.dynamics.contact.free_bodies.FreeBodyKernels`.
-    laws : BlockContactLaws
-        Laws of contact and friction.
-    impact, plastic, elastic : Function
-        As of :class:`gauss.codegen.kernels.StepFunctions`.
-    rest_steps : float
-        Steps: a gap that closes no faster than by its acceleration in so many is at rest, without impact.
-    """
-
-    place: Function
-    begin: Function
-    end: Function
-    laws: BlockContactLaws
-    impact: Function
-    plastic: Function
-    elastic: Function
-    rest_steps: float
+from gauss.codegen.kernels.near_pairs import ROW, write_near
+from gauss.codegen.kernels.position_projection import DOUBT, write_position_projection
+from gauss.codegen.kernels.step_memory import FINISHED, IMPACT, LOOP_SETTINGS, REPEATED, RESULTS
+from gauss.codegen.kernels.vectors import SIX, WIDTH
 
 
 class _PointModes(ContactModes):
@@ -144,98 +55,43 @@ class _PointModes(ContactModes):
         self._compare()
 
 
-class _FreeBodyStepWriter:
+class _FreeBodyStepWriter(BodiesOfStep):
     def __init__(self, functions: FreeBodyFunctions, module: ir.Module):
-        self.functions, self.module = functions, module
-        self.near, order = write_near(functions.place, module), write_order(module)
-        solver = write_block_contacts(functions.laws, module)
-        r = self.r = Routine(ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGERS, INTEGERS, POINTER]), "step"))
-        self.at = StepMemory(r, r.arrays, FREE_BODIES)
-        self.settings = {name: self.at["settings"][k] for k, name in enumerate(SETTINGS)}
-        self.at.settings = self.settings
-        self.islands = ContactIslands(self.at, order, solver)
+        shared = write_near(functions.place, module), write_order(module), write_block_contacts(functions.laws, module)
+        shared = *shared, *write_parts(functions, shared, module)
+        self.project = write_position_projection(functions, shared, module)
+        super().__init__(functions, shared, ir.Function(module, STEP, "step"))
         self.remaining = self.settings["share"] * -1.0 + 1.0
         self.status, self.modes = self.at.table("status"), _PointModes(self.at, functions.impact)
 
     def write(self) -> ir.Function:
         r, s, at = self.r, self.settings, self.at
         self.status[0] = REPEATED
-        with r.each(at.n["n"]) as k:
-            self._begin(k)
-        speed = r.maximum(self._speed(None), self._speed("free"))
+        r.call(self.shared[0], *r.arrays)
+        speed = r.maximum(self.speed(None), self.speed("free"))
         at.table("near_settings", POINTER)[0] = s["margin"] * 2.0 * self.remaining * s["h"] * speed
-        self._find()
+        self.find()
         count = at.table("count")
         m = count[0]
         with r.when(~((count[1] > 0) | (count[2] > 0) | (m > at.n["capacity"]))):
             with r.each(m) as c:
-                self._touch(c)
-            self.islands.divide(m)
+                self.touch(c)
+                self._keep_curvature(c, s["curved"] * speed * speed)
+            r.call(self.shared[1], *r.arrays)
             self._known(m)
             with r.each(m) as c:
                 self._row(c)
             with r.when(~(self._impact(m) > 0.0)):
                 solved = self.islands.solve()
-                with r.when(solved & (self._speed("added") <= s["margin"] * speed)), r.when(~(self._wakes(m) > 0)):
+                with r.when(solved & (self.speed("added") <= s["margin"] * speed)), r.when(~(self._wakes(m) > 0)):
                     self._finish(m)
         return r.done()
 
-    def _begin(self, k: Value):
-        """Pose, velocities, free accelerations and inertia of a body after the share of the step."""
-        at, s, n = self.at, self.settings, self.at.n
-        q, v, own = self._joint("q", k, COORDINATES), self._joint("v", k, RATES), at["constants"].after(k * n["constants"])
-        constants = len(self.functions.begin.inputs) - COORDINATES - RATES - 3 - SIX - 2
-        given = [*q, *v, *(own[i] for i in range(constants)), *(at["gravity"][i] for i in range(3))]
-        given += [at["expected"][k * SIX + i] for i in range(SIX)]
-        found = self.r.inline(self.functions.begin, *given, s["h"], s["share"])
-        for i in range(COORDINATES):
-            at["at"][k * COORDINATES + i] = found[i]
-        pose = found[COORDINATES : COORDINATES + POSE]
-        for i, value in enumerate(pose):
-            at["bodies"][n["bodies"] * i + k] = value
-        rest = found[COORDINATES + POSE :]
-        for i in range(SIX):
-            at["first"][k * WIDTH + i] = pose[12 + i]
-            at["free"][k * WIDTH + i] = pose[12 + i] + s["h"] * rest[i]
-            at["added"][k * WIDTH + i] = 0.0
-        for i in range(18):
-            at["mass"][k * MASS + i] = rest[SIX + i]
-        at["mass"][k * MASS + 18] = own[constants - 1]
-        at["mass"][k * MASS + 19] = self.r.number(1.0) / own[constants - 1]
-
-    def _joint(self, name: str, k: Value, count: int) -> list[Value]:
-        start = self.at.table(f"{name}_start")[k]
-        return [self.at[name][start + i] for i in range(count)]
-
-    def _twist(self, name: str | None, k: Value) -> list[Value]:
-        """Velocities (6,) of a body before the step, after it without contacts ("free"), and with them ("added")."""
-        first = self.at["first" if name is None else "free"].after(k * WIDTH)
-        return [first[i] + self.at["added"][k * WIDTH + i] if name == "added" else first[i] for i in range(SIX)]
-
-    def _speed(self, name: str | None) -> Value:
-        """Largest speed of a point of a shape."""
-        r, largest = self.r, self.r.variable(0.0)
-        with r.each(self.at.n["n"]) as k:
-            x = self._twist(name, k)
-            turning, moving = (r.square_root(a * a + b * b + c * c) for a, b, c in (x[:3], x[3:]))
-            largest[0] = r.maximum(moving + turning * self.at["reach"][k], largest[0])
-        return largest[0]
-
-    def _find(self):
-        at, n = self.at, self.at.n
-        integers = [at.table(name) for name in NEAR_INTEGERS]
-        others = [at.table(name, POINTER) for name in NEAR_NUMBERS]
-        self.r.call(self.near, n["parts"], n["pairs"], n["capacity"], n["bodies"], *integers, at["bodies"], *others)
-
-    def _touch(self, c: Value):
-        """Bodies of a contact that move, −1 for others."""
-        at = self.at
-        found, touching, body = (at.table(name) for name in ("found", "touching", "body"))
-        for side, part in enumerate(parts_of(found[c * 2], at.n["parts"])):
-            column = body[part * BODY]
-            touching[c * 2 + side] = -1
-            with self.r.when(column < at.n["n"]):
-                touching[c * 2 + side] = column
+    def _keep_curvature(self, c: Value, most: Value):
+        """Second derivative of a gap, or none where features are so nearly parallel that it tells nothing of a step."""
+        row = self.at.table("rows", POINTER).after(c * ROW)
+        with self.r.when(self.r.absolute(row[52]) > most):
+            row[52] = 0.0
 
     def _row(self, c: Value):
         """Jacobian, relative velocities and friction of a contact at its place in islands, velocities to be reached."""
@@ -245,8 +101,9 @@ class _FreeBodyStepWriter:
         first, free = self._rates(c, None), self._rates(c, "free")
         law = at.table("law")[p] - 1
         at["mu"][place], e = at["friction"][law], at["restitution"][law]
-        gap = row[0]
         closed = r.choose(s["removal"] > 0.0, at["f"][place * 3], 0.0)
+        (left,) = r.inline(self.functions.to_close, row[0], row[52], self._time())
+        gap = r.choose(s["removal"] > 0.0, row[0], left)
         given = gap, first[0], s["h"], s["rest"], s["share"], r.maximum(s["h"], s["removal"]), closed
         (plastic,) = r.inline(self.functions.plastic, *given)
         (elastic,) = r.inline(self.functions.elastic, *given[:2], e, *given[2:])
@@ -267,7 +124,7 @@ class _FreeBodyStepWriter:
         for side in range(2):
             body = at.table("touching")[c * 2 + side]
             with r.when(body >= 0):
-                twist = self._twist(name, body)
+                twist = self.twist(name, body)
                 for q in range(3):
                     J = at["J"].after(self.islands.contact[c] * CONTACT + (side * 3 + q) * WIDTH)
                     total = found[q][0]
@@ -275,6 +132,14 @@ class _FreeBodyStepWriter:
                         total = total + J[i] * twist[i]
                     found[q][0] = total
         return [entry[0] for entry in found]
+
+    def _time(self) -> Value:
+        """Time from the bodies' present poses to the end of the step."""
+        return self.settings["h"] * self.remaining
+
+    def _gap_after(self, row: Array, rate: Value) -> Value:
+        """Gap at the end of the step, by its rate at its present one."""
+        return self.r.inline(self.functions.gap_after, row[0], rate, row[52], self._time())[0]
 
     def _hits(self, c: Value) -> Value:
         """Whether a gap has an impact in the rest of the step."""
@@ -333,9 +198,10 @@ class _FreeBodyStepWriter:
             self._end(k)
         with r.when(at["loop"][LOOP_SETTINGS.index("recorded")] > 0.0):
             self.modes.write_points(m, self._hits, lambda c: self._rates(c, "added"), self._drift)
-        found, known = at.table("found"), at.table("known_found")
+        found, known, depths = at.table("found"), at.table("known_found"), _Depths(self)
         with r.each(m) as c:
             u = self._rates(c, "added")
+            depths.take(c, u[0])
             known[c * 2], known[c * 2 + 1] = found[c * 2], found[c * 2 + 1]
             for q in range(3):
                 force = at["f"][self.islands.contact[c] * 3 + q] / s["h"]
@@ -345,13 +211,17 @@ class _FreeBodyStepWriter:
         for name, value in (("power0", 0.0), ("power1", 0.0), ("power2", power[0] * -0.5), ("doubtful", 0.0)):
             at["results"][RESULTS.index(name)] = value
         self.status[0] = FINISHED
+        deepest = depths.deepest()
+        with r.when(deepest > s["accepted"]):
+            self.set("deepest", deepest)
+            r.call(self.project, *r.arrays)
 
     def _end(self, k: Value):
         at, s = self.at, self.settings
         q, own = at["at"].after(k * COORDINATES), at["constants"].after(k * at.n["constants"])
-        first, last = self._twist(None, k), self._twist("added", k)
+        first, last = self.twist(None, k), self.twist("added", k)
         constants = len(self.functions.end.inputs) - COORDINATES - RATES - SIX - 2
-        given = [*(q[i] for i in range(COORDINATES)), *self._joint("v", k, RATES), *(own[i] for i in range(constants))]
+        given = [*(q[i] for i in range(COORDINATES)), *self.joint("v", k, RATES), *(own[i] for i in range(constants))]
         given += [b - a for a, b in zip(first, last, strict=True)]
         found = self.r.inline(self.functions.end, *given, s["h"], s["share"])
         starts = at.table("q_start")[k], at.table("v_start")[k]
@@ -363,6 +233,29 @@ class _FreeBodyStepWriter:
         for i in range(SIX):
             acceleration = at["added"][k * WIDTH + i] / s["h"]
             at["expected"][k * SIX + i] = self.r.choose(s["share"] > 0.0, acceleration, 0.0)
+
+
+class _Depths:
+    """Deepest penetration at the end of a step: its rates tell it, unless an impact changed what curves the gaps."""
+
+    def __init__(self, step: _FreeBodyStepWriter):
+        self.step, r = step, step.r
+        self.found, self.doubted, self.hit = r.variable(0.0), r.variable(0.0), r.variable(0.0)
+
+    def take(self, c: Value, rate: Value):
+        """Take a contact by its rate after the step."""
+        step, r = self.step, self.step.r
+        row = step.at.table("rows", POINTER).after(c * ROW)
+        gap = step._gap_after(row, rate)
+        self.found[0] = r.maximum(gap * -1.0, self.found[0])
+        with r.when(~(step.settings["share"] > 0.0)):
+            (less,) = r.inline(step.functions.gap_after, gap, r.number(0.0), r.absolute(row[52]) * -DOUBT, step._time())
+            self.doubted[0] = r.maximum(less * -1.0, self.doubted[0])
+            self.hit[0] = r.maximum(step._hits(c), self.hit[0])
+
+    def deepest(self) -> Value:
+        """Depth of all contacts [m]."""
+        return self.step.r.choose(self.hit[0] > 0.0, self.doubted[0], self.found[0])
 
 
 class CompiledFreeBodyStep(CompiledSteps):

@@ -40,6 +40,8 @@ class StepFunctions:
     plastic, elastic : Function
         (gap, rate, h, rest, share, removal, closed), the latter with the coefficient of restitution after the rate → least
         rate.
+    to_close : Function
+        (gap, its second derivative, time) → the gap that would be left if its rate were zero then.
     """
 
     place: Function
@@ -47,6 +49,7 @@ class StepFunctions:
     impact: Function
     plastic: Function
     elastic: Function
+    to_close: Function
 
 
 class _StepWriter:

@@ -8,10 +8,10 @@ import numpy as np
 from gauss.codegen import from_disk
 from gauss.codegen.kernels import CompiledFreeBodyStep, FreeBodyFunctions
 from gauss.codegen.kernels.contact_islands import ISLANDS
-from gauss.codegen.kernels.free_body_step import FREE_BODIES, SETTINGS
+from gauss.codegen.kernels.free_body_poses import FREE_BODIES, SETTINGS
 from gauss.dynamics.contact.compiled_step_memory import CompiledStepMemory
 from gauss.dynamics.contact.free_bodies import CONSTANTS, begin_function, end_function, place_function
-from gauss.dynamics.contact.gap_laws import REST_STEPS, laws_of_gaps
+from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_prediction, laws_of_gaps
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.dynamics.contact.paradox import SLIDING as SLIDING_SPEED
 from gauss.dynamics.contact.shape_table import MOST_FEATURES
@@ -120,7 +120,7 @@ def compiled_free_body_step(laws) -> CompiledFreeBodyStep:
     """Machine code, made once on a machine."""
 
     def make() -> CompiledFreeBodyStep:
-        functions = place_function(), begin_function(), end_function(), laws, *laws_of_gaps(), REST_STEPS
+        functions = place_function(), begin_function(), end_function(), laws, *laws_of_gaps(), gap_prediction(), REST_STEPS
         return CompiledFreeBodyStep(FreeBodyFunctions(*functions))
 
     return from_disk((CompiledFreeBodyStep, laws.rounds, laws.rounds_of_many, laws.many), make)

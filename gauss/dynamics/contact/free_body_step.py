@@ -19,13 +19,14 @@ from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, mode
 from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
 from gauss.dynamics.contact.free_body_step_parts import BegunStep, FreeBodyStep
-from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
+from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
 from gauss.dynamics.contact.moreau_step import MIDPOINT
 from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
 from gauss.dynamics.contact.near_detection import NearDetection
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP, penetration_error
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
+from gauss.dynamics.contact.position_projection import ACCEPTED_DEPTH, depth_after, without_penetration
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.errors import SimulationError
 from gauss.system import State, System
@@ -33,6 +34,8 @@ from gauss.system import State, System
 UNSOLVED = 1e-3  # error of the laws, relative: beyond it the convex relaxation is solved
 REACH_MARGIN = 1.5  # of the distance that bodies approach within a step by their speeds before contact
 ATTEMPTS = 8  # steps with ever larger bounds of the speeds
+# Of speed² over the least radius of a body: second derivatives of gaps are of that size, unless edges are nearly parallel.
+MOST_CURVED = 4.0
 TWIST = 8  # doubles of a row of velocities
 
 
@@ -74,6 +77,8 @@ class FreeBodyStepper:
             "tolerance": LAW_TOLERANCE,
             "unsolved": UNSOLVED,
             "removal": removal,
+            "curved": MOST_CURVED / min(self.reach[self.reach > 0.0], default=np.inf),
+            "accepted": np.inf if removal else ACCEPTED_DEPTH * system.scale.length,
         }
         self.memory = first_memory(self, block_contact_laws(), self.settings)
         self.forget()
@@ -147,7 +152,7 @@ class FreeBodyStepper:
         """
         for share in self.shares:
             begun = self.begin(state, h, share)
-            speed = max(self._speed(begun.both[..., k]) for k in range(2))
+            speed = max(self.speed(begun.both[..., k]) for k in range(2))
             near = self._near(state, begun, speed, h, share)
             known = rates(near, begun.both)
             if share == self.shares[-1] or not self._impacts(near, begun, known, h, share).any():
@@ -156,7 +161,7 @@ class FreeBodyStepper:
             force, added, error = self._solve(near, begun, known, h, share)
             after = begun.both[..., 1].copy()
             after[: self.n, :6] += added
-            reached = self._speed(after)
+            reached = self.speed(after)
             if reached <= REACH_MARGIN * speed:
                 break
             speed = reached
@@ -173,6 +178,10 @@ class FreeBodyStepper:
         reached_rates = rates(near, after[..., None])[..., 0]
         work = force * (known[..., 0] + reached_rates)
         modes = self._changed_modes(near, begun, known, force, reached_rates, work, h, share)
+        hit = not share and bool(self._impacts(near, begun, known, h, share).any())
+        depth = depth_after(near, reached_rates[:, 0], h * (1.0 - share), hit)
+        if depth > self.settings["accepted"]:
+            found = without_penetration(self, State(state.t + h, *found), h, depth), found[1]
         return FreeBodyStep(*found, near, force, np.array([0.0, 0.0, -0.5 * work.sum()]), error, [], modes)
 
     def _changed_modes(
@@ -200,7 +209,7 @@ class FreeBodyStepper:
         mass[:, :18], mass[:, 18], mass[:, 19] = inertia.T, self.given[27], 1.0 / self.given[27]
         return BegunStep(at, np.concatenate([bodies, self.fixed], axis=1), both, mass, state.v)
 
-    def _speed(self, twists: np.ndarray) -> float:
+    def speed(self, twists: np.ndarray) -> float:
         """Largest speed of a point of a shape [m/s]."""
         turning, moving = (np.sqrt((part * part).sum(axis=1)) for part in (twists[: self.n, :3], twists[: self.n, 3:6]))
         return float((moving + turning * self.reach).max())
@@ -209,7 +218,9 @@ class FreeBodyStepper:
         """Contacts that may close within the rest of the step."""
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         near, overlaps = self.detection.find(begun.bodies, reach, UNSEEN_OVERLAP)
-        return confirmed(near, overlaps, self.table, state.t)
+        near = confirmed(near, overlaps, self.table, state.t)
+        near.bias[np.abs(near.bias[:, 0]) > self.settings["curved"] * speed * speed, 0] = 0.0
+        return near
 
     def _impacts(self, near: NearContacts, begun: BegunStep, known: np.ndarray, h: float, share: float) -> np.ndarray:
         before, after = known[:, 0].T
@@ -238,6 +249,13 @@ class FreeBodyStepper:
         f, added = self._dense(near, begun, bodies, b / unit, f / unit, friction)
         return f * unit / h, added * unit, None
 
+    def pushed_apart(self, near: NearContacts, begun: BegunStep, b: np.ndarray) -> np.ndarray | None:
+        """Velocities (n, 6) that contacts without friction add to relative velocities b (m, 3); None if none are found."""
+        graph = block_contact_solver().graph(self.n, np.where(near.bodies < self.n, near.bodies, -1))
+        scale, m = self.system.scale.length / self.system.scale.time + np.abs(b).max(), near.gap.size
+        _, added, (left, *_) = graph.solve(near.J, begun.mass, b, np.zeros(m), np.zeros((m, 3)), LAW_TOLERANCE * scale)
+        return added if left <= UNSOLVED * scale else None
+
     def without_forces(self, near: NearContacts, begun: BegunStep, known: np.ndarray, h: float, share: float) -> np.ndarray:
         """Relative velocities (m, 3) after a step without contact forces, less the least that gaps may have.
 
@@ -250,12 +268,14 @@ class FreeBodyStepper:
         h, share : float
             Step [s], and the share of it that the bodies have moved.
         """
-        b, before, rest = known[..., 1] + (h * (1.0 - share)) * near.bias, known[:, 0, 0], self._rest(begun)
+        time, before, rest = h * (1.0 - share), known[:, 0, 0], self._rest(begun)
+        b, curved = known[..., 1] + time * near.bias, near.bias[:, 0]
+        width = near.gap if self.removal else gap_to_close(near.gap, curved, time)
         restitution, closed = self.table.restitution[near.law], self._start(near)[:, 0] * (self.removal > 0.0)
         for e in self.coefficients:
             mine = slice(None) if len(self.coefficients) == 1 else restitution == e
             given = h, rest, share, max(h, self.removal)
-            b[mine, 0] -= least_rate(near.gap[mine], before[mine], float(e), *given, closed[mine])
+            b[mine, 0] -= least_rate(width[mine], before[mine], float(e), *given, closed[mine])
         return b
 
     def _dense(self, near: NearContacts, begun: BegunStep, bodies, b, f, friction):

@@ -1,10 +1,11 @@
 """Laws of a gap over one step: whether it has an impact, and the least rate that it may have afterwards.
 
-A gap d that would close within a step closes at its end, ḋ⁺ ≥ −d/((1 − s) h). Penetration is removed with ḋ⁺ ≥ −d/τ. In
-steps of one length τ is the step. Where steps become shorter, that speed would grow without bound, and bodies that penetrate
-a little would jump apart: then τ is a time of the scene, in which the gap closes exponentially, whatever the steps. What is
-left of a gap that stays closed vanishes in the same time: if it closed at the end of each step, curved gaps would make the
-rates alternate in proportion to the step.
+A gap d that would close within a step closes at its end, ḋ⁺ ≥ −d/((1 − s) h). In steps of one length d is what would be left
+at ḋ⁺ = 0, by the second derivative as well, so that bodies rocking on an edge do not penetrate. Penetration is removed with
+ḋ⁺ ≥ −d/τ. In steps of one length τ is the step. Where steps become shorter, that speed would grow without bound, and bodies
+that penetrate a little would jump apart: then τ is a time of the scene, in which the gap closes exponentially, whatever the
+steps. What is left of a gap that stays closed vanishes in the same time: if it closed at the end of each step, curved gaps
+would make the rates alternate in proportion to the step.
 """
 
 from gauss import math
@@ -53,15 +54,31 @@ def least_rate(width, rate, restitution: Scalar, h, rest, share, removal, closed
     return math.where(hit > share, -restitution * rate, shut)
 
 
+def gap_after(width, rate, curvature, time):
+    """Gap after a time, from its rate and its second derivative; numbers, arrays or expressions."""
+    return width + time * (rate + 0.5 * time * curvature)
+
+
+def gap_to_close(width, curvature, time):
+    """Gap after a time at whose end its rate is zero: what is left to close; numbers, arrays or expressions."""
+    return gap_after(width, -time * curvature, curvature, time)
+
+
 def removal_time(system: System) -> float:
     """Time in which penetration is removed where steps have many lengths [s]."""
     return REMOVAL * system.scale.time
 
 
-def laws_of_gaps() -> tuple[Function, Function, Function]:
-    """Traced: whether a gap has an impact, and its least rates after a step, without restitution and with it."""
+def laws_of_gaps() -> tuple[Function, Function, Function, Function]:
+    """Traced: whether a gap has an impact, its least rates after a step, without and with restitution, what is left."""
     return (
         write(lambda x: [is_impact(*x)], 5, name="impact"),
         write(lambda x: [least_rate(x[0], x[1], 0.0, *x[2:])], 7, name="plastic"),
         write(lambda x: [least_rate(*x)], 8, name="elastic"),
+        write(lambda x: [gap_to_close(*x)], 3, name="to_close"),
     )
+
+
+def gap_prediction() -> Function:
+    """Traced function of :func:`gap_after`."""
+    return write(lambda x: [gap_after(*x)], 4, name="gap_after")

@@ -19,7 +19,7 @@ from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.contact_step import ContactProblem
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.free_body_step import ATTEMPTS, REACH_MARGIN
-from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
+from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
 from gauss.dynamics.contact.implicit_damping import ImplicitDamping
 from gauss.dynamics.contact.mechanism_compliance import Compliance
@@ -312,11 +312,12 @@ class MechanismStepper:
     def _without_forces(self, rows: StepRows, begun: FreeStep, h: float, rest: float, share: float, force) -> np.ndarray:
         """Rates (n,) after a step without forces, less the least that gaps may have; with the forces of the last step."""
         after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
-        coefficients = self.rows.coefficients
+        coefficients, curved = self.rows.coefficients, rows.bias[: rows.gap.size]
+        gap = rows.gap if self.removal else gap_to_close(rows.gap, curved, h * (1.0 - share))
         for e in coefficients:
             mine = slice(0, rows.gap.size) if len(coefficients) == 1 else np.flatnonzero(rows.restitution == e)
             given = float(e), h, rest, share, max(h, self.removal), force[: rows.gap.size][mine] * (self.removal > 0.0)
-            after[mine] -= least_rate(rows.gap[mine], rows.rate[mine], *given)
+            after[mine] -= least_rate(gap[mine], rows.rate[mine], *given)
         return after
 
     def _solve(self, state: State, rows: StepRows, begun: FreeStep, near: NearContacts, h: float, rest: float, share: float):

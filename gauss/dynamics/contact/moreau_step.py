@@ -24,7 +24,7 @@ from gauss.dynamics.constraint_scales import contact_scales, gap_scales
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, laws_of
 from gauss.dynamics.contact.damped_step import DampedResponses, DampedStep
 from gauss.dynamics.contact.force_responses import ForceResponses
-from gauss.dynamics.contact.gap_laws import REST_STEPS, is_impact, least_rate
+from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
 from gauss.dynamics.contact.implicit_damping import ImplicitDamping
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps, penetration_error
@@ -243,7 +243,9 @@ class MoreauStepper:
         start : ndarray, shape (n,)
             Forces of the last step, or expressions.
         """
-        gaps = zip(touch.width, touch.rate, self.restitution, start if self.removal else np.zeros(len(start)), strict=False)
+        n, time = len(self.restitution), h * (1.0 - share)
+        width = touch.width if self.removal else gap_to_close(touch.width, touch.bias[:n], time)
+        gaps = zip(width, touch.rate, self.restitution, start if self.removal else np.zeros(len(start)), strict=False)
         removal = math.maximum(h, self.removal) if self.removal else h
         least = [least_rate(width, rate, e, h, rest, share, removal, closed) for width, rate, e, closed in gaps]
         least += [0.0] * (touch.rate.size - len(least))

@@ -8,8 +8,8 @@ from gauss.scene import Box, Contact, Scene
 from gauss.system import System, guards
 
 START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
-# A step closes gaps by their rates, and leaves half of h² times what curvature adds to their accelerations: up to (h ω)² of
-# the scale for points that turn at ω. Twice that is accepted, for the rates were larger before the step.
+# A step with an impact closes gaps by their rates, and leaves half of h² times what curvature adds to their accelerations:
+# up to (h ω)² of the scale for points that turn at ω. Twice that is accepted, for the rates were larger before the step.
 LEFT_BY_STEPS, MOST_LEFT = 2.0, 0.02
 RESOLVED = ", or begin at gauss.resolve_overlaps(system)"  # what else removes penetration
 UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
