@@ -25,6 +25,16 @@ ROUNDS = (
     Round(0, 1e-3, 20),
     Round(0, 1e-5, 30),
 )
+# What is left cycles with neighbours that converge: the regularisation stays where contacts change their modes. Of 3000 steps of
+# three bins of 30 balls, 33 miss the tolerance of the laws instead of 130, by 8e-7 at most instead of 1e-4.
+LAST_ROUNDS = (
+    Round(0, 3e-2, 28, decay=0.8),
+    Round(0, 1e-7, 10),
+    Round(100, 3e-2, 40, decay=0.8),
+    Round(0, 1e-7, 10),
+    Round(300, 1e-1, 40, decay=0.7),
+    Round(0, 1e-7, 12),
+)
 MANY = 100  # contacts of an island from which on they are many: in smaller ones, all rounds cost little
 CLOSE = 1e3  # residual, in units of its tolerance: smaller ones are worth Newton steps with hardly any regularisation
 # The same: residuals between both are left in heaps that come to rest, where redundant contacts stick but for some that slip
@@ -47,4 +57,4 @@ def block_contact_laws() -> BlockContactLaws:
     """Laws of contact and friction of the block-sparse problem."""
     laws = contact_solver()
     functions = laws.normal, laws.friction, laws.project_normal, laws.project_friction
-    return BlockContactLaws(*functions, ROUNDS, ROUNDS_OF_MANY, MANY)
+    return BlockContactLaws(*functions, ROUNDS + LAST_ROUNDS, ROUNDS_OF_MANY, MANY)
