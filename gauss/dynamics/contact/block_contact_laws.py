@@ -25,8 +25,8 @@ ROUNDS = (
     Round(0, 1e-3, 20),
     Round(0, 1e-5, 30),
 )
-# What is left cycles beside contacts that converge: the regularisation stays where contacts change their modes. Of 3000 steps
-# of three bins of 30 balls, 33 miss the tolerance of the laws instead of 130, by 8e-7 at most instead of 1e-4.
+# What is left cycles beside contacts that converge: the regularisation stays where contacts change their modes. Of 3000
+# steps of three bins of 30 balls, 33 miss the tolerance of the laws instead of 130, by 8e-7 at most instead of 1e-4.
 LAST_ROUNDS = (
     Round(0, 3e-2, 28, decay=0.8),
     Round(0, 1e-7, 10),
