@@ -1,8 +1,8 @@
 """Laws of contact of many bodies, and the rounds of Newton steps in which their problem is solved.
 
 Newton steps with hardly any regularisation nearly always converge. In heaps contacts cycle between sticking, slipping and
-open: all contacts are regularised, or those alone that cycle. Where more contacts stick than the bodies have freedoms, forces
-are not unique, and no search reaches the tolerance in most steps: then it ends at residuals that more steps hardly lessen.
+open: all contacts are regularised, or those alone that cycle. Where more contacts stick than the bodies have freedoms, the
+forces are not unique, and the search ends at residuals that more steps hardly lessen.
 """
 
 from functools import cache
