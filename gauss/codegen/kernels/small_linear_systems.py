@@ -63,11 +63,13 @@ def _hold_idle(r: Routine, n: Value, A: Array, x: Array):
 
 
 def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):
-    """Gaussian elimination with partial pivoting."""
-    largest = r.variable(0.0)
+    """Gaussian elimination with partial pivoting, up to a pivot that makes the matrix singular."""
+    largest, column = r.variable(0.0), r.variable(0, INTEGER)
     with r.each(n * n) as i:
         largest[0] = r.maximum(r.absolute(A[i]), largest[0])
-    with r.each(n) as k:
+    with r.loop() as leave_if:
+        k = column[0]
+        leave_if(k >= n)
         best, row = r.variable(-1.0), r.variable(0, INTEGER)
         row[0] = k
         with r.each(n, k) as i:
@@ -76,6 +78,7 @@ def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):
                 best[0], row[0] = size, i
         with r.when(~(best[0] > largest[0] * SINGULAR_PIVOT_RELATIVE)):
             if_singular[0] = 1
+        leave_if(if_singular[0] > 0)
         _swap(r, x, k, row[0])
         with r.each(n, k) as j:
             _swap(r, A, j * n + k, j * n + row[0])
@@ -87,7 +90,8 @@ def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):
             above = A[j * n + k]
             with r.each(n, k + 1) as i:
                 A[j * n + i] = A[j * n + i] - A[k * n + i] * above
-    with r.each(n) as back:
+        column[0] = k + 1
+    with r.when(if_singular[0] <= 0), r.each(n) as back:
         k = n - back - 1
         value = x[k] / A[k * n + k]
         x[k] = value

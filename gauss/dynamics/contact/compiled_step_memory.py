@@ -106,7 +106,7 @@ class CompiledStepMemory:
         places = self.places if ends is self.ends and rows is self.rows else self._places_of(ends, rows)
         self.begun[:], record = begin[1:], self.record
         self.settings[TIME_PLACE], self.loop[ERROR_PLACE] = begin[0], 0.0
-        before = record.kept()
+        before = record.modes.copy()
         self.code.advance(*self.given, ends.size, *places)
         _, _, changed, count = record.counts.tolist()
         changes: RecordedChanges | list[ModeChange] = []

@@ -58,7 +58,9 @@ class PairKernelSteps:
         self.inputs = np.zeros(len(self.layout.parameters))
         row, end, n_v = self.layout.row, 1 + self.layout.n_q, self.layout.n_v
         self.rates = slice(end, row)  # and work
-        self.kept_parts = slice(row), slice(row, row + n_v + 3), slice(self.layout.size - self.inputs.size, None)
+        mean = row + n_v + 3  # end of the mean accelerations and powers of a point; behind them gap forces, inputs last
+        inputs = slice(self.layout.size - self.inputs.size, None)
+        self.point_parts = slice(row), slice(row, mean), slice(mean, mean + self.gaps), inputs
 
     def prepared_steps(self) -> "PairKernelSteps":
         """The steps themselves: they are called as machine code is."""
@@ -72,8 +74,8 @@ class PairKernelSteps:
         return inf if memory is None else memory.fastest
 
     def arrays(self, point: np.ndarray, confirmed: np.ndarray, grid: np.ndarray, out: np.ndarray) -> tuple:
-        """Arguments of :meth:`call`."""
-        return point, grid
+        """Arguments of :meth:`call`: views, which take a call less time than to make them."""
+        return *(point[part] for part in self.point_parts), grid[:, 0]
 
     def separated(self, state: State) -> State:
         """State whose shapes do not overlap."""
@@ -89,14 +91,14 @@ class PairKernelSteps:
         rates = Rates(np.zeros(start.v.size), np.zeros(3))
         return self.layout.pack(Point(start, np.zeros(3), rates, np.zeros(self.gaps)), self.inputs)
 
-    def call(self, point: np.ndarray, grid: np.ndarray, n: int):
-        """Make n steps from a point to the times of a grid."""
-        motion, rates, (reached, means, inputs) = self.motion, self.rates, self.kept_parts
-        motion.reached = row = point[reached].copy()
+    def call(self, reached: np.ndarray, mean: np.ndarray, forces: np.ndarray, inputs: np.ndarray, times: np.ndarray, n: int):
+        """Make n steps from a point, of which the first arguments are parts, to some times [s]."""
+        motion, rates = self.motion, self.rates
+        motion.reached = row = reached.copy()
         motion.events = []  # of the steps of this call alone: a motion from Python may have no end
-        motion.hold(point[inputs])
+        motion.hold(inputs)
         try:
-            rows = motion.filled(*self._arrays_of(grid[:n, 0]))
+            rows = motion.filled(*self._arrays_of(times[:n]))
         except GaussError:
             self.control.status = float(LoopStatus.UNSOLVED)
             return
@@ -106,11 +108,11 @@ class PairKernelSteps:
         if not isfinite(last.dot(last)) and not np.isfinite(last).all():
             self.control.status = float(LoopStatus.NOT_FINITE)
             return
-        point[reached], mean = last, point[means]
+        reached[:] = last
         np.subtract(last[rates], row[rates], out=mean)  # of rates and work
         mean /= last[0] - row[0]
         if self.gaps:
-            point[means.stop :][: self.gaps] = motion.stepper.gap_forces()
+            forces[:] = motion.stepper.gap_forces()
 
     def _arrays_of(self, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Ends of steps (n,), and rows for what is reached: those of the call before, where few steps are as many."""
