@@ -35,6 +35,15 @@ EXTRAS = {
     "control": ("control",),
     "robots": ("example-robot-data",),
     "mjcf": ("mujoco",),
+    "descriptions": ("robot_descriptions",),
+    "xacro": ("xacro",),
+    "yaml": ("pyyaml",),
+    "usd": ("usd-core",),
+    "gym": ("gymnasium",),
+    "export": ("casadi",),
+    "symbolic": ("sympy",),
+    "jax": ("jax",),
+    "fmi": ("fmpy",),
     "peers": ("scikit-sundae", "mujoco"),
 }
 CACHED = {"object code": "", "by content": "made", "sources": "sources"}  # kinds of cached files, starts of their names

@@ -90,7 +90,7 @@ def contact_points(trajectory: Trajectory, sample: int = -1, backend: str | Back
     Warns
     -----
     NonUniqueReactionWarning
-        If single forces are not unique, as of :func:`gauss.contact_forces`.
+        If single forces are not unique, as of :func:`gauss.contact_forces`; not with time stepping, which does not look.
 
     Raises
     ------

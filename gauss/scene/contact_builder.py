@@ -61,8 +61,8 @@ class ContactBuilder(SceneBuilder):
         """Let all shapes touch each other that may, and return the contacts.
 
         Pairs on one body, on two bodies that a joint joins, and of which nothing moves are left out, and pairs that have a
-        contact already. A body on a joint from the ground touches the ground. Contacts are named after their shapes, as in
-        "ball on floor": the names that :func:`gauss.contact_forces` takes.
+        contact already. A body on a joint from the ground touches the ground. Contacts are named after their shapes, the one
+        declared later first, as in "ball on floor": the names that :func:`gauss.contact_forces` takes.
 
         Parameters
         ----------

@@ -11,6 +11,7 @@ from gauss.view.style import INK, check_format, curves, keep_flat, legend, looks
 
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
 MANY = 8  # names that fit into a title
+BELOW_ZERO = 0.04  # of the height of an axis: a line at zero does not lie on its edge
 LEAST_ARM = 1e-6  # m: moments that a force has about this arm are drawn as none
 ANGLES, LENGTHS, QUATERNIONS = "coordinate [rad]", "coordinate [m]", "part of a unit quaternion [1]"
 
@@ -175,7 +176,8 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
     curves(force, trajectory.t, forces, "size of the force [N]")
     curves(moment, trajectory.t, moments, "size of the moment [N m]")
     visible = LEAST_ARM * max(column.max(initial=0.0) for column in forces.values())
-    moment.set_ylim(0.0, max(moment.get_ylim()[1], visible))
+    top = max(moment.get_ylim()[1], visible)
+    moment.set_ylim(-BELOW_ZERO * top, top)
     legend(force)
     undrawn = [name for name, (_, loose) in both.items() if loose]
     if undrawn:

@@ -42,13 +42,18 @@ def lines(points: np.ndarray) -> list[tuple[int, int]]:
 
 def placed(trajectory: Trajectory) -> dict[str, np.ndarray]:
     """Skeleton of every body (samples, k, 3) in the world [m]; that of the ground stands still."""
-    positions, rotations = trajectory.poses()
     shapes = skeleton(trajectory.system)
-    moved = {
-        name: positions[:, None, i] + np.einsum("tij,kj->tki", rotations[:, i], shapes[name])
-        for i, name in enumerate(trajectory.system.structure.bodies)
+    ground = shapes.pop(GROUND)
+    return moved(trajectory, shapes) | {GROUND: np.broadcast_to(ground, (len(trajectory), *ground.shape))}
+
+
+def moved(trajectory: Trajectory, points: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Points (k, 3) in the frames of bodies, at every sample (samples, k, 3) in the world [m]."""
+    positions, rotations = trajectory.poses()
+    places = {name: i for i, name in enumerate(trajectory.system.structure.bodies) if name in points}
+    return {
+        name: positions[:, None, i] + np.einsum("tij,kj->tki", rotations[:, i], points[name]) for name, i in places.items()
     }
-    return moved | {GROUND: np.broadcast_to(shapes[GROUND], (len(trajectory), *shapes[GROUND].shape))}
 
 
 def _distinct(points: list, near: float) -> list:

@@ -1,5 +1,8 @@
 """What is said before a simulation holds in it: rates, distance to singularity, the method that fits."""
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -78,6 +81,11 @@ def test_the_doctor_finds_what_there_is():
     assert all(finding.works for finding in findings.values())
     assert str(object_cache.folder()) in findings["cache"].text
     assert f"{len(BACKENDS)} methods of gauss" in findings["solvers"].text and "clarabel" in findings["solvers"].text
+
+
+def test_the_doctor_looks_at_all_extras_of_users():
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    assert set(project["optional-dependencies"]) - {"bench", "dev"} == set(doctor.EXTRAS)  # what is left: for developers
 
 
 def test_the_doctor_says_what_is_missing(monkeypatch):

@@ -226,6 +226,29 @@ def test_every_body_has_a_form(name):
 
 
 @pytest.mark.slow
+def test_shapes_of_contact_are_in_the_picture():
+    scene = gauss.Scene("tower", gravity=(0, 0, -9.81))
+    box = scene.body("box", 1.0, (0.1, 0.1, 0.1), position=(0, 0, 1.0))
+    scene.free("F", "ground", box, at=(0, 0, 1.0))
+    scene.box("hull", box, size=(0.4, 0.4, 2.0))
+    view = framing(gauss.simulate(scene, 0.01, times=[0.0, 0.01]))
+    assert view.reach >= np.linalg.norm([0.4, 0.4, 2.0])
+    np.testing.assert_allclose(view.middle, [0.0, 0.0, 1.0], atol=1e-3)  # it falls 0.5 mm
+
+
+@pytest.mark.slow
+def test_paths_are_those_of_centres_of_mass_and_of_frames():
+    scene = gauss.load("four_bar")
+    scene.frame("tip", "rocker", (0.2, 0.1, 0.0))
+    moving = gauss.simulate(scene, 0.1, times=np.linspace(0.0, 0.1, 5))
+    viewer = show(moving, traces=("coupler", "tip"), port=_free_port())
+    paths = viewer.player.stage.parts["path"]
+    for handle, name, part in zip(paths, ("coupler", "tip"), ("com", "position"), strict=True):
+        ends = getattr(moving.body(name), part)[[0, -1]]
+        np.testing.assert_allclose(handle.points[[0, -1], [0, 1]], ends, atol=FLOATS)
+    viewer.close()
+
+
 def test_terrain_is_drawn_and_lies_above_the_floor():
     scene = gauss.Scene("land")
     heights = np.array([[0.3, 0.0, 0.2], [-0.4, 0.1, 0.0]])

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.arguments import real_numbers
 from gauss.dynamics.outputs import split
-from gauss.errors import ArgumentError, SimulationError, extra
+from gauss.errors import ArgumentError, SimulationError, extra, require
 from gauss.io.gym.task import Task
 from gauss.simulation import Simulator
 
@@ -25,6 +25,11 @@ class MechanismEnv(gymnasium.Env):
     integrator : str, optional
         Fixed-step method, see :class:`gauss.Simulator`.
 
+    Raises
+    ------
+    ArgumentError
+        If the task is none.
+
     Examples
     --------
     >>> from gauss.gym import MechanismEnv, acrobot
@@ -38,6 +43,7 @@ class MechanismEnv(gymnasium.Env):
     metadata: dict = {"render_modes": []}  # noqa: RUF012 (as Gymnasium declares it)
 
     def __init__(self, task: Task, integrator: str | None = None):
+        require(task, (Task,), "MechanismEnv")
         self.task, self.simulator = task, Simulator(task.scene, task.step, integrator)
         self.action_space = task.action_space
         self._last = self._observed()

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.dynamics.outputs import split
-from gauss.errors import ArgumentError, SimulationError, extra
+from gauss.errors import ArgumentError, SimulationError, extra, require
 from gauss.io.gym.task import Task
 from gauss.simulation import SimulatorBatch
 from gauss.system import State, retract
@@ -32,6 +32,8 @@ class MechanismVectorEnv(VectorEnv):
 
     Raises
     ------
+    ArgumentError
+        If the task is none.
     SimulationError
         If the scene cannot be compiled for batches, with the reasons: ``gymnasium.vector.SyncVectorEnv`` takes any
         :class:`gauss.gym.MechanismEnv`.
@@ -40,6 +42,7 @@ class MechanismVectorEnv(VectorEnv):
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 (as Gymnasium declares it)
 
     def __init__(self, task: Task, num_envs: int, integrator: str | None = None, threads: int = 1):
+        require(task, (Task,), "MechanismVectorEnv")
         self.task, self.num_envs = task, num_envs
         self.simulators = SimulatorBatch(task.scene, task.step, num_envs, integrator, threads)
         self.system = system = self.simulators.system

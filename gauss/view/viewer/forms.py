@@ -36,6 +36,16 @@ def size(system: System) -> float:
     return max(extents, default=1.0) or 1.0
 
 
+def corners(system: System) -> dict[str, np.ndarray]:
+    """Corners (k, 3) of the boxes around the shapes of contact of every moving body that has some, in its frame [m]."""
+    found: dict[str, list[np.ndarray]] = {}
+    for shape in system.scene.shapes.values():
+        if _solid(shape) is not None:
+            body, _, mesh = _carried(system, shape)
+            found.setdefault(body, []).append(trimesh.bounds.corners(mesh.bounds))
+    return {body: np.concatenate(points) for body, points in found.items() if body != GROUND}
+
+
 def forms(system: System, visuals=()) -> list[BodyMesh]:
     """Meshes of all bodies: those given for a body, or generated ones; joints; shapes of contact.
 

@@ -7,8 +7,8 @@ import numpy as np
 from gauss.scene import GROUND, HalfSpace, HeightField, Scene
 from gauss.scene.values import unit
 from gauss.simulation import Trajectory
-from gauss.view.skeleton import placed
-from gauss.view.viewer.forms import size
+from gauss.view.skeleton import moved, placed
+from gauss.view.viewer.forms import corners, size
 
 VIEW = np.array([0.42, -0.8, 0.38])  # from what is seen to the eye: right, away, up
 FIELD = 0.6  # angle that the eye sees from bottom to top [rad]: narrow, so that parallels nearly look so
@@ -30,12 +30,13 @@ class Framing(NamedTuple):
 
 
 def framing(trajectory: Trajectory) -> Framing:
-    """View in which the skeleton stays in the picture all the time."""
+    """View in which the skeleton and the shapes of contact of bodies stay in the picture all the time."""
     gravity = np.array(trajectory.system.scene.gravity)
     up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array([0.0, 0.0, 1.0])
     right, away = _beside(up)
     length = size(trajectory.system)
-    seen = np.concatenate([points.reshape(-1, 3) for points in placed(trajectory).values()])
+    outlines = [placed(trajectory), moved(trajectory, corners(trajectory.system))]
+    seen = np.concatenate([points.reshape(-1, 3) for outline in outlines for points in outline.values()])
     low, high = seen.min(axis=0), seen.max(axis=0)
     middle, reach = (low + high) / 2, max(float(np.linalg.norm(high - low)), length)
     direction = VIEW @ np.stack([right, away, up])

@@ -154,10 +154,12 @@ class ViewerStage:
         if len(self.trajectory) < 2 or not shown.traces:
             return
         fine = resampled(shown.motion, min(FINEST_PATH, SMOOTHNESS * len(self.trajectory)))
+        poses, frames = fine.poses(), self.trajectory.system.frames  # of all bodies by one function
         for name in shown.traces:
-            moved = fine.body(name)
-            carrier = name if name in self.bodies else self.bodies[self.trajectory.system.frames[name].body]
-            points = np.asarray(moved.com if name in self.bodies else moved.position, np.float32)
+            body = frames[name].body
+            carrier, own = self.bodies[body], frames[self.bodies[body]]
+            arm = own.R.T @ ((0.0 if name in self.bodies else frames[name].p) - own.p)
+            points = np.asarray(poses[0][:, body] + poses[1][:, body] @ arm, np.float32)
             segments = np.stack([points[:-1], points[1:]], axis=1)
             look = {"thickness": 0.006 * self.size}
             handle = self.server.scene.add_line_segments(

@@ -86,3 +86,9 @@ def test_tasks_without_limits_or_inputs_are_refused():
     driven.drive("pin", torque=lambda t: gauss.math.sin(t))
     with pytest.raises(SimulationError, match="laws of time"):
         gym.MechanismVectorEnv(gym.Task(driven, lambda *_: 0.0), 2)
+
+
+@pytest.mark.parametrize("make", [gym.MechanismEnv, lambda task: gym.MechanismVectorEnv(task, 2)])
+def test_a_scene_is_no_task(make):
+    with pytest.raises(ArgumentError):
+        make(gauss.load("cart_pole"))
