@@ -28,9 +28,12 @@ class LinkedGroups:
 
     def join(self, one: int, other: int) -> bool:
         """Join the groups of two things; whether they were two."""
-        low, high = sorted((self.root(one), self.root(other)))
-        self._parent[high] = low
-        return low != high
+        one, other = self.root(one), self.root(other)
+        if one < other:
+            self._parent[other] = one
+        else:
+            self._parent[one] = other
+        return one != other
 
 
 def linked_groups(count: int, links: Iterable[tuple[int, int]]) -> np.ndarray:

@@ -201,8 +201,8 @@ def _slice(encoder: _Encoder, thing: slice | range) -> Sequence:
 def _record(encoder: _Encoder, thing) -> Sequence:
     """The fields of a record; an attribute beside them must be a property computed from them."""
     kind = type(thing)
-    beside = getattr(thing, "__dict__", {}).keys() - kind.__dataclass_fields__.keys()
-    if not all(isinstance(getattr(kind, name, None), cached_property) for name in beside):
+    own, named = getattr(thing, "__dict__", {}).keys(), kind.__dataclass_fields__.keys()
+    if not (own <= named or all(isinstance(getattr(kind, name, None), cached_property) for name in own - named)):
         _refused(encoder, thing)
     _named(encoder, kind)
     return [getattr(thing, name) for name in _field_names(kind)]  # type: ignore[arg-type]  # a type is hashable

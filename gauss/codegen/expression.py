@@ -21,24 +21,33 @@ INDEX_OF, OPERANDS_OF = attrgetter("index"), attrgetter("operands")  # of a node
 
 def _operation(op: str, swapped: bool = False) -> Callable:
     """Method for an operation of two operands: one call less than by a common method, for it is most of tracing."""
-    keeps_zero = op in ("add", "sub", "mul")
+    keeps_zero, is_product = op in ("add", "sub", "mul"), op == "mul"
 
     def operate(self, other):
-        first, graph = self, self.graph
+        graph = self.graph
         if type(other) is float:
             known = graph.constants.get(other)
             other = graph.constant(other) if known is None else known
         elif type(other) is not Expression or other.graph is not graph:
-            if not isinstance(other, OPERANDS):
-                return NotImplemented
-            if isinstance(other, Expression) and graph.precedes(other.graph):
-                graph, first = other.graph, other.graph.lift(self)
-            other = graph.lift(other)
-        if first is other and keeps_zero and first is graph.zero:  # half of all operations of a mechanism
-            return first
-        return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
+            return _lifted(operate, self, other)
+        zero = graph.zero
+        if keeps_zero and self is other is zero:  # half of all operations of a mechanism
+            return zero
+        if is_product and self.is_constant is not other.is_constant and (self is zero or other is zero):
+            return zero  # most of the others with zero; two constants may be 0·∞
+        return graph.binary(op, other, self) if swapped else graph.binary(op, self, other)
 
     return operate
+
+
+def _lifted(operate: Callable, x: "Expression", other):
+    """Result of an operation whose operands are brought to one graph first."""
+    if not isinstance(other, OPERANDS):
+        return NotImplemented
+    graph = x.graph
+    if isinstance(other, Expression) and graph.precedes(other.graph):
+        graph, x = other.graph, other.graph.lift(x)
+    return operate(x, graph.lift(other))
 
 
 class Expression:
@@ -194,15 +203,15 @@ def as_number(value) -> float | None:
 
 def reachable(outputs, operands=OPERANDS_OF) -> list[Expression]:
     """Nodes on which the outputs depend, operands first."""
-    found, waiting = set(), [node for node in outputs if isinstance(node, Expression)]
-    nodes = []
+    found: dict[int, Expression] = {}
+    waiting = [node for node in outputs if isinstance(node, Expression)]
     while waiting:
         node = waiting.pop()
-        if node.index not in found:
-            found.add(node.index)
-            nodes.append(node)
-            waiting.extend(operands(node))
-    return sorted(nodes, key=INDEX_OF)
+        index = node.index
+        if index not in found:
+            found[index] = node
+            waiting += operands(node)
+    return [found[index] for index in sorted(found)]
 
 
 def operand_indices(nodes: Iterable[Expression]) -> Iterator[int]:

@@ -37,6 +37,7 @@ BINARY: dict[str, Callable[[float, float], float]] = {
 }
 COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
 COMPARISONS = ("less", "less_equal")
+NEW = object.__new__
 TURNS = frozenset({"sin", "cos"})
 # Operations on zero and another expression: what folding and the rules of simplification give, sooner; or None. The product
 # of zero and a constant is not a number where that is infinite.
@@ -227,7 +228,13 @@ class Graph:
         node = self._known.get(key)
         if node is None:
             nodes = self.nodes
-            node = self._known[key] = Expression(self, op, operands, value, len(nodes))
+            node = self._known[key] = NEW(Expression)  # its attributes without the overhead of its constructor
+            node.graph = self
+            node.op = op
+            node.operands = operands
+            node.value = value
+            node.index = len(nodes)
+            node.is_constant = False
             nodes.append(node)
         return node
 

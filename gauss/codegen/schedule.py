@@ -101,7 +101,8 @@ class _Reassociation:
             operands = made.operands
             if len(operands) == 2:  # the maximum, without its overhead
                 x, y = operands
-                begin = max(when[x.index], when[y.index])
+                begin, other = when[x.index], when[y.index]
+                begin = other if other > begin else begin
             else:
                 begin = max([when[x.index] for x in operands], default=0)
             when.append(begin + (LATENCY.get(made.op, 1) if operands else 0))

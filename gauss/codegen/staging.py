@@ -33,10 +33,12 @@ class EarlyGraph(Graph):
         """Expression of this graph in a later one: a result where it is evaluated here, else evaluated again from these."""
         assert isinstance(graph, LaterGraph)
         known = graph.from_early  # by index: a law that is traced along its branches may not be a key
-        if value.index not in known and not self._is_rebuilt(value, known):
-            known[value.index] = graph.early_result(value)
-        if value.index in known:
-            return known[value.index]
+        found = known.get(value.index)
+        if found is not None:
+            return found
+        if not self._is_rebuilt(value, known):
+            found = known[value.index] = graph.early_result(value)
+            return found
         for node in reachable([value], lambda node: node.operands if self._is_rebuilt(node, known) else ()):
             if self._is_rebuilt(node, known):
                 known[node.index] = graph.copy(node, [known[operand.index] for operand in node.operands])

@@ -90,9 +90,13 @@ def states_around(system: System) -> Iterator[State]:
         )
 
 
-def consistent_states(system: System) -> Iterator[State]:
-    """States that meet the constraints: the start of the scene, and random ones around it."""
-    for state in states_around(system):
+def consistent_states(system: System, start: State | None = None) -> Iterator[State]:
+    """States that meet the constraints: the start of the scene, or a given one that does, and random ones around it."""
+    around = states_around(system)
+    if start is not None:
+        next(around)
+        yield start
+    for state in around:
         with suppress(GaussError):
             yield system.initial_state(state.q, state.v)
 

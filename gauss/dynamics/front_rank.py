@@ -10,6 +10,7 @@ from gauss.dynamics.conditions import has_large_loops
 from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism, Embedding
 from gauss.dynamics.error_scale import consistent_states
 from gauss.dynamics.generic_rank import ROUNDOFF_PIVOT, count, dependent_rows, is_generic_rank
+from gauss.dynamics.initial_states import met_start
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
 from gauss.system import State, System
@@ -55,7 +56,7 @@ def _named(found: Embedding | None) -> tuple:
 
 def _regular_embedding(system: System) -> Embedding | None:
     before = None  # rows that depend on others at the state before; states are assembled as long as these do not decide
-    for state in consistent_states(system):
+    for state in consistent_states(system, met_start(system)):
         found = _regular_at(system, state)
         if found:
             return found

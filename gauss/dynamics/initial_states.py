@@ -1,14 +1,18 @@
 """Initial states without Newton steps: the start of the scene is kept by its content, a consistent state as it is given."""
 
+import warnings
+from contextlib import suppress
+
 import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.assemble import state_residual
-from gauss.dynamics.consistent_states import changed_starts, consistent, violations
+from gauss.dynamics.consistent_states import changed_starts, consistent, consistent_if_met
 from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import RESIDUAL_ROUNDOFF, within_limits
 from gauss.dynamics.store import cached, cached_on_disk
+from gauss.errors import GaussError
 from gauss.system import State, System
 
 RESIDUAL_THRESHOLD = 30  # residuals by numpy that take as long as compiling the residual
@@ -19,22 +23,35 @@ def scene_start(system: System) -> State:
 
     AssemblyError if the constraints cannot be met from there.
     """
-    find = lambda: consistent(system, system.start(), tuple(system.scene.starts))  # noqa: E731
     if not system.has_closures:
-        return find()
+        return _found(system)[0]
     found: list[State] = []
 
     def make() -> tuple[State, bool, tuple[str, ...]]:
-        found.append(find())
+        start, is_met = _found(system)
+        found.append(start)
         given = within_limits(system, system.start())
-        is_met = not (violations(system, found[0]) or changed_starts(system, given, found[0], system.scene.starts))
-        return found[0], is_met, system.rigid_joints
+        is_met = is_met and not changed_starts(system, given, start, system.scene.starts)
+        return start, is_met, system.rigid_joints
 
     state, is_met, rigid_joints = cached_on_disk(system, (scene_start,), make)
     vars(system).setdefault("rigid_joints", rigid_joints)  # its own property, which would reduce the system to find them
     if not (found or is_met):
-        return find()
+        return _found(system)[0]
     return State(state.t, state.q.copy(), state.v.copy())  # the caller may write to it
+
+
+def met_start(system: System) -> State | None:
+    """Consistent start of the scene, if there is nothing to warn of; else None."""
+    with warnings.catch_warnings(), suppress(GaussError, Warning):
+        warnings.simplefilter("error")
+        return scene_start(system)
+    return None
+
+
+def _found(system: System) -> tuple[State, bool]:
+    """Start of the scene, assembled, and whether it is known to meet its constraints."""
+    return consistent_if_met(system, system.start(), tuple(system.scene.starts))
 
 
 def projected(system: System, state: State) -> State:
