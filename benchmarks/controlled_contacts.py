@@ -7,8 +7,9 @@ Run it with:
 Motions with closed forms: a ball that slides and then rolls, one that bounces eight times, a block that is pushed for 10 ms
 after it has rested for three seconds, slides, and sticks. The error is the largest of the position at 50 times, in metres.
 MuJoCo makes the first motion, with elliptic cones and its stiffest contacts of that step (`solref` of two steps), and, where
-Drake is installed, its error-controlled integrator CENIC (benchmarks/cenic.py). CPU time of a motion after one that was not
-measured, the least of the rounds. Writes benchmarks/results/controlled_contacts.csv, .md and .png.
+they are installed (`pip install drake exudyn`), Drake's error-controlled integrator CENIC (benchmarks/cenic.py) and Exudyn
+(benchmarks/exudyn_contacts.py); the header of the page says which was not. Siconos has no wheel. CPU time of a motion after
+one that was not measured, the least of the rounds. Writes benchmarks/results/controlled_contacts.csv, .md and .png.
 """
 
 from collections.abc import Callable
@@ -19,7 +20,7 @@ import mujoco
 import numpy as np
 
 import gauss
-from benchmarks import cenic
+from benchmarks import cenic, exudyn_contacts
 from benchmarks.command import RESULTS, command
 from gauss.bench.contest import duration
 from gauss.bench.machine import header
@@ -29,7 +30,7 @@ g = 9.81
 SAMPLES = 50
 STEPS = (1e-2, 1e-3, 1e-4, 1e-5)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-FIXED, CONTROLLED, MUJOCO, CENIC = "fixed steps", "error control", "MuJoCo", "CENIC"
+FIXED, CONTROLLED, MUJOCO, CENIC, EXUDYN = "fixed steps", "error control", "MuJoCo", "CENIC", "Exudyn"
 MU, RADIUS, SPEED = 0.2, 0.1, 2.0  # of the ball that rolls
 E = 0.7  # restitution of the ball that bounces
 LIMIT, PUSH, BEGIN, LENGTH = 2.0, 102.0, 3.0, 0.01  # of the block: friction, force [N], when and how long [s]
@@ -139,15 +140,18 @@ def measure(rounds: int) -> tuple[list[dict], list[str]]:
     runs = {(name, FIXED, h): ours(case, step=h) for name, case in CASES.items() for h in STEPS}
     runs |= {(name, CONTROLLED, rtol): ours(case, rtol=rtol) for name, case in CASES.items() for rtol in TOLERANCES}
     runs |= {("rolls", MUJOCO, h): theirs(h) for h in STEPS}
+    times = np.linspace(0.0, CASES["rolls"].duration, SAMPLES)
+    if exudyn_contacts.is_installed():
+        runs |= {("rolls", EXUDYN, h): exudyn_contacts.rolling(MU, RADIUS, SPEED, times, h) for h in STEPS}
     if cenic.is_installed():
-        drake = cenic.rolling(MU, RADIUS, SPEED, np.linspace(0.0, CASES["rolls"].duration, SAMPLES))
+        drake = cenic.rolling(MU, RADIUS, SPEED, times)
         runs |= {("rolls", CENIC, accuracy): partial(drake, accuracy) for accuracy in TOLERANCES}
     rows = []
     for (name, how, number), run in runs.items():
         exact = np.array([CASES[name].position(t) for t in np.linspace(0.0, CASES[name].duration, SAMPLES)])
         found, least = run(), min(duration(run) for _ in range(rounds))
         rows.append({"motion": name, "how": how, "given": number, "error": np.abs(found - exact).max(), "time": least})
-    return rows, header("mujoco", "drake")
+    return rows, header("mujoco", "exudyn", "drake")
 
 
 def draw(rows: list[dict]):
@@ -156,7 +160,7 @@ def draw(rows: list[dict]):
 
     figure, panels = pyplot.subplots(1, len(CASES), figsize=(12, 4), sharex=True, sharey=True, layout="constrained")
     for panel, name in zip(panels, CASES, strict=True):
-        for how, marker in ((FIXED, "o"), (CONTROLLED, "s"), (MUJOCO, "^"), (CENIC, "d")):
+        for how, marker in ((FIXED, "o"), (CONTROLLED, "s"), (MUJOCO, "^"), (CENIC, "d"), (EXUDYN, "v")):
             own = [row for row in rows if row["motion"] == name and row["how"] == how]
             panel.loglog([row["time"] for row in own], [row["error"] for row in own], marker=marker, label=how)
         panel.set(title=name, xlabel="CPU time of a motion [s]")

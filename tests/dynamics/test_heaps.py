@@ -63,7 +63,7 @@ def test_a_round_is_made_between_its_residuals(problems, round_, made):
     functions = laws.normal, laws.friction, laws.project_normal, laws.project_friction
     module = ir.Module(name="gauss")
     write_order(module)
-    write_block_contacts(BlockContactLaws(*functions, (first,), (first, round_), 1), module)
+    write_block_contacts(BlockContactLaws(*functions, (first, round_), (first, round_), 1), module)
     solver = BlockContactSolver(machine.load(str(module)))
     *_, (_, steps, rounds) = solver.graph(graph.n, graph.bodies).solve(*given[:-1], EXACT)
     assert (steps, rounds) == (first.steps + made, 2)

@@ -26,6 +26,7 @@ from gauss.codegen.kernels.vectors import BLOCK, SIX, WIDTH, TwistRows
 SIDE = 3 * WIDTH  # doubles of the rows of one contact for one body: normal, two tangents
 CONTACT = 2 * SIDE
 MASS = 20  # inertia (3, 3) [kg m²], its inverse, mass, its inverse
+FREEDOMS = 6  # of a body
 LEAST_NUMBER = 1e-60  # forces and velocities that are set to zero: their squares may not be inverted
 ELIMINATED = 12  # K (3, 3) and g (3,) of a contact
 APART, STICKING, SLIPPING = 0.0, 1.0, 2.0  # modes of a contact
@@ -43,7 +44,8 @@ class BlockContactLaws:
     normal, friction, project_normal, project_friction : Function
         As of :class:`gauss.codegen.kernels.ContactSolver`.
     rounds, rounds_of_many : tuple of Round
-        What is tried one after the other, each from the best forces so far: of few and of many contacts.
+        What is tried one after the other, each from the best forces so far; the latter where many contacts are redundant:
+        where more stick by the forces that are known than the freedoms of the bodies bear.
     many : int
         Number of contacts from which on they are many.
     """
@@ -77,7 +79,7 @@ class _BlockContactWriter:
         self._measure()
         few, many = self.laws.rounds, self.laws.rounds_of_many
         first, end = r.variable(0, INTEGER), r.variable(len(few), INTEGER)
-        with r.when(self.m >= self.laws.many):
+        with r.when((self.m >= self.laws.many) & self._are_redundant()):
             first[0], end[0] = len(few), len(few) + len(many)
         span = first[0], end[0]
         least, total, rounds = write_rounds(self, "sparse", few + many, self.m * 3, lambda: self.tolerance, span)
@@ -85,6 +87,16 @@ class _BlockContactWriter:
         self.result[0], self.result[1] = least[0], total[0]
         self.result[2] = r.as_double(rounds[0])
         return r.done()
+
+    def _are_redundant(self) -> Value:
+        """Whether the contacts that stick by the known forces have more components than the bodies have freedoms."""
+        sticking = self.r.variable(0, INTEGER)
+        with self.r.each(self.m) as c:
+            push, *across = (self.f[c * 3 + k] for k in range(3))
+            most = self.mu[c] * push
+            with self.r.when((push > 0.0) & (across[0] * across[0] + across[1] * across[1] < most * most)):
+                sticking[0] = sticking[0] + 1
+        return sticking[0] * 3 > self.n * FREEDOMS
 
     def begin_round(self, regularisation: Value, decay: Value):
         """The same ε for all contacts at first."""

@@ -48,11 +48,11 @@ def slots(n: dict[str, int]) -> dict[str, int]:
         "results": len(RESULTS),
         "q": n["n_q"],
         "v": n["n_v"],
+        "work": 3,  # q, v and work follow one another
         "end_q": n["n_q"],
         "end_v": n["n_v"],
         "own": n["n_v"],
         "loop": len(LOOP_SETTINGS),
-        "work": 3,
         "constants": bodies * n["constants"],
         "gravity": 3,
         "reach": bodies,

@@ -49,6 +49,7 @@ def slots(n: dict[str, int]) -> dict[str, int]:
             "results": len(RESULTS),
             "q": n["n_q"],
             "v": v,
+            "work": 3,  # q, v and work follow one another
             "end_q": n["n_q"],
             "end_v": v,
             "given": 1 + n["n_q"] + v + n["input"],
@@ -99,7 +100,6 @@ def slots(n: dict[str, int]) -> dict[str, int]:
             "room": room_of(rows),
             "loop": len(LOOP_SETTINGS),
             "own": v,
-            "work": 3,
             "row_work": rows,
             "hit": elements,
             "lost": elements,

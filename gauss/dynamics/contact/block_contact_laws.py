@@ -1,8 +1,8 @@
 """Laws of contact of many bodies, and the rounds of Newton steps in which their problem is solved.
 
 Newton steps with hardly any regularisation nearly always converge. In heaps contacts cycle between sticking, slipping and
-open: few contacts are regularised in all rounds, many where they cycle, as redundant contacts need large changes of the
-other forces.
+open: all contacts are regularised, or those alone that cycle. Where more contacts stick than the bodies have freedoms, the
+forces are not unique, and the search ends at residuals that more steps hardly lessen.
 """
 
 from functools import cache
@@ -35,7 +35,7 @@ LAST_ROUNDS = (
     Round(300, 1e-1, 40, decay=0.7),
     Round(0, 1e-7, 12),
 )
-MANY = 100  # contacts of an island from which on they are many: in smaller ones, all rounds cost little
+MANY = 100  # contacts from which on redundant ones have rounds of their own: of fewer, all rounds cost little
 CLOSE = 1e3  # residual, in units of its tolerance: smaller ones are worth Newton steps with hardly any regularisation
 # The same: residuals between both are left in heaps that come to rest, where redundant contacts stick but for some that slip
 # by micrometres per second. In a bin of 100 balls, 200 Newton steps more lessened them by half at most.

@@ -19,7 +19,6 @@ from gauss.dynamics.contact.paradox import SLIDING as SLIDING_SPEED
 from gauss.dynamics.contact.shape_table import MOST_FEATURES
 from gauss.dynamics.contact.step_patterns import step_patterns
 from gauss.dynamics.gap_functions import RESTING
-from gauss.system import State
 
 SPEED_PLACE = RESULTS.index("fastest")
 
@@ -73,6 +72,7 @@ class MechanismMemory(CompiledStepMemory):
         terms["fixed:M"] = "fixed", parts["M"][0].start
         steps = compiled_mechanism_step() if kernels.receiver is None else CallingSteps(compiled_mechanism_step())
         super().__init__(steps, MECHANISM, sizes, terms)
+        self.inputs = self.at["given"][sizes["n_v"] + sizes["n_q"] + 1 :]
         self._fill(N)
 
     def _fill(self, N: np.ndarray):
@@ -116,13 +116,12 @@ class MechanismMemory(CompiledStepMemory):
         """Addresses of kernels of the scene."""
         return self.stepper.kernels.addresses()
 
-    def advance(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
+    def advance(self, begin: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
         """Steps to some times, with the inputs that are held."""
-        inputs, given = self.stepper.inputs, self.at["given"]
-        given[given.size - inputs.size :] = inputs
+        self.inputs[:] = self.stepper.inputs
         if self.stepper.kernels.receiver is not None:
-            return self._calling(state, work, ends, rows)
-        found = super().advance(state, work, ends, rows)
+            return self._calling(begin, ends, rows)
+        found = super().advance(begin, ends, rows)
         last = rows[found.steps - 1]
         return found if not found.steps or isfinite(last.dot(last)) else self._sound(found, rows)
 
@@ -132,19 +131,19 @@ class MechanismMemory(CompiledStepMemory):
         if finite.all():
             return found
         sound, modes = int(finite.argmin()), self.record.kept()
-        for change in reversed(found.changes):
+        for change in reversed(list(found.changes)):
             modes[change.element] = modes[change.element] if change.step < sound else change.before
         changes = [change for change in found.changes if change.step < sound]
         self.stepper.forget_forces()
         self.record.take(modes)
         return LoopOfSteps(sound, 0.0, changes, False)
 
-    def _calling(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
+    def _calling(self, begin: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
         """Steps whose kernels call opaque laws, up to one in which such a law raises or returns no numbers."""
         known, modes = self.known, self.record.kept()
         try:
             with self.stepper.kernels.receiver:
-                found = super().advance(state, work, ends, rows)
+                found = super().advance(begin, ends, rows)
         except BaseException:
             self.known = known
             self.record.take(modes)
@@ -155,7 +154,7 @@ class MechanismMemory(CompiledStepMemory):
         self.known = known
         self.record.take(modes)
         sound = int(np.argmin(finite))
-        return self._calling(state, work, ends[:sound], rows) if sound else LoopOfSteps(0, 0.0, [], False)
+        return self._calling(begin, ends[:sound], rows) if sound else LoopOfSteps(0, 0.0, [], False)
 
     @property
     def fastest(self) -> float:

@@ -4,6 +4,7 @@ The mode of an element is 0 while it bears no force, 1 while it sticks, or bears
 its points slides. Machine code keeps the same record: :mod:`gauss.codegen.kernels.contact_modes`.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,33 @@ class ModeChange(NamedTuple):
     after: int
     hit: bool  # whether it had an impact in the step
     lost: float  # energy lost in it during the step [J]
+
+
+class RecordedChanges:
+    """Changes that machine code recorded: its numbers, which become changes when they are asked for.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (k CHANGE,)
+        Copy of the record.
+    modes : ndarray
+        Modes of the elements before the steps.
+    """
+
+    __slots__ = ("modes", "numbers")
+
+    def __init__(self, numbers: np.ndarray, modes: np.ndarray):
+        self.numbers, self.modes = numbers, modes
+
+    def __len__(self) -> int:
+        return self.numbers.size // CHANGE
+
+    def __iter__(self) -> Iterator[ModeChange]:
+        modes = self.modes.tolist()
+        for step, element, mode, hit, lost in self.numbers.reshape(-1, CHANGE).tolist():
+            k, after = int(element), int(mode)
+            yield ModeChange(int(step), k, modes[k], after, hit > 0.0, lost)
+            modes[k] = after
 
 
 class ModesOfStep(NamedTuple):
@@ -88,15 +116,6 @@ class ModeRecord:
         self.modes[opened], self.modes[elements] = 0, mode
         self.closed[: elements.size], self.counts[0] = elements, elements.size
         return changes
-
-    def recorded(self, rows: np.ndarray, modes: np.ndarray) -> list[ModeChange]:
-        """Changes that machine code recorded, from the modes before its steps."""
-        found = []
-        for step, element, mode, hit, lost in rows.reshape(-1, CHANGE).tolist():
-            k = int(element)
-            found.append(ModeChange(int(step), k, int(modes[k]), int(mode), hit > 0.0, lost))
-            modes[k] = int(mode)
-        return found
 
 
 def modes_of_contacts(table: ShapeTable, law: np.ndarray, force: np.ndarray, speed: np.ndarray, slow: float) -> np.ndarray:

@@ -137,11 +137,16 @@ class FreeBodyStepper:
         self.memory.known = found
 
     def run(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
+        """Steps from a state and its work to some times by machine code, as of :meth:`steps_from`."""
+        return self.steps_from(np.concatenate([[state.t], state.q, state.v, work]), ends, rows)
+
+    def steps_from(self, begin: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
         """Steps by machine code, as of :meth:`gauss.dynamics.contact.compiled_step_memory.CompiledStepMemory.advance`."""
         self.memory = self.memory.fitting()
         if self.asleep.size:
-            self.memory.at["end_q"][:], self.memory.at["end_v"][:] = state.q, state.v  # steps move the others alone
-        return self.memory.advance(state, work, ends, rows)
+            at, end = self.memory.at, 1 + self.system.n_q  # steps move the others alone
+            at["end_q"][:], at["end_v"][:] = begin[1:end], begin[end:-3]
+        return self.memory.advance(begin, ends, rows)
 
     def examined(self, state: State, h: float) -> list[Paradox]:
         """None: contacts of many free bodies are not examined for Painlevé's paradox."""

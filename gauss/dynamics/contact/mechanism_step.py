@@ -173,12 +173,16 @@ class MechanismStepper:
         return sliding_above(self.system, v) * self.system.scale.time / self.system.scale.length
 
     def run(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
-        """Steps from a state and its work to some times by machine code, as far as it finishes them.
+        """Steps from a state and its work to some times by machine code, as of :meth:`steps_from`."""
+        return self.steps_from(np.concatenate([[state.t], state.q, state.v, work]), ends, rows)
+
+    def steps_from(self, begin: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
+        """Steps to some times by machine code, as far as it finishes them.
 
         Parameters
         ----------
-        state, work : State, ndarray
-            Where they begin.
+        begin : ndarray, shape (4 + n_q + n_v,)
+            (t, q, v, work) where they begin.
         ends : ndarray, shape (k,)
             Ends of the steps [s].
         rows : ndarray, shape (k, 4 + n_q + n_v)
@@ -187,7 +191,7 @@ class MechanismStepper:
         if self.memory is None:
             return LoopOfSteps(0, 0.0, [], False)
         self.memory = self.memory.fitting()
-        return self.memory.advance(state, work, ends, rows)
+        return self.memory.advance(begin, ends, rows)
 
     def examined(self, state: State, h: float) -> list[Paradox]:
         """Painlevé's paradoxes of a step by machine code."""

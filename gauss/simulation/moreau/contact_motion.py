@@ -1,11 +1,12 @@
 """A motion by kernels of pairs of shapes, advanced from time to time: by machine code, and by Python where that stops."""
 
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gauss.codegen.kernels.step_memory import CHANGES_ROOM
-from gauss.dynamics.contact.contact_changes import ModeChange
+from gauss.dynamics.contact.contact_changes import ModeChange, RecordedChanges
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
@@ -48,11 +49,16 @@ class ContactMotion:
         Steps, and those of the convex relaxation of Coulomb's law.
     largest : float
         Largest error of the laws of contact, relative.
+    state : State
+        The state.
+    work : ndarray, shape (3,)
+        Work of drives and of forces on bodies, energy lost, since the start [J].
     events : list of Event
         Changes of the contact mode.
     """
 
     stepper: FreeBodyStepper | MechanismStepper
+    _noted: list[tuple[list[float], RecordedChanges | list[ModeChange], FreeBodyStepper | MechanismStepper]]
 
     def __init__(self, system: System, held: bool = False, stepper: FreeBodyStepper | MechanismStepper | None = None):
         self.system, self.stepper = system, stepper or new_contact_stepper(system, held)
@@ -62,9 +68,35 @@ class ContactMotion:
     def begin(self, start: State):
         """Begin at a state."""
         self.stepper.forget()
-        self.state, self.work, self.start = start, np.zeros(3), start.t
-        self.steps, self.relaxed, self.largest = 0, 0, 0.0
-        self.events: list[Event] = []
+        self.continue_from(start, np.zeros(3))
+        self.start, self.steps, self.relaxed, self.largest = start.t, 0, 0, 0.0
+        self.events = []
+
+    @property
+    def state(self) -> State:
+        """The state, made when asked for."""
+        return self._state_of(self.reached)
+
+    @property
+    def work(self) -> np.ndarray:
+        """Work (3,) of drives and of forces on bodies, energy lost, since the start [J]."""
+        return self.reached[-3:]
+
+    def continue_from(self, state: State, work: np.ndarray):
+        """Be at another state, with another work."""
+        self.reached = np.concatenate([[state.t], state.q, state.v, work])
+
+    @property
+    def events(self) -> list[Event]:
+        """Changes of the contact mode; those noted since they were last asked for become events here."""
+        noted, self._noted = self._noted, []
+        for times, changes, stepper in noted:
+            self._events += self._made(times, changes, stepper.elements, stepper.first_set_valued)
+        return self._events
+
+    @events.setter
+    def events(self, events: list[Event]):
+        self._events, self._noted = events, []
 
     def hold(self, inputs: np.ndarray):
         """Set the inputs of the next steps."""
@@ -72,7 +104,7 @@ class ContactMotion:
 
     def jump(self, state: State, work: np.ndarray):
         """Continue from a state after a jump of prescribed velocities, with its work."""
-        self.state, self.work = state, work
+        self.continue_from(state, work)
 
     def advance(self, ends: np.ndarray) -> np.ndarray:
         """Make steps to some times [s], and return (t, q, v, work) at these, (k, row).
@@ -82,10 +114,13 @@ class ContactMotion:
         GaussError
             If the first step fails. If another one fails, the rows end before it.
         """
-        ends, done = np.ascontiguousarray(ends), 0  # machine code reads them
-        rows = np.empty((ends.size, self.row))
+        return self.filled(np.ascontiguousarray(ends), np.empty((ends.size, self.row)))  # machine code reads them
+
+    def filled(self, ends: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Rows of :meth:`advance`, written into an array; both arrays are contiguous."""
+        done = 0
         while done < ends.size:
-            count, goes_on = self._by_machine_code(ends[done:], rows[done:])
+            count, goes_on = self._by_machine_code(*((ends[done:], rows[done:]) if done else (ends, rows)))
             done += count
             if done == ends.size or goes_on:
                 continue
@@ -100,17 +135,17 @@ class ContactMotion:
 
     def _by_machine_code(self, ends: np.ndarray, rows: np.ndarray) -> tuple[int, bool]:
         """Number of steps that machine code finishes, and whether it may continue."""
-        begin, loop = self.state, self.stepper.run(self.state, self.work, ends, rows)
+        begin = self.reached
+        loop = self.stepper.steps_from(begin, ends, rows)
         if not loop.steps:
             return 0, False
         if loop.changes:
-            self._note([begin.t, *ends.tolist()], loop.changes)
+            self._note([float(begin[0]), *ends.tolist()], loop.changes)
         self.steps, self.largest = self.steps + loop.steps, max(self.largest, loop.largest)
         if loop.doubtful:
-            before = begin if loop.steps == 1 else self._state_of(rows[loop.steps - 2])
-            self._examine(before, float(ends[loop.steps - 1]))
-        last = rows[loop.steps - 1]
-        self.state, self.work = self._state_of(last), last[-3:].copy()
+            before = begin if loop.steps == 1 else rows[loop.steps - 2]
+            self._examine(self._state_of(before), float(ends[loop.steps - 1]))
+        self.reached = rows[loop.steps - 1].copy()
         return loop.steps, loop.doubtful or len(loop.changes) >= CHANGES_ROOM
 
     def _examine(self, before: State, t: float):
@@ -122,8 +157,8 @@ class ContactMotion:
             self.warned |= {key} if found else set()
 
     def _state_of(self, row: np.ndarray) -> State:
-        own, n_q = row.copy(), self.n_q
-        return State(float(own[0]), own[1 : 1 + n_q], own[1 + n_q : -3])
+        end = 1 + self.n_q
+        return State(float(row[0]), row[1:end], row[end:-3])
 
     def _by_python(self, t: float) -> np.ndarray:
         begin, h = self.state, t - self.state.t
@@ -133,19 +168,23 @@ class ContactMotion:
         self.paradoxes.warn(found.paradoxes, begin.t)
         if found.modes is not None:
             self._note([begin.t, t], self.stepper.record.update(found.modes))
-        self.state, self.work = self.stepper.projected(State(t, found.q, found.v)), self.work + h * found.power
-        return np.concatenate([[t], self.state.q, self.state.v, self.work])
+        self.continue_from(self.stepper.projected(State(t, found.q, found.v)), self.work + h * found.power)
+        return self.reached.copy()
 
     def _python_step(self, h: float) -> FreeBodyStep | MechanismStep:
         return self.stepper.python_step(self.state, h)
 
-    def _note(self, times, changes: list[ModeChange]):
-        """Keep changes of the contact mode as events, each at the end of its step; those that begin closed are none."""
-        names, first = self.stepper.elements, self.stepper.first_set_valued
+    def _note(self, times: list[float], changes: RecordedChanges | list[ModeChange]):
+        """Keep changes of the contact mode in steps between some times, until the events are asked for."""
+        self._noted.append((times, changes, self.stepper))
+
+    def _made(self, times: list[float], changes: Iterable[ModeChange], names: list[str], first: int) -> Iterator[Event]:
+        """Events of changes, each at the end of its step; elements that begin closed make none."""
         for change in changes:
             begins = not change.before and (change.element >= first or times[change.step] == self.start)
             event = event_of(change, names[change.element], float(times[change.step + 1]), begins)
-            self.events += [] if event is None else [event]
+            if event is not None:
+                yield event
 
     def slept(self) -> SleepRecord | None:
         """Which bodies slept; None in motions without sleeping."""
@@ -169,5 +208,6 @@ class ContactMotion:
 
     def take(self, kept: ContactMotionState):
         """Continue from what was kept."""
-        self.state, self.work, self.stepper.known, modes, _ = kept
+        state, work, self.stepper.known, modes, _ = kept
+        self.continue_from(state, work)
         self.stepper.record.take(modes)

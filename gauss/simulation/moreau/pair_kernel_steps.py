@@ -7,6 +7,7 @@ import numpy as np
 from gauss.codegen.kernels import Control, LoopStatus
 from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_question
+from gauss.dynamics.contact.compiled_step_memory import KEPT_STEPS
 from gauss.dynamics.contact.contact_stepper import lent_stepper, new_contact_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.overlap_resolution import resolved
@@ -53,9 +54,10 @@ class PairKernelSteps:
         program = CalledProgram if ask.laws.called else Program
         self.program = program(ask.system, ask.laws, memory=self.gaps, inputs=held)
         self.layout, self.key = self.program.layout, (ask.laws.key, held, self.gaps)
+        self.ends, self.rows = np.empty(0), np.empty((0, 0))  # of a call
         self.inputs = np.zeros(len(self.layout.parameters))
         row, end, n_v = self.layout.row, 1 + self.layout.n_q, self.layout.n_v
-        self.parts = slice(1, end), slice(end, end + n_v), slice(end, row), slice(row - 3, row)
+        self.rates = slice(end, row)  # and work
         self.kept_parts = slice(row), slice(row, row + n_v + 3), slice(self.layout.size - self.inputs.size, None)
 
     def prepared_steps(self) -> "PairKernelSteps":
@@ -89,13 +91,12 @@ class PairKernelSteps:
 
     def call(self, point: np.ndarray, grid: np.ndarray, n: int):
         """Make n steps from a point to the times of a grid."""
-        motion, (q, v, rates, work), (reached, means, inputs) = self.motion, self.parts, self.kept_parts
-        row = point[reached].copy()
-        motion.state, motion.work = State(float(row[0]), row[q], row[v]), row[work]
-        motion.events.clear()  # of the steps of this call alone: a motion from Python may have no end
+        motion, rates, (reached, means, inputs) = self.motion, self.rates, self.kept_parts
+        motion.reached = row = point[reached].copy()
+        motion.events = []  # of the steps of this call alone: a motion from Python may have no end
         motion.hold(point[inputs])
         try:
-            rows = motion.advance(grid[:n, 0])
+            rows = motion.filled(*self._arrays_of(grid[:n, 0]))
         except GaussError:
             self.control.status = float(LoopStatus.UNSOLVED)
             return
@@ -111,6 +112,16 @@ class PairKernelSteps:
         if self.gaps:
             point[means.stop :][: self.gaps] = motion.stepper.gap_forces()
 
+    def _arrays_of(self, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Ends of steps (n,), and rows for what is reached: those of the call before, where few steps are as many."""
+        if ends.size != self.ends.size:
+            found = np.array(ends), np.empty((ends.size, self.layout.row))
+            if ends.size <= KEPT_STEPS:
+                self.ends, self.rows = found
+            return found
+        self.ends[:] = ends
+        return self.ends, self.rows
+
     def repeated(self, point: np.ndarray, t: float) -> np.ndarray:
         """Point after a step to a time [s].
 
@@ -124,7 +135,7 @@ class PairKernelSteps:
         except GaussError as error:
             raise SimulationError(str(error)) from error
         reached = point.copy()
-        reached[: self.layout.row] = [t, *self.motion.state.q, *self.motion.state.v, *self.motion.work]
+        reached[: self.layout.row] = self.motion.reached
         return reached
 
     def kept(self):

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.dynamics.contact.asleep_bodies import BodySleepers
 from gauss.dynamics.contact.asleep_trees import TreeSleepers
-from gauss.dynamics.contact.contact_changes import ModeChange
+from gauss.dynamics.contact.contact_changes import ModeChange, RecordedChanges
 from gauss.dynamics.contact.contact_stepper import Stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
 from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
@@ -95,7 +95,8 @@ class SleepingMotion(ContactMotion):
         """Steps between two looks."""
         if self.asleep.which.all():
             state = self.state
-            self.steps, self.state = self.steps + ends.size, State(float(ends[-1]), state.q, state.v)
+            self.steps += ends.size
+            self.continue_from(State(float(ends[-1]), state.q, state.v), self.work)
             return np.column_stack([ends, np.tile(np.concatenate([state.q, state.v, self.work]), (ends.size, 1))])
         rows = super().advance(ends)
         is_fast = self.sleepers.speeds(rows[:, 1 + self.system.n_q : -3], self.state) > self.speed
@@ -119,7 +120,7 @@ class SleepingMotion(ContactMotion):
         lost, v = float(self.sleepers.kinetic_energies(self.state)[new].sum()), self.state.v.copy()
         for k in np.flatnonzero(new):
             v[self.sleepers.rates[k]] = 0.0
-        self.state, self.work = State(self.state.t, self.state.q, v), self.work + np.array([0.0, 0.0, lost])
+        self.continue_from(State(self.state.t, self.state.q, v), self.work + np.array([0.0, 0.0, lost]))
         self._set_asleep(np.where(new, island, self.asleep.island), known)
         names = self._names(new)
         self.events.append(Event(self.state.t, "sleeps", names, lost))
@@ -188,7 +189,7 @@ class SleepingMotion(ContactMotion):
             self.stepper.known = known
             self._wake(pushed)
 
-    def _note(self, times, changes: list[ModeChange]):
+    def _note(self, times: list[float], changes: RecordedChanges | list[ModeChange]):
         closed = self.asleep.closed
         if closed.any():  # an element of which contacts rest is closed all the time
             least = closed.astype(int)[self.asleep.places[[one.element for one in changes]]].tolist()
