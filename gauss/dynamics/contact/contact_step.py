@@ -22,6 +22,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Function, from_disk, jacobian, write
 from gauss.codegen.kernels import CompiledContactSolver, ContactSolver, Round
+from gauss.dynamics.contact.convex_relaxation import CONVEX_ERROR, CONVEX_STEPS, least_over_cones, on_cones
 from gauss.errors import SimulationError
 
 LAW_TOLERANCE = 1e-10  # error of the laws that ends Newton's method, in units of the scene times 1 + the largest rate
@@ -37,7 +38,6 @@ ROUNDS_OF_DENSE = (
     Round(30, 0.0, 15),
     Round(300, 0.0, 15),
 )
-CONVEX_STEPS, CONVEX_ERROR = 20_000, 1e-6  # of the convex relaxation; its error as ACCEPTED_LAW_ERROR
 LEAST_DIAGONAL = 1e-14  # relative to the largest diagonal entry of W: smaller rows are empty
 
 
@@ -98,34 +98,21 @@ class ContactProblem:
         return np.maximum(w, LEAST_DIAGONAL * w.max(initial=1e-300))
 
     def _convex(self, start: np.ndarray) -> np.ndarray:
-        """Forces of the convex relaxation, by accelerated projected gradients (Nesterov 1983; O'Donoghue, Candès 2015)."""
+        """Forces of the convex relaxation."""
         goal, size = CONVEX_ERROR * (1.0 + np.abs(self.b).max()), np.linalg.eigvalsh(self.W)[-1]
-        f = ahead = self._allowed(start)
-        momentum = 1.0
-        for _ in range(CONVEX_STEPS):
-            new = self._allowed(ahead - (self.W @ ahead + self.b) / size)
-            if np.abs(self._allowed(new - (self.W @ new + self.b) / size) - new).max() * size <= goal:
-                return new
-            if (ahead - new) @ (new - f) > 0.0:
-                momentum = 1.0
-            after = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * momentum * momentum))
-            ahead = new + (momentum - 1.0) / after * (new - f)
-            f, momentum = new, after
-        raise SimulationError(
-            "no forces of contacts and set-valued elements were found that obey their laws; shorten the step."
-        )
+        f, error = least_over_cones(lambda f: self.W @ f + self.b, self._allowed, start, size, goal, CONVEX_STEPS)
+        if not error <= goal:
+            raise SimulationError(
+                "no forces of contacts and set-valued elements were found that obey their laws; shorten the step."
+            )
+        return f
 
     def _allowed(self, f: np.ndarray) -> np.ndarray:
         """Projection of forces on the friction cones and the limits of set-valued elements."""
         laws, f = self.laws, f.copy()
         smooth = np.setdiff1d(laws.normal, laws.under)
         f[smooth] = np.maximum(f[smooth], 0.0)
-        for t, n, mu in zip(laws.across, laws.under, laws.friction, strict=True):
-            size = np.hypot(*f[t])
-            if size > mu * f[n]:  # outside the cone: on its surface, or at its tip
-                height = max(0.0, (f[n] + mu * size) / (1.0 + mu * mu))
-                f[t] = mu * height / size * f[t]
-                f[n] = height
+        f[laws.under], f[laws.across] = on_cones(f[laws.under], f[laws.across], laws.friction)
         f[laws.set_valued] = np.clip(f[laws.set_valued], -laws.limit, laws.limit)
         return f
 

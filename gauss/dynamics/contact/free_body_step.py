@@ -17,6 +17,7 @@ from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, compil
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
 from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem
+from gauss.dynamics.contact.convex_relaxation import CONVEX_ERROR, relaxed_impulses
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
 from gauss.dynamics.contact.free_body_step_parts import BegunStep, FreeBodyStep
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
@@ -33,6 +34,7 @@ from gauss.system import State, System
 
 UNSOLVED = 1e-3  # error of the laws, relative: beyond it the convex relaxation is solved
 REACH_MARGIN = 1.5  # of the distance that bodies approach within a step by their speeds before contact
+DENSE_CONTACTS = 200  # contacts up to which the convex relaxation is that of one matrix; of more, W stays a sparse product
 ATTEMPTS = 8  # steps with ever larger bounds of the speeds
 # Of speed² over the least radius of a body: second derivatives of gaps are of that size, unless edges are nearly parallel.
 MOST_CURVED = 4.0
@@ -250,6 +252,13 @@ class FreeBodyStepper:
         start, friction = h * self._start(near), self.table.friction[near.law]
         f, added, (left, *_) = self.graph.solve(near.J, begun.mass, b, friction, start, LAW_TOLERANCE * scale)
         if left <= UNSOLVED * scale:
+            return f / h, added, left / scale
+        if m > DENSE_CONTACTS:
+            other, pushed, error = relaxed_impulses(near.J, begun.mass, bodies, b / unit, friction, f / unit)
+            if error * unit <= CONVEX_ERROR * scale:
+                return other * unit / h, pushed * unit, None
+            if error * unit < left:  # neither is found: the lesser error is told, and warned of at the end of the motion
+                return other * unit / h, pushed * unit, error * unit / scale
             return f / h, added, left / scale
         f, added = self._dense(near, begun, bodies, b / unit, f / unit, friction)
         return f * unit / h, added * unit, None
