@@ -1,6 +1,7 @@
 """Command line: each command parses arguments and calls a few functions; one file for each group of commands."""
 
 import os
+import re
 import sys
 import warnings
 from errno import EDQUOT, EFBIG, ENOSPC
@@ -13,6 +14,8 @@ from gauss.cli.common import group
 from gauss.errors import GaussError
 from gauss.versions import VERSION
 
+# arguments of functions that are named in errors, with a text or what follows, and are options here
+ARGUMENT = re.compile(r"\b(integrator|step|rtol|atol|backend|stabilisation)=(?:'(\w+)'| ?)")
 FULL = (ENOSPC, EDQUOT, EFBIG)  # the disk, the quota, or the file is full
 
 app = group(pretty_exceptions_enable=False)
@@ -36,6 +39,11 @@ app.add_typer(bench.bench, name="bench")
 app.add_typer(bench.problems, name="problems")
 
 
+def as_options(message: str) -> str:
+    """Message of an error with arguments as options of the command line: ``step=1e-3`` is ``--step 1e-3``."""
+    return ARGUMENT.sub(lambda found: f"--{found[1]} {found[2] or ''}", message)
+
+
 def _say_version(asked: bool):
     if asked:
         typer.echo(f"gauss {VERSION}")
@@ -57,7 +65,7 @@ def main():
     try:
         app()
     except GaussError as error:
-        typer.secho(f"error: {error}", fg="red", err=True)
+        typer.secho(f"error: {as_options(str(error))}", fg="red", err=True)
         raise SystemExit(2) from None
     except OSError as error:
         if error.errno not in FULL:

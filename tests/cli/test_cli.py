@@ -11,6 +11,7 @@ import pytest
 
 import gauss
 import gauss.__main__
+from gauss.cli import as_options
 from gauss.cli.common import tolerances
 from gauss.errors import FileError, MissingPackageError
 from tests.support.files import call
@@ -232,3 +233,8 @@ def test_a_folder_of_the_name_of_a_model_hides_nothing(tmp_path, monkeypatch):
     for name in ("mine", "."):
         with pytest.raises(FileError, match="it is a folder; expected .toml"):
             gauss.load(name)
+
+
+def test_errors_name_options_not_arguments():
+    named = as_options("step= [s], as step=1e-3, or integrator='rk4'.")
+    assert named == "--step [s], as --step 1e-3, or --integrator rk4."

@@ -38,7 +38,7 @@ def test_sparse_products_find_the_velocities_of_one_matrix(unmet, monkeypatch):
 
 
 def test_steps_end_and_the_lesser_error_is_told(unmet, monkeypatch):
-    monkeypatch.setattr(convex_relaxation, "STEPS_OF_MANY", FEW_STEPS)
+    monkeypatch.setattr(convex_relaxation, "SPARSE_STEPS", FEW_STEPS)
     found = unmet(0)
     assert found.error is not None and np.isfinite(found.v).all()
     assert found.error <= LARGEST_TOLD

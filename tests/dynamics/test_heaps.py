@@ -10,7 +10,7 @@ from gauss.codegen import machine
 from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, Round
 from gauss.codegen.kernels.block_contacts import write_block_contacts
 from gauss.codegen.kernels.block_lu import write_order
-from gauss.dynamics.contact.block_contact_laws import FINE, MANY, ROUNDS_OF_MANY
+from gauss.dynamics.contact.block_contact_laws import FINE, LEAST_CONTACTS, REDUNDANT_ROUNDS
 from gauss.dynamics.contact.contact_step import contact_solver
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 
@@ -41,8 +41,8 @@ def problems():
 
 def test_steps_of_a_heap_end_at_fine_residuals(problems):
     """Most of them within the rounds that every residual takes."""
-    at_most = sum(each.steps for each in ROUNDS_OF_MANY if each.above <= 1.0 and each.below == np.inf)
-    assert all(len(graph.bodies) >= MANY for graph, *_ in problems)
+    at_most = sum(each.steps for each in REDUNDANT_ROUNDS if each.above <= 1.0 and each.below == np.inf)
+    assert all(len(graph.bodies) >= LEAST_CONTACTS for graph, *_ in problems)
     results = [(given[-1], result) for _, given, (_, _, result) in problems[-LAST:]]
     assert np.median([steps for _, (_, steps, _) in results]) <= at_most
     assert all(residual <= FINE * tolerance for tolerance, (residual, *_) in results)

@@ -43,11 +43,12 @@ class BlockContactLaws:
     ----------
     normal, friction, project_normal, project_friction : Function
         As of :class:`gauss.codegen.kernels.ContactSolver`.
-    rounds, rounds_of_many : tuple of Round
-        What is tried one after the other, each from the best forces so far; the latter where many contacts are redundant:
-        where more stick by the forces that are known than the freedoms of the bodies bear.
-    many : int
-        Number of contacts from which on they are many.
+    rounds, redundant_rounds : tuple of Round
+        What is tried one after the other, each from the best forces so far; the latter in problems of
+        ``least_contacts`` or more whose contacts are redundant: those that stick by the known forces bear more components of
+        force than the bodies have freedoms.
+    least_contacts : int
+        Number of contacts.
     """
 
     normal: Function
@@ -55,8 +56,8 @@ class BlockContactLaws:
     project_normal: Function
     project_friction: Function
     rounds: tuple[Round, ...]
-    rounds_of_many: tuple[Round, ...]
-    many: int
+    redundant_rounds: tuple[Round, ...]
+    least_contacts: int
 
 
 class _BlockContactWriter:
@@ -77,12 +78,12 @@ class _BlockContactWriter:
     def write(self) -> ir.Function:
         r = self.r
         self._measure()
-        few, many = self.laws.rounds, self.laws.rounds_of_many
-        first, end = r.variable(0, INTEGER), r.variable(len(few), INTEGER)
-        with r.when((self.m >= self.laws.many) & self._are_redundant()):
-            first[0], end[0] = len(few), len(few) + len(many)
+        usual, redundant = self.laws.rounds, self.laws.redundant_rounds
+        first, end = r.variable(0, INTEGER), r.variable(len(usual), INTEGER)
+        with r.when((self.m >= self.laws.least_contacts) & self._are_redundant()):
+            first[0], end[0] = len(usual), len(usual) + len(redundant)
         span = first[0], end[0]
-        least, total, rounds = write_rounds(self, "sparse", few + many, self.m * 3, lambda: self.tolerance, span)
+        least, total, rounds = write_rounds(self, "sparse", usual + redundant, self.m * 3, lambda: self.tolerance, span)
         self.accumulate()
         self.result[0], self.result[1] = least[0], total[0]
         self.result[2] = r.as_double(rounds[0])

@@ -5,6 +5,7 @@ finished here: where pairs of kinds of shapes are met for the first time, arrays
 bodies asleep are pushed.
 """
 
+import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
@@ -74,9 +75,11 @@ class _FreeBodyStepWriter(BodiesOfStep):
         count = at.table("count")
         m = count[0]
         with r.when(~((count[1] > 0) | (count[2] > 0) | (m > at.n["capacity"]))):
+            by_shape, by_step = s["curved"] * speed * speed, speed * 2.0 / (self.remaining * s["h"])
+            curved = r.choose(by_shape < by_step, by_shape, by_step)
             with r.each(m) as c:
                 self.touch(c)
-                self._keep_curvature(c, s["curved"] * speed * speed)
+                self._keep_curvature(c, curved)
             r.call(self.shared[1], *r.arrays)
             self._known(m)
             with r.each(m) as c:
@@ -88,7 +91,7 @@ class _FreeBodyStepWriter(BodiesOfStep):
         return r.done()
 
     def _keep_curvature(self, c: Value, most: Value):
-        """Second derivative of a gap, or none where features are so nearly parallel that it tells nothing of a step."""
+        """Second derivative of a gap, or none where it tells nothing of a step: of parallel features, of long steps."""
         row = self.at.table("rows", POINTER).after(c * ROW)
         with self.r.when(self.r.absolute(row[52]) > most):
             row[52] = 0.0
@@ -102,7 +105,7 @@ class _FreeBodyStepWriter(BodiesOfStep):
         law = at.table("law")[p] - 1
         at["mu"][place], e = at["friction"][law], at["restitution"][law]
         closed = r.choose(s["removal"] > 0.0, at["f"][place * 3], 0.0)
-        (left,) = r.inline(self.functions.to_close, row[0], row[52], self._time())
+        (left,) = r.inline(self.functions.to_close, row[0], row[52], self._time(), r.number(np.inf))
         gap = r.choose(s["removal"] > 0.0, row[0], left)
         given = gap, first[0], s["h"], s["rest"], s["share"], r.maximum(s["h"], s["removal"]), closed
         (plastic,) = r.inline(self.functions.plastic, *given)

@@ -1,8 +1,8 @@
 """Laws of contact of many bodies, and the rounds of Newton steps in which their problem is solved.
 
 Newton steps with hardly any regularisation nearly always converge. In heaps contacts cycle between sticking, slipping and
-open: all contacts are regularised, or those alone that cycle. Where more contacts stick than the bodies have freedoms, the
-forces are not unique, and the search ends at residuals that more steps hardly lessen.
+open: all contacts are regularised, or those alone that cycle. Where contacts that stick bear more components of force than
+the bodies have freedoms, forces are not unique, and the search ends at residuals that more steps hardly lessen.
 """
 
 from functools import cache
@@ -35,12 +35,12 @@ LAST_ROUNDS = (
     Round(300, 1e-1, 40, decay=0.7),
     Round(0, 1e-7, 12),
 )
-MANY = 100  # contacts from which on redundant ones have rounds of their own: of fewer, all rounds cost little
-CLOSE = 1e3  # residual, in units of its tolerance: smaller ones are worth Newton steps with hardly any regularisation
-# The same: residuals between both are left in heaps that come to rest, where redundant contacts stick but for some that slip
-# by micrometres per second. In a bin of 100 balls, 200 Newton steps more lessened them by half at most.
-FINE = 1e5
-ROUNDS_OF_MANY = (
+LEAST_CONTACTS = 100  # of problems whose redundant contacts have rounds of their own: of fewer, all rounds cost little
+# Residuals in units of their tolerance. Those below CLOSE are worth Newton steps with hardly any regularisation; those from
+# CLOSE to FINE are left in heaps that come to rest, where contacts stick but for some that slip by micrometres per second:
+# in a bin of 100 balls, 200 Newton steps more lessened them by half at most.
+CLOSE, FINE = 1e3, 1e5
+REDUNDANT_ROUNDS = (
     Round(0, 1e-7, 12),
     Round(0, 3e-2, 28, decay=0.8),
     Round(0, 1e-2, 20, decay=0.6),
@@ -57,4 +57,4 @@ def block_contact_laws() -> BlockContactLaws:
     """Laws of contact and friction of the block-sparse problem."""
     laws = contact_solver()
     functions = laws.normal, laws.friction, laws.project_normal, laws.project_friction
-    return BlockContactLaws(*functions, ROUNDS + LAST_ROUNDS, ROUNDS_OF_MANY, MANY)
+    return BlockContactLaws(*functions, ROUNDS + LAST_ROUNDS, REDUNDANT_ROUNDS, LEAST_CONTACTS)

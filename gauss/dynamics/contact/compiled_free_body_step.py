@@ -123,4 +123,4 @@ def compiled_free_body_step(laws) -> CompiledFreeBodyStep:
         functions = place_function(), begin_function(), end_function(), laws, *laws_of_gaps(), gap_prediction(), REST_STEPS
         return CompiledFreeBodyStep(FreeBodyFunctions(*functions))
 
-    return from_disk((CompiledFreeBodyStep, laws.rounds, laws.rounds_of_many, laws.many), make)
+    return from_disk((CompiledFreeBodyStep, laws.rounds, laws.redundant_rounds, laws.least_contacts), make)

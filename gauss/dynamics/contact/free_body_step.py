@@ -37,6 +37,7 @@ REACH_MARGIN = 1.5  # of the distance that bodies approach within a step by thei
 DENSE_CONTACTS = 200  # contacts up to which the convex relaxation is that of one matrix; of more, W stays a sparse product
 ATTEMPTS = 8  # steps with ever larger bounds of the speeds
 # Of speed² over the least radius of a body: second derivatives of gaps are of that size, unless edges are nearly parallel.
+# Those that bend a gap by more than the way of the fastest point are of steps in which bodies turn too far to be predicted.
 MOST_CURVED = 4.0
 TWIST = 8  # doubles of a row of velocities
 
@@ -226,7 +227,9 @@ class FreeBodyStepper:
         reach = 2.0 * REACH_MARGIN * (1.0 - share) * h * speed
         near, overlaps = self.detection.find(begun.bodies, reach, UNSEEN_OVERLAP)
         near = confirmed(near, overlaps, self.table, state.t)
-        near.bias[np.abs(near.bias[:, 0]) > self.settings["curved"] * speed * speed, 0] = 0.0
+        curved = np.abs(near.bias[:, 0])
+        far = (curved > self.settings["curved"] * speed * speed) | (curved * (1.0 - share) * h > 2.0 * speed)
+        near.bias[far, 0] = 0.0
         return near
 
     def _impacts(self, near: NearContacts, begun: BegunStep, known: np.ndarray, h: float, share: float) -> np.ndarray:
@@ -284,7 +287,7 @@ class FreeBodyStepper:
         """
         time, before, rest = h * (1.0 - share), known[:, 0, 0], self._rest(begun)
         b, curved = known[..., 1] + time * near.bias, near.bias[:, 0]
-        width = near.gap if self.removal else gap_to_close(near.gap, curved, time)
+        width = near.gap if self.removal else gap_to_close(near.gap, curved, time, np.inf)
         restitution, closed = self.table.restitution[near.law], self._start(near)[:, 0] * (self.removal > 0.0)
         for e in self.coefficients:
             mine = slice(None) if len(self.coefficients) == 1 else restitution == e

@@ -59,9 +59,13 @@ def gap_after(width, rate, curvature, time):
     return width + time * (rate + 0.5 * time * curvature)
 
 
-def gap_to_close(width, curvature, time):
-    """Gap after a time at whose end its rate is zero: what is left to close; numbers, arrays or expressions."""
-    return gap_after(width, -time * curvature, curvature, time)
+def gap_to_close(width, curvature, time, most):
+    """Gap after a time at whose end its rate is zero: what is left to close; numbers, arrays or expressions.
+
+    Curvatures that bend the gap by more than ``most`` [m] tell nothing of the step: bodies turn too far in it.
+    """
+    left = gap_after(width, -time * curvature, curvature, time)
+    return math.where(math.abs(left - width) > most, width, left)
 
 
 def removal_time(system: System) -> float:
@@ -75,7 +79,7 @@ def laws_of_gaps() -> tuple[Function, Function, Function, Function]:
         write(lambda x: [is_impact(*x)], 5, name="impact"),
         write(lambda x: [least_rate(x[0], x[1], 0.0, *x[2:])], 7, name="plastic"),
         write(lambda x: [least_rate(*x)], 8, name="elastic"),
-        write(lambda x: [gap_to_close(*x)], 3, name="to_close"),
+        write(lambda x: [gap_to_close(*x)], 4, name="to_close"),
     )
 
 

@@ -243,11 +243,12 @@ class MoreauStepper:
         start : ndarray, shape (n,)
             Forces of the last step, or expressions.
         """
-        n, time = len(self.restitution), h * (1.0 - share)
-        width = touch.width if self.removal else gap_to_close(touch.width, touch.bias[:n], time)
-        gaps = zip(width, touch.rate, self.restitution, start if self.removal else np.zeros(len(start)), strict=False)
+        given = h * (1.0 - share), self.system.scale.length
+        curved = [] if self.removal else [gap_to_close(*gap, *given) for gap in zip(touch.width, touch.bias, strict=False)]
+        closed = start if self.removal else np.zeros(len(start))
+        gaps = zip(curved or touch.width, touch.rate, self.restitution, closed, strict=False)
         removal = math.maximum(h, self.removal) if self.removal else h
-        least = [least_rate(width, rate, e, h, rest, share, removal, closed) for width, rate, e, closed in gaps]
+        least = [least_rate(width, rate, e, h, rest, share, removal, force) for width, rate, e, force in gaps]
         least += [0.0] * (touch.rate.size - len(least))
         return touch.rate + h * (touch.J @ acceleration + (1.0 - share) * touch.bias) - np.array(least)
 
