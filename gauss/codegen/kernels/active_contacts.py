@@ -43,7 +43,7 @@ class ActiveContacts:
         removal = r.maximum(s["h"], s["removal"])
         with r.each(m + g) as i:
             closed = r.choose(s["removal"] > 0.0, self.at["force"][i], 0.0)
-            curved = self.at["bias"][i], s["h"] * self.at.remaining, s["length"]
+            curved = self.at["bias"][i], s["h"] * self.at.remaining, s["most_bent"]
             (left,) = r.inline(self.functions.to_close, self.at["gap"][i], *curved)
             gap = r.choose(s["removal"] > 0.0, self.at["gap"][i], left)
             given = gap, self.at["rate"][i], s["h"], s["rest"], s["share"], removal, closed

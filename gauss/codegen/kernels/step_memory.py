@@ -31,7 +31,7 @@ ADDRESSES = (
 )
 TERMS = ("M", "tau", "power", "bodies", "J", "gap", "rate", "K", "bias")  # of the mechanism, in this order
 FINISHED, REPEATED, IMPACT = range(3)  # status of a step: what Python does where it is not finished
-STEP_SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "missed", "jammed", "length", "contact_unit", "removal")
+STEP_SETTINGS = ("t", "h", "share", "rest", "slow", "margin", "missed", "jammed", "most_bent", "contact_unit", "removal")
 LOOP_SETTINGS = ("pace", "resting", "sliding", "shares", "recorded", "largest")
 CHANGE = 5  # step, element, its mode, whether it had an impact, energy lost
 CHANGES_ROOM = 256  # changes of the contact mode that are kept, beside those of one step

@@ -62,7 +62,7 @@ def gap_after(width, rate, curvature, time):
 def gap_to_close(width, curvature, time, most):
     """Gap after a time at whose end its rate is zero: what is left to close; numbers, arrays or expressions.
 
-    Curvatures that bend the gap by more than ``most`` [m] tell nothing of the step: bodies turn too far in it.
+    Curvatures that bend the gap by more than ``most``, in its unit, tell nothing of the step: bodies turn too far in it.
     """
     left = gap_after(width, -time * curvature, curvature, time)
     return math.where(math.abs(left - width) > most, width, left)

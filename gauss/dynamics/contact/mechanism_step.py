@@ -87,7 +87,7 @@ class MechanismStepper:
             "missed": MISSED_CLOSING_RATE,
             "removal": removal,
             "jammed": JAMMED_RESPONSE,
-            "length": system.scale.length,
+            "most_bent": system.scale.time,  # gaps of the length of the scene, in the unit of rows
             "contact_unit": self.rows.contact_unit,
         }
         self.record = ModeRecord(len(self.rows.elements))
@@ -318,7 +318,7 @@ class MechanismStepper:
         """Rates (n,) after a step without forces, less the least that gaps may have; with the forces of the last step."""
         after = rows.rate + h * (rows.K @ begun.acceleration + (1.0 - share) * rows.bias)
         coefficients, curved = self.rows.coefficients, rows.bias[: rows.gap.size]
-        gap = rows.gap if self.removal else gap_to_close(rows.gap, curved, h * (1.0 - share), self.system.scale.length)
+        gap = rows.gap if self.removal else gap_to_close(rows.gap, curved, h * (1.0 - share), self.constants["most_bent"])
         for e in coefficients:
             mine = slice(0, rows.gap.size) if len(coefficients) == 1 else np.flatnonzero(rows.restitution == e)
             given = float(e), h, rest, share, max(h, self.removal), force[: rows.gap.size][mine] * (self.removal > 0.0)

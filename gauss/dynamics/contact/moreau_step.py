@@ -243,7 +243,7 @@ class MoreauStepper:
         start : ndarray, shape (n,)
             Forces of the last step, or expressions.
         """
-        given = h * (1.0 - share), self.system.scale.length
+        given = h * (1.0 - share), self.system.scale.time  # gaps of the length of the scene, in the unit of rows
         curved = [] if self.removal else [gap_to_close(*gap, *given) for gap in zip(touch.width, touch.bias, strict=False)]
         closed = start if self.removal else np.zeros(len(start))
         gaps = zip(curved or touch.width, touch.rate, self.restitution, closed, strict=False)
