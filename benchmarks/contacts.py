@@ -19,7 +19,7 @@ timed come later. "first ms" is the first motion of all, with the machine code t
 
 The last scenes have many contacts: a stack, dominoes, balls and convex meshes that fall into a bin. Their error is the
 deepest penetration at the end [m], of boxes and meshes into the floor and of balls into each other and the walls. Rows
-of 30, 100 and 1000 balls show how a step grows with their number. Settled balls lie in the hollows of four others each. 100
+of 30, 100 and 1000 balls show how a step grows with their number. Packed balls lie in the hollows of four others each. 100
 of them got velocities of about 1 cm/s and moved for 0.04 s before, so that they creep: some of their redundant contacts slip
 by micrometres per second, and the laws are met to 1e-5 relative, not to 1e-10 as elsewhere. 1000 stand still, and MuJoCo
 takes its conjugate gradients there: its Newton solver takes seconds a step.
@@ -191,9 +191,9 @@ def many(name: str, scene, end: float, deepest: Callable) -> list[Way]:
     return [way, theirs(name, scene, end, lambda q, v: deepest(q.reshape(-1, 7)), step)]
 
 
-def settled(n: int, row: int, jolt: float, end: float, solver=None) -> list[Way]:
-    """Balls that have settled; the error is the deepest penetration at the end [m]."""
-    name, step = f"{n} balls, settled", 1e-3
+def packed(n: int, row: int, jolt: float, end: float, solver=None) -> list[Way]:
+    """Balls packed in a bin; the error is the deepest penetration at the end [m]."""
+    name, step = f"{n} balls, packed", 1e-3
     scene, wall = free_bodies.packed_balls(n, row, jolt)
     if jolt:
         still = gauss.simulate(scene, SETTLING, times=[SETTLING], integrator="time_stepping", step=step, progress=False)
@@ -213,8 +213,8 @@ def crowded() -> list[list[Way]]:
         many("100 balls in a bin", free_bodies.bin_of_balls(100, wall=wide), 0.6, lambda q: free_bodies.ball_depth(q, wide)),
         many("50 convex meshes in a bin", heap, 0.4, lambda q: mesh_depth(heap, q)),
         many("1000 balls in a bin", free_bodies.bin_of_balls(1000, wall=0.6), 0.3, lambda q: free_bodies.ball_depth(q, 0.6)),
-        settled(100, 5, JOLT, 0.05),
-        settled(1000, 10, 0.0, 0.01, mujoco.mjtSolver.mjSOL_CG),
+        packed(100, 5, JOLT, 0.05),
+        packed(1000, 10, 0.0, 0.01, mujoco.mjtSolver.mjSOL_CG),
     ]
 
 

@@ -57,30 +57,25 @@ def consistent(
     AssemblyError
         If the constraints cannot be met; it carries the closest pose and the residual of each constraint.
     """
-    return consistent_if_met(system, state, kept, required, least_violation, rough)[0]
-
-
-def consistent_if_met(
-    system: System, state: State, kept=(), required: bool = False, least_violation: bool = False, rough: bool = False
-) -> tuple[State, bool]:
-    """As :func:`consistent`, and whether the state is known to violate no constraint."""
     state = within_limits(system, state)
     if not system.has_closures:
-        return state, True
+        return state
     columns = fixed_columns(system, kept)
     if not columns:
         return _moved_freely(system, state, kept, rough, least_violation, columns)
     pose = assembled(system, state, columns, required)
     found = project_rates(system, pose.state, columns)
     if _is_met(system, found) and _keeps(system, state, found, columns):
-        return found, True
+        return found
     if not required:
         return _moved_freely(system, state, kept, rough, least_violation, columns)
-    return found, not least_violation and _check_start(system, found, _while_kept(kept), pose)
+    if not least_violation:
+        _check_start(system, found, _while_kept(kept), pose)
+    return found
 
 
-def _moved_freely(system: System, state: State, kept, rough: bool, least_violation: bool, columns) -> tuple[State, bool]:
-    """State near a guess in which every coordinate may change, those to be kept, too; whether it is known to be met."""
+def _moved_freely(system: System, state: State, kept, rough: bool, least_violation: bool, columns) -> State:
+    """State near a guess in which every coordinate may change, those to be kept, too."""
     pose = assembled(system, state, [], rough or _is_free(system, state, columns))
     found = project_rates(system, pose.state)
     if columns and not _is_met(system, found):
@@ -88,11 +83,10 @@ def _moved_freely(system: System, state: State, kept, rough: bool, least_violati
         other = project_rates(system, other_pose.state, columns)
         if _is_met(system, other):
             pose, found = other_pose, other
-    if least_violation:
-        return found, False
-    is_met = _check_start(system, found, "from this start", pose)
-    _warn_of_changes(system, state, found, kept, rough and pose.starts > 0)
-    return found, is_met
+    if not least_violation:
+        _check_start(system, found, "from this start", pose)
+        _warn_of_changes(system, state, found, kept, rough and pose.starts > 0)
+    return found
 
 
 def _while_kept(kept) -> str:
@@ -200,11 +194,11 @@ def _keeps(system: System, start: State, kept: State, held) -> bool:
     return max([moved, *turned]) <= RESIDUAL_TOLERANCE and slowed <= RESIDUAL_TOLERANCE * scale.fastest(start.v)
 
 
-def _check_start(system: System, state: State, where: str, pose: AssembledPose) -> bool:
-    """Whether a state violates no constraint; refused if it does, or warned of if numbers of few digits explain it."""
+def _check_start(system: System, state: State, where: str, pose: AssembledPose):
+    """Refuse a state that violates its constraints; warn if the residual is that of numbers with few digits."""
     found = violations(system, state)
     if not found:
-        return True
+        return
     words = _named(found)
     if _distance(system, state) <= TYPED_DIGITS_RESIDUAL:
         warnings.warn(
@@ -213,7 +207,7 @@ def _check_start(system: System, state: State, where: str, pose: AssembledPose) 
             InconsistentConstraintsWarning,
             stacklevel=user_level(),
         )
-        return False
+        return
     worst = next(iter(found))
     message = f"constraint {worst!r} cannot be met {where}: {words} in the closest pose found. "
     at_limit = _at_limits(system, state)

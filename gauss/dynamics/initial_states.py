@@ -1,13 +1,10 @@
 """Initial states without Newton steps: the start of the scene is kept by its content, a consistent state as it is given."""
 
-import warnings
-from contextlib import suppress
-
 import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.assemble import state_residual
-from gauss.dynamics.consistent_states import changed_starts, consistent, consistent_if_met
+from gauss.dynamics.consistent_states import changed_starts, consistent, violations
 from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import RESIDUAL_ROUNDOFF, within_limits
@@ -23,35 +20,36 @@ def scene_start(system: System) -> State:
 
     AssemblyError if the constraints cannot be met from there.
     """
+    find = lambda: consistent(system, system.start(), tuple(system.scene.starts))  # noqa: E731
     if not system.has_closures:
-        return _found(system)[0]
+        return find()
     found: list[State] = []
 
     def make() -> tuple[State, bool, tuple[str, ...]]:
-        start, is_met = _found(system)
-        found.append(start)
-        given = within_limits(system, system.start())
-        is_met = is_met and not changed_starts(system, given, start, system.scene.starts)
-        return start, is_met, system.rigid_joints
+        start = met_start(system)
+        found.append(find() if start is None else start)
+        return found[0], start is not None, system.rigid_joints
 
     state, is_met, rigid_joints = cached_on_disk(system, (scene_start,), make)
     vars(system).setdefault("rigid_joints", rigid_joints)  # its own property, which would reduce the system to find them
     if not (found or is_met):
-        return _found(system)[0]
+        return find()
     return State(state.t, state.q.copy(), state.v.copy())  # the caller may write to it
 
 
 def met_start(system: System) -> State | None:
-    """Consistent start of the scene, if there is nothing to warn of; else None."""
-    with warnings.catch_warnings(), suppress(GaussError, Warning):
-        warnings.simplefilter("error")
-        return scene_start(system)
-    return None
+    """Consistent start of a scene with loops, assembled once; None if it would be refused or warned of."""
 
+    def make() -> State | None:
+        given, names = system.start(), tuple(system.scene.starts)
+        try:
+            start = consistent(system, given, names, least_violation=True)
+        except GaussError:
+            return None
+        is_met = not (violations(system, start) or changed_starts(system, within_limits(system, given), start, names))
+        return start if is_met else None
 
-def _found(system: System) -> tuple[State, bool]:
-    """Start of the scene, assembled, and whether it is known to meet its constraints."""
-    return consistent_if_met(system, system.start(), tuple(system.scene.starts))
+    return cached(system, (met_start,), make)
 
 
 def projected(system: System, state: State) -> State:
