@@ -23,7 +23,8 @@ ROUNDING = 1e-11  # of some steps, of two pieces of machine code
 FIXED = {"integrator": "rk4", "step": 1e-3, "samples": 3, "progress": False}
 SCENES = {
     "masses and starts": ("double_pendulum", {"upper.mass": [0.5, 2.0], "A.position": [0.1, 2.0]}),
-    "loops": ("four_bar", {"crank.mass": [1.0, 2.0], "A.rate": [-8.0]}),
+    "loops": ("four_bar", {"crank.mass": [1.0, 2.0], "A.rate": [-8.0, 3.0]}),
+    "poses of loops": ("four_bar", {"A.position": [0.0, 0.6], "A.rate": [1.0]}),
     "lengths in loops": ("four_bar", {"D.at.x": [1.15, 1.25], "rocker.com[0]": [0.4]}),
     "gravity": ("heavy_top", {"gravity.z": [-9.81, -1.6]}),
 }
