@@ -10,7 +10,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Scalar
 from gauss.integrators.control import SMALLEST_DIVISOR, Tolerance, TrialStep, next_factor
-from gauss.integrators.step import Chart, Cost, Equations, Point, stages
+from gauss.integrators.step import Chart, Cost, Equations, Point, compensation_size, stages
 from gauss.integrators.tableaus import DOP853, DOPRI5, EmbeddedPair
 from gauss.system import State, System
 
@@ -42,6 +42,10 @@ class ExplicitPair:
     def evaluations(self) -> int:
         """Evaluations of the accelerations in a step."""
         return self.pair.c.size
+
+    def state_size(self, system: System) -> int:
+        """Size of its method state: compensation of y and t, σ of the constraint Jacobian, number of steps so far."""
+        return compensation_size(system) + 2
 
     def attempt(
         self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance, steps: Scalar | None = None

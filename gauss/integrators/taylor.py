@@ -56,6 +56,10 @@ class Taylor:
         """Order of convergence; the highest one where it follows from the tolerance."""
         return HIGHEST_DEFAULT_ORDER if self.terms is None else self.terms
 
+    def state_size(self, system: System) -> int:
+        """Size of its method state: compensation of (q, v, work) and t."""
+        return system.n_q + system.n_v + 3 + 1
+
     def order_for(self, tolerance: Tolerance) -> int:
         """Order of the least cost per time for a tolerance."""
         if self.terms is not None:

@@ -25,9 +25,7 @@ from gauss.dynamics.programs import program_of
 from gauss.dynamics.store import cached_on_disk, is_noted_on_disk, note_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
-from gauss.integrators import ExplicitPair, FixedStep, Point, Rates, Taylor
-from gauss.simulation.compiled_steps.explicit_stages import method_state_size
-from gauss.simulation.compiled_steps.taylor_step import compensation_size
+from gauss.integrators import ExplicitPair, FixedStep, Point, Rates
 from gauss.simulation.motion_records import EnergyRecord, Event, Stats
 from gauss.simulation.prescribed import AfterJump, crossed
 from gauss.simulation.problem import Problem
@@ -115,14 +113,10 @@ class CompiledRun:
     def _initial_method_state(self) -> tuple[np.ndarray | None, int]:
         """Initial method state, the accelerations where None, and its size."""
         method = self.problem.method
-        if isinstance(method, ExplicitPair) and not self.drift.partitioned:
-            size = method_state_size(self.system)
-        elif isinstance(method, Taylor):
-            size = compensation_size(self.system)
-        elif isinstance(method, FixedStep) and method.state_size:
-            size = method.state_size(self.system)
-        else:
+        size_of = getattr(method, "state_size", None)
+        if size_of is None or (isinstance(method, ExplicitPair) and self.drift.partitioned):
             return None, self.system.n_v if isinstance(method, FixedStep) and method.starts_from_accelerations else 0
+        size = size_of(self.system)
         return np.zeros(size), size
 
     def _loop_of(self, kind: Hashable, make: Callable[[], Loop]) -> Loop:

@@ -124,12 +124,14 @@ def _bind(load) -> BoundLoad:
 def _check_inertia(system: System):
     """Refuse a movable leaf of the tree without inertia; other singular inertias are found by the solvers."""
     structure = system.structure
+    massless = [edge for edge in structure.tree if not system.Phi[6 * edge.outer : 6 * edge.outer + 6].any()]
+    if not massless:
+        return
     inner = {edge.inner for edge in structure.tree}
     bound, tied = _constrained(structure)
-    for edge in structure.tree:
+    for edge in massless:
         v, pair = system.joints[edge.constraint].v, system.joints[edge.constraint].pair
-        is_leaf = edge.outer not in inner and edge.outer not in bound and v.start not in tied
-        if is_leaf and pair.n_v and not system.Phi[6 * edge.outer : 6 * edge.outer + 6].any():
+        if pair.n_v and edge.outer not in inner and edge.outer not in bound and v.start not in tied:
             body, joint = structure.bodies[edge.outer], structure.constraints[edge.constraint].name
             raise SceneError(
                 f"body {body!r} has no mass, yet joint {joint!r} lets it move and nothing hangs on it: "

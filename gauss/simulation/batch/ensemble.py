@@ -20,7 +20,6 @@ from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.machine_code import FIXED
 from gauss.simulation.batch.rollout import ADAPTIVE
-from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.energy_balance import shares
 from gauss.simulation.tolerances import tolerance
@@ -76,8 +75,9 @@ class Ensemble:
         if integrator in FIXED:
             self.code = fixed_batch(Program(system, laws, family=self.family), FIXED[integrator], device)
         else:
-            program = Program(system, laws, memory=method_state_size(pattern), family=self.family)
-            self.code = AdaptiveBatchCode(program, ADAPTIVE[integrator], self.tolerance.shares, device)
+            method = ADAPTIVE[integrator]
+            program = Program(system, laws, memory=method.state_size(pattern), family=self.family)
+            self.code = AdaptiveBatchCode(program, method, self.tolerance.shares, device)
 
     def covers(self, members: np.ndarray) -> bool:
         """Whether systems with these numbers (batch, n) differ in the parameters only."""

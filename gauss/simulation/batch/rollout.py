@@ -28,7 +28,6 @@ from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, batch_program, fixed_step_code, machine_code, one_by_one
 from gauss.simulation.batch.repeated_motions import repeat, tell_of_divergence
-from gauss.simulation.compiled_steps.explicit_stages import method_state_size
 from gauss.simulation.energy_balance import shares
 from gauss.simulation.memory_limit import refuse_beyond_memory
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts_of_many
@@ -295,7 +294,7 @@ def _adaptive(
         return _singly(system, starts, run, settings)
     allowed = tolerance(system, rtol, atol)
     make = lambda laws: AdaptiveBatchCode(  # noqa: E731
-        batch_program(system, laws, method)(system, laws, memory=method_state_size(system)), method, allowed.shares, device
+        batch_program(system, laws, method)(system, laws, memory=method.state_size(system)), method, allowed.shares, device
     )
     batch = AdaptiveBatch(machine_code(system, method, (allowed.key, device), make), starts, allowed)
     refuse_inconsistent(system, starts, batch.residual)

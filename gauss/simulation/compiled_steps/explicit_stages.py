@@ -18,16 +18,10 @@ from gauss import math
 from gauss.codegen import INTEGER, Function, NativeFunction, write
 from gauss.codegen.kernels import CheckedSwitch, ExplicitTrial, Interpolation, RowCode, RowFunction, stride
 from gauss.dynamics.traced_system import Program
-from gauss.integrators import ExplicitPair, compensation_size, first_length, trial_length
+from gauss.integrators import ExplicitPair, first_length, trial_length
 from gauss.simulation.compiled_steps.chart_code import ChartCode
 from gauss.simulation.compiled_steps.projected_stages import SMALL_PIVOT
 from gauss.simulation.compiled_steps.step_control import StepControl
-from gauss.system import System
-
-
-def method_state_size(system: System) -> int:
-    """Size of the method state: compensation of y and t, σ of the constraint Jacobian, number of steps so far."""
-    return compensation_size(system) + 2
 
 
 class ExplicitStages:

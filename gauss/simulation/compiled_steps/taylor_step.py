@@ -20,11 +20,6 @@ LARGEST_DEFECT = (
 )
 
 
-def compensation_size(system: System) -> int:
-    """Size of the compensation of (q, v, work) and t."""
-    return system.n_q + system.n_v + 3 + 1
-
-
 def taylor_step(program: Program, shares=None) -> TaylorStep:
     """Functions of Taylor's method for one motion; ``shares`` are factors of the tolerance.
 
