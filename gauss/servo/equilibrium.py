@@ -83,6 +83,7 @@ def equilibrium(servo: Servo, state: State | None = None) -> Equilibrium:
     system = servo.system
     require_written(system)
     state = system.initial_state() if state is None else state
+    servo.follow_laws()
     form = servo.made((_Form,), lambda: _Form(servo))
     state = State(state.t, state.q, np.zeros(system.n_v))
     unknown = np.zeros(form.n_contacts + len(servo.efforts))

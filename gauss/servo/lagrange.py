@@ -154,6 +154,7 @@ def free_displacements(blocked: np.ndarray) -> np.ndarray:
 
 
 def _terms(servo: Servo, state: State) -> Terms:
+    servo.follow_laws()
     return servo.made((LagrangeForm,), lambda: LagrangeForm(servo))(state)
 
 
