@@ -21,7 +21,7 @@ from gauss.dynamics.store import cached_on_disk
 from gauss.errors import BalanceWarning, require, user_level
 from gauss.simulation.advice import advice
 from gauss.simulation.motion_records import EnergyRecord
-from gauss.simulation.trajectory import MANY, Trajectory
+from gauss.simulation.trajectory import LEAST_COMPILED_SAMPLES, Trajectory
 from gauss.system import State, System, coordinate_units, rate_units
 
 WRONG = 1e-3  # residual relative to the largest energy above which a motion is taken to be wrong
@@ -240,7 +240,7 @@ def _energies(trajectory: Trajectory) -> np.ndarray:
     if system.dynamics is not None:
         seen = system.dynamics.on_demand((_energies,), lambda: [0])
         seen[0] += len(trajectory)
-        if seen[0] >= MANY:
+        if seen[0] >= LEAST_COMPILED_SAMPLES:
             kernel = cached_on_disk(system, (_kernel,), lambda: _kernel(system))
             return kernel(np.concatenate([trajectory.t[None], trajectory.q.T, trajectory.v.T, work.T])).T
     states = (trajectory.state(k) for k in range(len(trajectory)))

@@ -26,7 +26,7 @@ from gauss.system import State, System
 
 LOOKED_AT = 20  # samples of a recorded motion whose loops are looked at: noise is in all of them
 RECORDED_RESIDUAL = 1e-6  # of loop constraints, relative to their scales: above that of any integrator
-MANY = 300  # samples above which machine code is compiled: numpy takes about as long for so many
+LEAST_COMPILED_SAMPLES = 300  # samples above which machine code is compiled: numpy takes about as long for so many
 
 
 @dataclass(frozen=True)
@@ -245,7 +245,7 @@ class Trajectory:
         function : callable
             Takes a :class:`Kinematics`, returns a vector of numbers, or of expressions if it is traced.
         """
-        if len(self) < MANY:
+        if len(self) < LEAST_COMPILED_SAMPLES:
             return np.array([function(motion) for motion in self.motions], dtype=float)
         system = self.system
 
