@@ -42,6 +42,11 @@ def _operation(op: str, swapped: bool = False) -> Callable:
     return operate
 
 
+def _function(op: str) -> Callable:
+    """Method for a function of one operand."""
+    return lambda x: x.graph.unary(op, x)
+
+
 def _lifted(operate: Callable, x: "Expression", other):
     """Result of an operation whose operands are brought to one graph first."""
     if not isinstance(other, OPERANDS):
@@ -110,8 +115,7 @@ class Expression:
             raise TypeError("a traced expression is no key of a dict and no member of a set")
         return id(self)
 
-    def __neg__(self):
-        return self.graph.unary("neg", self)
+    __neg__, __floor__ = _function("neg"), _function("floor")
 
     def __pos__(self):
         return self
@@ -131,9 +135,6 @@ class Expression:
             square, n = square * square, n // 2
         return power if whole >= 0 else 1.0 / power
 
-    def __floor__(self):
-        return self.graph.unary("floor", self)
-
     def __mod__(self, divisor):
         return self - divisor * (self / divisor).__floor__()
 
@@ -142,29 +143,11 @@ class Expression:
 
     # numpy calls these methods on the entries of object arrays: np.sin(array) → array of x.sin()
 
-    def sqrt(self):
-        """Square root."""
-        return self.graph.unary("sqrt", self)
-
-    def sin(self):
-        """Sine."""
-        return self.graph.unary("sin", self)
-
-    def cos(self):
-        """Cosine."""
-        return self.graph.unary("cos", self)
+    sqrt, sin, cos, exp, log = map(_function, ("sqrt", "sin", "cos", "exp", "log"))
 
     def tan(self):
         """Tangent."""
         return self.sin() / self.cos()
-
-    def exp(self):
-        """Exponential."""
-        return self.graph.unary("exp", self)
-
-    def log(self):
-        """Natural logarithm."""
-        return self.graph.unary("log", self)
 
     def arctan2(self, other):
         """Angle of the point (other, self)."""

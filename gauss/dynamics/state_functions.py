@@ -206,8 +206,7 @@ def _function(system: System, requests, columns) -> TracedFunction:
 
 def _on_device(system: System, requests, columns, key, device: str) -> Callable:
     """Function of requests over rows on a device; its reasons to refuse a row are those of the function on this CPU."""
-    from gauss.codegen.gpu.device_function import DeviceFunction
-    from gauss.codegen.gpu.rows import RowsOnDevice
+    from gauss.codegen.gpu.device_function import DeviceFunction, RowsOnDevice
 
     function = _function(system, requests, columns)
     make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
