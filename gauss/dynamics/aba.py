@@ -52,8 +52,6 @@ class FreeElimination:
     ----------
     S : ndarray, shape (6, 6)
         Motion subspace.
-    inertia : tuple of ndarray
-        Articulated inertia Î.
     """
 
     projected = (np.zeros((3, 3)),) * 3

@@ -29,8 +29,6 @@ class LoadedMechanism:
     ----------
     loads : sequence of BoundLoad
         Its loads, with traced laws.
-    t : Expression or float
-        Time [s].
     q, v, load : ndarray, shape (n_q,), (n_v,), (n_v,)
         Coordinates, rates, generalised forces added to the loads.
     subsystems : sequence of Subsystem, optional

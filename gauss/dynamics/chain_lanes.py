@@ -36,12 +36,8 @@ def in_chain_lanes(system: System, laws: Laws, once: Callable, sizes: tuple[int,
 
     Parameters
     ----------
-    laws : Laws
-        Its loads; the traced ones are included.
     once : callable
         Dynamics (program, q, v, generalised forces, t) of one state.
-    sizes : tuple of int
-        Lengths of these vectors.
     """
     kinds = chains_for_lanes(system)
     if not kinds:

@@ -52,8 +52,6 @@ class CompositeBodies:
 
     Parameters
     ----------
-    v : ndarray, shape (n_v,)
-        Rates.
     rate_of : callable, optional
         Time derivative of functions of the coordinates at these rates; needed where subspaces move in their link frames.
     """

@@ -57,13 +57,7 @@ MOST_ROWS = 10  # loop constraints of a linear model in straight-line code: 15, 
 
 
 def refuse_motionless(system: System, what: str):
-    """Raise a SimulationError for a system in which nothing can move, which leaves nothing to do.
-
-    Parameters
-    ----------
-    what : str
-        Function that was called.
-    """
+    """Raise a SimulationError for a system in which nothing can move, which leaves nothing to do."""
     if not system.n_v:
         raise SimulationError(f"{what}: nothing in scene {system.scene.name!r} can move; give a joint that moves.")
 

@@ -39,10 +39,6 @@ def consistent(
 
     Parameters
     ----------
-    system : System
-        The system.
-    state : State
-        The guess.
     kept : sequence of str
         Joints, or single rates of joints, that keep their coordinates and rates if possible.
     required : bool

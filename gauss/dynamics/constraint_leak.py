@@ -82,8 +82,6 @@ def constraint_leak(system: System, mechanism: Mechanism) -> Scalar:
     ----------
     system : System
         The system, of numbers.
-    mechanism : Mechanism
-        The system in one state.
 
     Returns
     -------

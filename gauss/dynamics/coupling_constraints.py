@@ -30,12 +30,8 @@ class RelationRows:
 
     Parameters
     ----------
-    tree : KinematicTree
-        The open tree in its state.
     relation : Bound
         Its bodies of the system and joints of the subsystem.
-    rows : Rows
-        Its blocks.
     """
 
     def __init__(self, tree: KinematicTree, relation, rows):
@@ -72,12 +68,8 @@ class _CarriedBody:
 
     Parameters
     ----------
-    tree : KinematicTree
-        The open tree.
     frame : PlacedFrame
         Principal central frame of the body on the body of the subsystem that carries it.
-    A : ndarray, shape (m, 6)
-        Its block.
     """
 
     def __init__(self, tree: KinematicTree, frame, A):

@@ -30,8 +30,6 @@ def look_at_energies(motion: Kinematics, work) -> np.ndarray:
 
     Parameters
     ----------
-    motion : Kinematics
-        Kinematics of the state.
     work : array_like, shape (3,)
         Work of drives and of forces on bodies, and energy dissipated, since the start [J].
     """

@@ -21,10 +21,6 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
 
     Parameters
     ----------
-    motion : Kinematics
-        Poses and velocities.
-    applied : Applied
-        Loads there.
     rates : ndarray, shape (n_v,)
         Joint accelerations.
 

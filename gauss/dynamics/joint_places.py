@@ -139,8 +139,6 @@ def _along_axes(parts: Callable, state: State, moving: np.ndarray, *more: np.nda
     ----------
     parts : callable
         Function over symbols; of ``more`` besides.
-    state : State
-        State over symbols.
     moving : ndarray, shape (3, n_q + n_v)
         Changes of coordinates and rates for each axis.
     more : ndarray

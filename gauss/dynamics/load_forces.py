@@ -34,8 +34,6 @@ def generalised_forces(motion: Kinematics, applied: Applied) -> np.ndarray:
     ----------
     motion : Kinematics
         Kinematics, with its joints if there are loads on bodies; floats or expressions.
-    applied : Applied
-        Loads of this state.
     """
     system, P = motion.system, applied.P
     loaded = {body for body in range(system.structure.n_bodies) if _acts(applied.F[body]) or _acts(applied.M[body])}

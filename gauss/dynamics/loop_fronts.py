@@ -43,8 +43,6 @@ class LoopFronts:
     ----------
     graph : CallGraph
         The subsystem; its kinematics and the elimination of its tree are recorded.
-    mu : float
-        Regularisation μ.
     roots : dict
         Root of each block of rows, :data:`GROUND` or a link.
     """

@@ -31,10 +31,6 @@ class LoopJoint:
 
     Parameters
     ----------
-    tree : KinematicTree or LinkStates
-        The open tree in its state.
-    index : int
-        Index of the joint in its subsystem.
     q, v : ndarray
         All coordinates and rates.
 

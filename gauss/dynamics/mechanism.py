@@ -41,12 +41,8 @@ class Mechanism:
 
     Parameters
     ----------
-    system : System
-        The system.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
-    t : float
-        Time [s].
     subsystems : sequence of Subsystem, optional
         Subsystems of another stage of the reduction; those of the system when not given.
     """

@@ -25,8 +25,6 @@ class RowSpace:
 
     Parameters
     ----------
-    rows : ndarray, shape (m, n)
-        The rows.
     units : ndarray, shape (n,)
         Units of the coordinates.
     residual : float

@@ -41,8 +41,6 @@ class NullSpaceDynamics:
 
     Parameters
     ----------
-    laws : Laws
-        Its loads; the traced ones are included.
     state : State
         State that meets the constraints.
     load : ndarray, shape (n_v,)

@@ -24,8 +24,6 @@ def null_space_terms(system: System, requests: Sequence, state: State, given: di
 
     Parameters
     ----------
-    requests : sequence of Request
-        Functions of a state.
     state : State
         State that meets the constraints.
     given : dict

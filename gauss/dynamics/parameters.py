@@ -55,8 +55,6 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
     ----------
     values : sequence of float or Expression
         Numbers in the order of :func:`numbers`.
-    dynamics : Dynamics
-        Dynamics of the new system.
     """
     values, place = np.asarray(values, dtype=object), 0
     constraint_scales(system)  # cached for the numbers: expressions have no scales

@@ -151,10 +151,6 @@ def kinematics_of_joint(
     ----------
     forward : bool
         Whether the link is the child of the joint.
-    link : Link
-        Constants of the link.
-    q, v : ndarray
-        Coordinates and rates of the joint.
     inner : ndarray, shape (3,)
         Angular velocity of the inner link in its frame.
     """

@@ -24,10 +24,6 @@ def measured(output: Output, motion: Kinematics, acceleration=None) -> np.ndarra
 
     Parameters
     ----------
-    output : Output
-        The sensor.
-    motion : Kinematics
-        Poses and velocities.
     acceleration : ndarray, shape (n_v,), optional
         Accelerations, for the kinds that depend on them.
 

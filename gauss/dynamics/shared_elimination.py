@@ -25,8 +25,6 @@ class SharedElimination:
 
     Parameters
     ----------
-    program : Program
-        Its system, loads and stabilisation.
     added : int
         n_v if generalised forces are added to the loads, else 0.
     """

@@ -19,8 +19,6 @@ class QR:
 
     Parameters
     ----------
-    W : ndarray, shape (n, m)
-        The matrix.
     least_length : float
         Columns below this length are left out.
     cut : float or Expression

@@ -30,8 +30,6 @@ class StateTerms:
     ----------
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates, symbols; rates, symbols or zeros.
-    t : Expression or float
-        Time [s].
     """
 
     def __init__(self, system: System, q, v, t: Scalar = 0.0):

@@ -63,10 +63,6 @@ class Program:
     ----------
     system : System
         One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
-    laws : Laws
-        Its loads; the traced ones are included.
-    drift : Drift
-        Constraint stabilisation.
     memory : int
         Numbers of the state of the method.
     family : ParametrisedSystem, optional

@@ -145,8 +145,6 @@ class _LinkCode:
 
     Parameters
     ----------
-    pair : Pair
-        Its joint.
     constants : ndarray
         Numbers of a link of this kind.
     varying : ndarray of int

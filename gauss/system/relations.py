@@ -141,8 +141,6 @@ def place_relations(system, relations) -> Relations:
 
     Parameters
     ----------
-    system : System
-        Bodies, frames and joints.
     relations : iterable of Relation
         The relations, of any scene on it.
 

@@ -206,8 +206,6 @@ def spanning_tree(joints, preference=None) -> tuple[Edge, ...]:
 
     Parameters
     ----------
-    joints : sequence of PlacedJoint
-        Joints.
     preference : callable, optional
         Joints of the least value are taken first; among equals those whose outer body turns with the fewest joints, then
         those near the ground. Without it, joints are taken in their order.

@@ -46,8 +46,6 @@ class CompiledEngine(Engine):
     ----------
     system : System
         A smooth system (see :func:`gauss.dynamics.conditions.obstacles`).
-    kernels : StateKernels
-        Its machine code.
     loads : LoadForces, optional
         Loads beside the machine code; none when not given.
     slow : sequence of str

@@ -91,8 +91,6 @@ def tiered_kernels(system: System, plan: Plan, laws: Laws, spent: int) -> Kernel
         One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
     plan : Plan
         Of the phase, see :data:`gauss.dynamics.plan.MODES`: "compiled" has no threshold, "tiered" has one.
-    laws : Laws
-        Loads of the system.
     spent : int
         Evaluations of the phase by numpy in this motion.
     """

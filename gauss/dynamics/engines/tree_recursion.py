@@ -11,13 +11,7 @@ from gauss.system import System
 
 
 class TreeRecursionKernels:
-    """Forward dynamics and their check, called as :class:`gauss.dynamics.traced_system.Kernels` are.
-
-    Parameters
-    ----------
-    system : System
-        A tree.
-    """
+    """Forward dynamics and their check, called as :class:`gauss.dynamics.traced_system.Kernels` are."""
 
     project = None  # a tree has no loop constraints
 

@@ -26,12 +26,6 @@ def affine_changes(
 
     Parameters
     ----------
-    conditions : sequence of Expression or bool
-        Conditions of the time alone.
-    clock : Expression
-        Symbol of the time.
-    begin, end : float
-        Interval of time [s].
     apart : float
         Distance of two times at which a condition is compared [s].
 

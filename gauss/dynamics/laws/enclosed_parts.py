@@ -29,8 +29,6 @@ def enclosed_parts(
         Ends of the step, numbers or expressions.
     first, last : ndarray, shape (n_v,)
         Accelerations there.
-    count : int
-        Number of subintervals.
     """
     h = end.t - begin.t
     value = [np.concatenate([[s.t], s.q, s.v]) for s in (begin, end)]

@@ -27,8 +27,6 @@ def kink_error(begin: Point, end: Point, tolerance: Tolerance) -> Scalar:
     ----------
     begin, end : Point
         Ends of the step, numbers or expressions.
-    tolerance : Tolerance
-        Local error.
     """
     v, h = (begin.state.v, end.state.v), end.state.t - begin.state.t
     residual = v[1] - v[0] - 0.5 * h * (begin.rates.acceleration + end.rates.acceleration)

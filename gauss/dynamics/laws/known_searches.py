@@ -48,10 +48,6 @@ class KnownSearch:
 
         Parameters
         ----------
-        law : callable
-            The law.
-        start : State
-            Initial state.
         *others
             What else the search depends on.
         """

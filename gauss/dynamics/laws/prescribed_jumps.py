@@ -121,8 +121,6 @@ def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
 
     Parameters
     ----------
-    start : State
-        Initial state.
     end : float
         Final time [s].
     stops : sequence of (float, float)
@@ -158,15 +156,11 @@ class _Sides:
 
     Parameters
     ----------
-    before, after : float
-        Times [s].
     sizes : ndarray, shape (2, r)
         Magnitudes of the position and velocity that each row prescribes, to which a jump is compared.
 
     Attributes
     ----------
-    before, after : float
-        Times [s].
     gaps : ndarray, shape (r,)
         Jump of the position residuals.
     positions, speeds : ndarray of bool, shape (r,)

@@ -16,11 +16,6 @@ BARE = {"__new__", "__getattribute__"}  # methods of a float that say nothing of
 class RecordedTime:
     """Time that behaves as the number it is, and records whether it was read.
 
-    Parameters
-    ----------
-    t : float
-        Time [s].
-
     Attributes
     ----------
     is_read : bool
@@ -82,15 +77,7 @@ def reads_time(law: Callable, motion: Kinematics) -> tuple[bool, bool]:
 
 
 class KinematicsAtTime(Kinematics):
-    """Kinematics of the same coordinates and rates at another time: poses are those of the other one.
-
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics of these coordinates and rates.
-    t : float
-        Time [s].
-    """
+    """Kinematics of the same coordinates and rates at another time: poses are those of the other one."""
 
     def __init__(self, motion: Kinematics, t):
         self.system, self.state, self._other = motion.system, State(t, motion.state.q, motion.state.v), motion

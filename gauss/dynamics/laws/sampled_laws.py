@@ -35,8 +35,6 @@ def sampled_times(
         Of (t, motion).
     motion : Kinematics
         Kinematics of the initial state; None for laws of rotors.
-    begin, end : float
-        Interval of time [s].
     what : str
         Name of the law in warnings.
     uses_time : bool

@@ -29,8 +29,6 @@ def laws_of_time(outputs, of_time: Sequence[Expression], clock: Expression) -> L
         Values of the laws, in one graph.
     of_time : sequence of Expression
         Nodes that depend on the time alone, and are examined.
-    clock : Expression
-        Symbol of the time.
     """
     alone = {node.index for node in of_time}
     used = {x.index for node in reachable(outputs) if node.index not in alone for x in node.operands}
@@ -52,10 +50,6 @@ def coarse_steps(law: LawOfTime, begin: float, end: float, step: float, switches
 
     Parameters
     ----------
-    law : callable
-        The law.
-    begin, end, step : float
-        Interval and step [s].
     switches : ndarray, shape (k,)
         Times at which the law switches [s]: steps across one are not examined.
     """

@@ -58,12 +58,6 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
 
     Parameters
     ----------
-    system : System
-        The system.
-    laws : Laws
-        Its loads.
-    start : State
-        Initial state.
     end : float
         Final time [s].
     breaks : sequence of float

@@ -120,10 +120,6 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
     ----------
     outputs : sequence of Expression or float
         Values of the laws, in one graph.
-    clock : Expression
-        Symbol of the time.
-    begin, end : float
-        Interval of time [s].
     monotone : bool
         Whether the mesh makes laws nearly monotone in each cell, for conditions that are sampled at few times of a step.
     """

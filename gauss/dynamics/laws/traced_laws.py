@@ -28,8 +28,6 @@ class Laws:
 
     Parameters
     ----------
-    system : System
-        The system.
     trace : bool
         False: all laws are opaque.
 

@@ -18,8 +18,6 @@ def propagated(
 
     Parameters
     ----------
-    joints : iterable of PlacedJoint
-        Joints that connect the bodies.
     seed : tuple of int and ndarray
         A body and its vector.
     across : callable

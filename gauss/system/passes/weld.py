@@ -44,8 +44,6 @@ def welded(subsystem: Subsystem, locked: dict[str, np.ndarray]) -> Subsystem:
 
     Parameters
     ----------
-    subsystem : Subsystem
-        The subsystem.
     locked : dict
         Coordinates (k,) at which joints are held, by name.
     """
