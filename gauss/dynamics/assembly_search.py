@@ -105,9 +105,8 @@ def _distance(system: System, guess: State, state: State) -> float:
     found = 0.0
     for joint in system.joints:
         change = np.abs(state.q[joint.q] - guess.q[joint.q])
-        plain = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
-        units = system.scale.coordinates[joint.v][:plain]
-        found = max(found, float((change[:plain] / units).max(initial=0.0)))
+        units = system.scale.coordinates[joint.v][: joint.n_plain]
+        found = max(found, float((change[: joint.n_plain] / units).max(initial=0.0)))
     return found
 
 

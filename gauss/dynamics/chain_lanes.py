@@ -20,8 +20,7 @@ from gauss.codegen.packed_function import PackedFunction
 from gauss.dynamics.equal_chains import EqualChains, equal_chains
 from gauss.dynamics.given_link_frames import GivenLinkFrames, with_given_frames
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.parameters import changed, count, numbers, with_numbers
-from gauss.dynamics.parametrised_system import ParametrisedSystem
+from gauss.dynamics.parameters import ParametrisedSystem, changed, count, numbers, with_numbers
 from gauss.dynamics.traced_system import Program
 from gauss.system import System
 

@@ -17,16 +17,17 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Expression
+from gauss.dynamics.aba import mirrored
 from gauss.dynamics.link_frames import Link
 from gauss.dynamics.rnea import JointKinematics, KinematicTree, apply
 from gauss.rotations import congruent, cross, skew
 
 
 class Moments(NamedTuple):
-    """Momentum p (3,) of a body, and P = ∫ ẋ xᵀ dm (3, 3)."""
+    """Moments of the velocities of a body."""
 
-    momentum: np.ndarray
-    mixed: np.ndarray
+    momentum: np.ndarray  # (3,) p = ∫ ẋ dm
+    mixed: np.ndarray  # (3, 3) P = ∫ ẋ xᵀ dm
 
     def turned(self, R: np.ndarray, r: np.ndarray) -> "Moments":
         """Moments in the axes and about the origin of a frame from which the present one is turned by R and lies at r."""
@@ -223,5 +224,4 @@ def _about_inner(R, p, mass, first, inertia) -> np.ndarray:
     g = first + (mass / 2.0) * p
     (x, y, z), added = 2.0 * p * g, np.outer(-p, g) - np.outer(g, p)
     added[np.diag_indices(3)] = y + z, x + z, x + y
-    found = congruent(R, inertia) + added
-    return np.array([[found[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])
+    return mirrored(congruent(R, inertia) + added)

@@ -10,7 +10,7 @@ from gauss.codegen import Function, Kernel, forward, jacobian, write
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.store import cached_on_disk
 from gauss.system import State, System, coordinate_rates, guards, sides
-from gauss.system.contact_gaps import slips
+from gauss.system.contact_mode import slips
 from gauss.system.relations import place_residuals
 
 

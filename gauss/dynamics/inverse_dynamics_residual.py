@@ -9,8 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gauss.backends.structure import Edge
-from gauss.dynamics.assemble import impressed
-from gauss.dynamics.constraint_rows import joint_rows
+from gauss.dynamics.assemble import impressed, joint_rows
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.rotations import cross

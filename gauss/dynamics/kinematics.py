@@ -18,35 +18,21 @@ WORLD_AXES = np.eye(3)
 
 @dataclass(frozen=True)
 class JointMotion:
-    """Kinematics of a joint in world axes.
+    """Kinematics of a joint in world axes."""
 
-    Parameters
-    ----------
-    P : ndarray, shape (3,)
-        Joint point, fixed in the child [m].
-    r, s : ndarray, shape (3,)
-        From the centre of mass of the child, of the parent, to P [m].
-    E_omega, E_v : ndarray, shape (3, k)
-        Motion subspace in world axes.
-    bias_omega, bias_v : ndarray, shape (3,)
-        E° q̇: rate of the subspace at fixed parent times the rates.
-    R_predicted : ndarray, shape (3, 3)
-        Joint frame of the child by the parent and the coordinates.
-    """
-
-    P: np.ndarray
-    r: np.ndarray
+    P: np.ndarray  # (3,) joint point, fixed in the child [m]
+    r: np.ndarray  # r, s (3,): from the centre of mass of the child, of the parent, to P [m]
     s: np.ndarray
-    E_omega: np.ndarray
+    E_omega: np.ndarray  # E_omega, E_v (3, k): motion subspace
     E_v: np.ndarray
-    bias_omega: np.ndarray
+    bias_omega: np.ndarray  # bias_omega, bias_v (3,): E° q̇, rate of the subspace at fixed parent times the rates
     bias_v: np.ndarray
-    R_predicted: np.ndarray
+    R_predicted: np.ndarray  # (3, 3) joint frame of the child by the parent and the coordinates
 
 
 @dataclass
 class _Poses:
-    """Result of :func:`_outward`; index −1 is the ground."""
+    """Result of :func:`_outward`, as the attributes of :class:`Kinematics`; index −1 is the ground."""
 
     state: State
     R: list

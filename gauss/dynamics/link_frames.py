@@ -92,11 +92,11 @@ def _link(subsystem: Subsystem, edge: Edge, frames, own_turn: float, is_first: b
 
 
 class Mass(NamedTuple):
-    """Inertia about the origin of a frame: mass, mass times its centre (3,), moments and products (3, 3)."""
+    """Inertia about the origin of a frame."""
 
-    mass: float
-    first: np.ndarray
-    inertia: np.ndarray
+    mass: float  # [kg]
+    first: np.ndarray  # (3,) mass times its centre [kg m]
+    inertia: np.ndarray  # (3, 3) moments and products [kg m²]
 
     def plus(self, other: "Mass") -> "Mass":
         """Sum of both."""

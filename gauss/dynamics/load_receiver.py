@@ -52,7 +52,7 @@ def output_kernel(program: Program, system: System, of_step: bool, batch: bool) 
     Parameters
     ----------
     program : Program
-        Functions of the system; a :class:`gauss.dynamics.called_program.CalledProgram` if it has opaque laws.
+        Functions of the system; a :class:`gauss.dynamics.programs.CalledProgram` if it has opaque laws.
     system : System
         System whose scene has the outputs; the program may be that of its smooth part.
     of_step : bool

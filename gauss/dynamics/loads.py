@@ -46,6 +46,11 @@ class Applied:
         for bound in system.loads if loads is None else loads:
             apply(bound.load, bound.laws, motion, self)
 
+    @property
+    def power(self) -> np.ndarray:
+        """Power (3,) of drives, of forces on bodies, and dissipated in dampers [W]."""
+        return np.array([self.driven, self.loaded, self.dissipated])
+
     def push(self, motion: Kinematics, body: int, point: np.ndarray, force: np.ndarray):
         """Add a force [N] at a point of a body, both in world axes."""
         self.F[body] = self.F[body] + force
@@ -53,9 +58,13 @@ class Applied:
 
     def on_bodies(self, motion: Kinematics) -> dict:
         """Force [N] and moment about the centre of mass [N m] on loaded bodies, in principal axes, {body: …}."""
+        return {i: (motion.R[i].T @ self.F[i], motion.R[i].T @ self.M[i]) for i in self.loaded_bodies}
+
+    @property
+    def loaded_bodies(self) -> list[int]:
+        """Bodies on which a force or a moment acts."""
         acts = lambda part: part.dtype == object or part.any()  # noqa: E731
-        bodies = [i for i in range(motion.system.structure.n_bodies) if acts(self.F[i]) or acts(self.M[i])]
-        return {i: (motion.R[i].T @ self.F[i], motion.R[i].T @ self.M[i]) for i in bodies}
+        return [i for i in range(len(self.F) - 1) if acts(self.F[i]) or acts(self.M[i])]
 
 
 @singledispatch

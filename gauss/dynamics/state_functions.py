@@ -18,7 +18,7 @@ from gauss.dynamics.constraint_leak import LARGEST_LEAK, REFUSED_LEAK, constrain
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.mobility import mobility
-from gauss.dynamics.null_space_terms import null_space_terms
+from gauss.dynamics.null_space_dynamics import null_space_terms
 from gauss.dynamics.parameter_terms import size_of
 from gauss.dynamics.projection import fixed_columns
 from gauss.dynamics.rigid_loops import is_in_other_pose, refuse_other_pose
@@ -53,11 +53,11 @@ ARGUMENTS = "q", "v", "acceleration", "load"  # in this order
 
 
 class Request(NamedTuple):
-    """A term, with the name of its frame or parameter, and its axes."""
+    """A term that is asked for."""
 
-    name: str
-    frame: str = ""
-    reference: str = ""
+    name: str  # name of the function
+    frame: str = ""  # name of its frame or parameter
+    reference: str = ""  # its axes
 
 
 def state_function(

@@ -30,7 +30,7 @@ from gauss.dynamics.laws.switching_functions import SwitchingFunctions
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
-from gauss.dynamics.parametrised_system import ParametrisedSystem
+from gauss.dynamics.parameters import ParametrisedSystem
 from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.rigid_loops import is_in_other_pose
 from gauss.dynamics.shared_elimination import SharedElimination
@@ -362,7 +362,7 @@ def applied_loads(system: System, loads, state: State):
         return np.zeros(system.n_v), {}, np.zeros(3)
     motion = kinematics(system, state)
     applied = Applied(motion, loads)
-    return applied.P, applied.on_bodies(motion), np.array([applied.driven, applied.loaded, applied.dissipated])
+    return applied.P, applied.on_bodies(motion), applied.power
 
 
 def largest(values):

@@ -117,10 +117,8 @@ class CompiledEngine(Engine):
 
         ``load`` (n_v,) are generalised forces under which the accelerations were found, besides the loads.
 
-        Raises
-        ------
-        DistrustError
-            If the residual is too large, as with masses of very different order; from then on the certified engine answers.
+        DistrustError if the residual is too large, as with masses of very different order; from then on the certified engine
+        answers.
         """
         if self.handed_over is not None:
             return

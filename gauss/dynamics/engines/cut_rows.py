@@ -19,7 +19,7 @@ from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.certified import CertifiedEngine, rates_of
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.engines.held_joints import HeldJoint, held_rows
@@ -213,10 +213,9 @@ class CutRowEngine(Engine):
 
     def _solved(self, state: State):
         """Rates, and the certified solution."""
-        compulsion, (driven, loaded, dissipated) = self.certified.assembled(self.system, state, None, None)
+        compulsion, power = self.certified.assembled(self.system, state, None, None)
         self.Q, solution = with_losses(compulsion, self.links, lambda problem: self.certified.answer(problem, state.t))
-        driven = driven - solution.multipliers @ solution.compulsion.C
-        return Rates(solution.qdd, np.array([driven, loaded, dissipated])), solution
+        return rates_of(solution, power), solution
 
     def _compiled(self, engine: CompiledEngine, state: State) -> Rates:
         found: Rates

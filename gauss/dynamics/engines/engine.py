@@ -54,10 +54,7 @@ class Engine(ABC):
     def check(self, point: Point, last: bool = False):
         """Check the accelerations of a point by an independent computation; ``last`` marks the end of the motion.
 
-        Raises
-        ------
-        DistrustError
-            If they differ; from then on the engine uses the independent computation.
+        DistrustError if they differ; from then on the engine uses the independent computation.
         """
 
     def hand_over(self, t: float) -> bool:

@@ -77,8 +77,9 @@ class TieredFunction:
 
     def __call__(self, *args, **kwargs):
         """Value of the function of the current tier."""
-        if self.make is not None and self.threshold.passed():
-            self.function, self.make = self.make(), None
+        make = self.make  # another thread may have called it in between
+        if make is not None and self.threshold.passed():
+            self.function, self.make = make(), None
         return self.function(*args, **kwargs)
 
 

@@ -4,9 +4,8 @@ import numpy as np
 
 from gauss.codegen import Kernel
 from gauss.codegen.kernels import CorrectedRecursion
-from gauss.dynamics.kernel_program import added_forces
+from gauss.dynamics.kernel_program import added_forces, tree_correction
 from gauss.dynamics.store import cached_on_disk
-from gauss.dynamics.tree_program import tree_correction
 from gauss.system import System
 
 

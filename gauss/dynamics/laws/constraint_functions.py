@@ -15,10 +15,10 @@ OWN = (Cam, Constraint, OnCurve, OneSidedConstraint, Transmission)  # kinds of r
 
 
 class WatchedFunctions(NamedTuple):
-    """Traced functions over the symbols of a motion, each with the name of its load or constraint."""
+    """Traced functions over the symbols of a motion."""
 
-    motion: Kinematics
-    functions: list[tuple[str, Function]]
+    motion: Kinematics  # the system in symbols
+    functions: list[tuple[str, Function]]  # each with the name of its load or constraint
 
     @property
     def outputs(self) -> list[Expression]:

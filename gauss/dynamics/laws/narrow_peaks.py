@@ -15,7 +15,7 @@ from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, write
 from gauss.codegen.kernels import CheckedSwitch
 from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
-from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.intervals import Interval, written_enclosures, written_values
 from gauss.dynamics.laws.products import FLAT, PEAK, Products
 from gauss.integrators import Point
 from gauss.system import State, System
@@ -134,29 +134,13 @@ class NarrowPeaks:
     @cached_property
     def _phases(self) -> Function:
         """(t, q, v, q̈) → phases, and their rates."""
-        symbols = [*self.symbols, *self.accelerations]
         rates = self.slopes(self.phases) or [0.0] * len(self.phases)
-
-        def values(state):
-            given = {symbol.index: Interval.point(value) for symbol, value in zip(symbols, state, strict=True)}
-            return [value.low for value in enclose([*self.phases, *rates], given)]
-
-        return write(values, len(symbols), name="phases")
+        return written_values([*self.phases, *rates], [*self.symbols, *self.accelerations], "phases")
 
     def _enclosed(self, asked: list[Expression]) -> tuple[int, Function, Function]:
         """Number of expressions; (t, q, v) → values; ends of each of (t, q, v, q̈) → those of them and of their rates."""
-        symbols, rates = [*self.symbols, *self.accelerations], self.slopes(asked)
-
-        def values(state):
-            given = {symbol.index: Interval.point(value) for symbol, value in zip(self.symbols, state, strict=True)}
-            return [value.low for value in enclose(asked, given)]
-
-        def enclosures(ends):
-            given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
-            return [end for value in enclose([*asked, *rates], given) for end in value]
-
-        at = write(values, len(self.symbols), name="bases")
-        return len(asked), at, write(enclosures, 2 * len(symbols), name="base_enclosures")
+        at, every = written_values(asked, self.symbols, "bases"), [*asked, *self.slopes(asked)]
+        return len(asked), at, written_enclosures(every, [*self.symbols, *self.accelerations], "base_enclosures")
 
     def _enclosures(self, size: int, at: Function, around: Function, count: int, t, q, v, first, t_end, q_end, v_end, last):
         """Values at the ends of subintervals, and enclosures of values and rates on each."""

@@ -19,7 +19,7 @@ from gauss.dynamics.store import cached
 from gauss.integrators import Point
 from gauss.scene.values import ConstantLaw, as_function
 from gauss.system import BoundLoad, Relations, State, System
-from gauss.system.contact_gaps import has_own_gaps
+from gauss.system.contact_mode import has_own_gaps
 
 LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements that may be laws
 

@@ -27,7 +27,7 @@ from gauss.dynamics.laws.enclosed_parts import (
     sign_changes,
     upper_bounds,
 )
-from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.intervals import Interval, enclose, written_enclosures, written_values
 from gauss.dynamics.laws.kink_error import kink_error, kink_factor
 from gauss.dynamics.laws.levels import LEVELED, leveled
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
@@ -266,24 +266,12 @@ class SwitchingFunctions:
     @cached_property
     def _values(self) -> Function:
         """(t, q, v) → values of the switching functions: written once, called at every end of a subinterval."""
-        asked = self._groups[0]
-
-        def values(state):
-            given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, state, strict=True)}
-            return [value.low for value in enclose(asked, given)]
-
-        return write(values, len(self._symbols), name="switching")
+        return written_values(self._groups[0], self._symbols, "switching")
 
     @cached_property
     def _enclosures(self) -> Function:
         """Low and high of each of (t, q, v, q̈) → those of all groups: written once, called for every subinterval."""
-        symbols, asked = [*self._symbols, *self._acceleration], [x for group in self._groups for x in group]
-
-        def enclosures(ends):
-            given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
-            return [end for value in enclose(asked, given) for end in value]
-
-        return write(enclosures, 2 * len(symbols), name="enclosures")
+        return written_enclosures(list(chain(*self._groups)), [*self._symbols, *self._acceleration], "enclosures")
 
     def _slopes(self, asked) -> list:
         """Time derivatives of switching functions, with accelerations as symbols; empty if one has none."""
