@@ -48,10 +48,7 @@ class FreeElimination:
 
     ZeroDivisionError if a pivot of Î is a constant zero.
 
-    Parameters
-    ----------
-    S : ndarray, shape (6, 6)
-        Motion subspace.
+    ``S`` (6, 6): motion subspace.
     """
 
     projected = (np.zeros((3, 3)),) * 3

@@ -49,12 +49,8 @@ class AssembledPose(NamedTuple):
 def assembled(system: System, guess: State, held, restart: bool) -> AssembledPose:
     """Pose that meets the constraints, near a guess if there is one, or that of the least residual.
 
-    Parameters
-    ----------
-    held : sequence of int
-        Entries of v whose coordinates are fixed.
-    restart : bool
-        Whether starts around the guess are tried where the paths from it end at a residual.
+    ``held``: entries of v whose coordinates are fixed. ``restart``: whether starts around the guess are tried where the
+    paths from it end at a residual.
     """
     best = _pose(system, project_positions(system, guess, NEWTON_STEPS, held))
     if best.is_met and _distance(system, guess, best.state) <= FAR_POSE:

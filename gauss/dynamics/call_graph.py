@@ -40,12 +40,7 @@ DAMPED = float(np.sqrt(MU))  # regularisation: along rows with smaller pivots ac
 class CallGraph:
     """A subsystem with loops, recorded section by section.
 
-    Parameters
-    ----------
-    subsystem : Subsystem
-        One without relations and gear trains.
-    q, v : ndarray
-        Slots of its coordinates and rates.
+    ``subsystem``: one without relations and gear trains. ``q``, ``v``: slots of its coordinates and rates.
     """
 
     def __init__(self, subsystem: Subsystem, recorder: CallRecorder, q, v):
@@ -299,9 +294,8 @@ class CallGraph:
             for body, held in self.held[index].items():
                 if body >= 0:
                     along = tau[self.subsystem.joints[index].v]
-                    (forces[body],) = self.recorder.call(
-                        "push", _with_wrenches, forces[body], held, parts[index], self.free[index][body], along
-                    )
+                    given = forces[body], held, parts[index], self.free[index][body], along
+                    (forces[body],) = self.recorder.call("push", lambda f, A, y, B, tau: (f + A @ y - B @ tau,), *given)
         return forces
 
     def _values(self, rates, accelerations, still: bool):
@@ -339,7 +333,3 @@ class CallGraph:
 
     def _none(self) -> np.ndarray:
         return np.zeros(self.subsystem.n_v).astype(object)
-
-
-def _with_wrenches(force, held, multipliers, free, tau):
-    return (force + held @ multipliers - free @ tau,)

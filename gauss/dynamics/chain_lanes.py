@@ -33,10 +33,7 @@ def in_chain_lanes(system: System, laws: Laws, once: Callable, sizes: tuple[int,
 
     Mechanisms with relations, and with traced loads that call functions, are left to code of single operations.
 
-    Parameters
-    ----------
-    once : callable
-        Dynamics (program, q, v, generalised forces, t) of one state.
+    ``once``: dynamics (program, q, v, generalised forces, t) of one state.
     """
     kinds = chains_for_lanes(system)
     if not kinds:

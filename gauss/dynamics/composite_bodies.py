@@ -51,10 +51,8 @@ class Moments(NamedTuple):
 class CompositeBodies:
     """Composite bodies of a tree in one state.
 
-    Parameters
-    ----------
-    rate_of : callable, optional
-        Time derivative of functions of the coordinates at these rates; needed where subspaces move in their link frames.
+    ``rate_of``: time derivative of functions of the coordinates at these rates; needed where subspaces move in their link
+    frames.
     """
 
     def __init__(self, tree: KinematicTree, v: np.ndarray, rate_of: Callable = np.zeros_like):
@@ -113,10 +111,7 @@ class CompositeBodies:
         S_iᵀ (I_j Ψ̈_j + 2 B_j Ψ̇_j + S_j ×* f_j) and S_iᵀ (I_j (Ψ̇_j + Ṡ_j) + 2 B_j S_j) (Singh, Russell and Wensing,
         Efficient analytical derivatives of rigid-body dynamics using spatial vector algebra, 2022).
 
-        Parameters
-        ----------
-        acceleration : ndarray, shape (n_v,)
-            Joint accelerations.
+        ``acceleration`` (n_v,): joint accelerations.
         """
         S, inertias, B, inner = self.subspaces, self.inertias, self.moments, self._inner_motions(acceleration)
         slow = {body: motion_cross(inner[body][0], S[body]) for body in S}
@@ -143,12 +138,8 @@ class CompositeBodies:
     def _paired(self, within: dict, carried: dict, rates: dict, motions: dict) -> np.ndarray:
         """Matrix (n_v, n_v) of entries S_iᵀ F_j, and I_j S_j · A_i + B_jᵀ S_j · C_i, for joints i that carry j.
 
-        Parameters
-        ----------
-        within, carried : dict
-            Wrenches F (6, k) of each joint, at the joint itself and at those that carry it.
-        rates, motions : dict
-            A and C (6, k) of each joint.
+        ``within``, ``carried``: wrenches F (6, k) of each joint, at the joint itself and at those that carry it. ``rates``,
+        ``motions``: A and C (6, k) of each joint.
         """
         tree, to = self.tree, {edge.outer: edge for edge in self.tree.edges}
         found = np.zeros((self.v.size, self.v.size), dtype=object)

@@ -28,10 +28,7 @@ class ContactTerms(NamedTuple):
 class ContactTermsKernel:
     """Contact terms, as machine code, or inlined where they are traced.
 
-    Parameters
-    ----------
-    system : System
-        With unilateral constraints or set-valued elements.
+    ``system``: with unilateral constraints or set-valued elements.
     """
 
     def __init__(self, system: System):

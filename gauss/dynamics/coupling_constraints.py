@@ -28,10 +28,7 @@ class Couplings:
 class RelationRows:
     """Rows of one relation, A a + B q̈ = D, in link frames.
 
-    Parameters
-    ----------
-    relation : Bound
-        Its bodies of the system and joints of the subsystem.
+    ``relation``: its bodies of the system and joints of the subsystem.
     """
 
     def __init__(self, tree: KinematicTree, relation, rows):
@@ -66,10 +63,7 @@ class RelationRows:
 class _CarriedBody:
     """Body of the system on the link that carries it, with its block A of the rows.
 
-    Parameters
-    ----------
-    frame : PlacedFrame
-        Principal central frame of the body on the body of the subsystem that carries it.
+    ``frame``: principal central frame of the body on the body of the subsystem that carries it.
     """
 
     def __init__(self, tree: KinematicTree, frame, A):

@@ -56,10 +56,7 @@ class HubJoint(NamedTuple):
 class EmbeddedLoops(ArticulatedBody):
     """Forward dynamics of a tree with loop constraints in one state.
 
-    Parameters
-    ----------
-    hubs : dict
-        Roots of the fronts of hubs, {hub: root}.
+    ``hubs``: roots of the fronts of hubs, {hub: root}.
     """
 
     def __init__(self, tree: KinematicTree, rows, hubs: dict[int, int]):

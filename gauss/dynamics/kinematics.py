@@ -98,7 +98,8 @@ class Kinematics(View):
     def of_bodies(cls, system: System, state: State, R, x, W, u) -> "Kinematics":
         """Given poses and velocities of the bodies, without joints."""
         found = cls(system, state)
-        found._take(_of_bodies(system, state, R, x, W, u))
+        poses = [*R, WORLD_AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN]  # and those of the ground
+        found._take(_Poses(state, *poses, [None] * len(system.joints)))
         return found
 
     def _take(self, poses: _Poses):
@@ -114,11 +115,8 @@ class Kinematics(View):
 class KinematicsOnAccess(Kinematics):
     """Poses and velocities of all bodies by a function, called on first access; without joints.
 
-    Parameters
-    ----------
-    poses : callable
-        () → rotations (n + 1, 3, 3), centres of mass, angular velocities and velocities (n + 1, 3) of the bodies, then of
-        the ground, as one array.
+    ``poses``: () → rotations (n + 1, 3, 3), centres of mass, angular velocities and velocities (n + 1, 3) of the bodies,
+    then of the ground, as one array.
     """
 
     def __init__(self, system: System, state: State, poses: Callable[[], np.ndarray]):
@@ -133,11 +131,6 @@ class KinematicsOnAccess(Kinematics):
         numbers = known["_numbers"] if "_numbers" in known else known.setdefault("_numbers", self._bodies())
         (first, last, shape), n = BLOCKS[name], numbers.size // NUMBERS
         return known.setdefault(name, numbers[first * n : last * n].reshape(n, *shape))
-
-
-def _of_bodies(system: System, state: State, R, x, W, u) -> _Poses:
-    """Poses and velocities of the bodies, and those of the ground; without joints."""
-    return _Poses(state, [*R, WORLD_AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints))
 
 
 def kinematics(system: System, state: State) -> Kinematics:

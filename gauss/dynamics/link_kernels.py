@@ -101,12 +101,7 @@ GROUND_POSE = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
 class LoopJointKind:
     """Kind of loop joints: those of one kind differ in their numbers only.
 
-    Parameters
-    ----------
-    joint : PlacedJoint
-        One of them.
-    redundant : iterable of int
-        Axes of the joint frame along which its rows are left out.
+    ``joint``: one of them. ``redundant``: axes of the joint frame along which its rows are left out.
     """
 
     def __init__(self, joint: PlacedJoint, redundant):

@@ -30,10 +30,7 @@ ASKED = Drive, Force  # kinds of loads that are known by the values of their law
 def generalised_forces(motion: Kinematics, applied: Applied) -> np.ndarray:
     """Applied loads along the rates (n_v,), with those on bodies carried inward along the spanning tree.
 
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics, with its joints if there are loads on bodies; floats or expressions.
+    ``motion``: kinematics, with its joints if there are loads on bodies; floats or expressions.
     """
     wrenches = {body: (applied.M[body], applied.F[body]) for body in applied.loaded_bodies}
     return applied.P + along_rates(motion, wrenches) if wrenches else applied.P
@@ -53,12 +50,8 @@ def traced_forces(system: System, loads: Sequence[BoundLoad]) -> Function:
 class LoadForces:
     """Generalised forces and power of loads, (t, q, v) → (Q (n_v,), power (3,) of drives, forces, dampers).
 
-    Parameters
-    ----------
-    called : sequence of BoundLoad
-        Loads that Python evaluates.
-    laws : Laws, optional
-        Those whose traced loads are evaluated, too, by machine code; when not given, none are.
+    ``called``: loads that Python evaluates. ``laws``: those whose traced loads are evaluated, too, by machine code; when not
+    given, none are.
     """
 
     def __init__(self, system: System, called: Sequence[BoundLoad] = (), laws: Laws | None = None):
@@ -103,12 +96,8 @@ class LoadForces:
     def write(self, state: State, numbers: np.ndarray, place: int, found: int):
         """Write generalised forces and power (n_v + 3,) of a state to an address.
 
-        Parameters
-        ----------
-        numbers : ndarray
-            A :meth:`room` with its time, coordinates and rates, that nobody else writes to.
-        place, found : int
-            Addresses of ``numbers``, and of the results.
+        ``numbers``: a :meth:`room` with its time, coordinates and rates, that nobody else writes to. ``place``, ``found``:
+        addresses of ``numbers``, and of the results.
         """
         motion = None
         if self.called:

@@ -20,21 +20,11 @@ NO_FORCE.flags.writeable = False  # one array for all bodies without loads
 class Applied:
     """Sum of applied loads, without gravity.
 
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics; loads on coordinates need the state only.
-    loads : sequence of BoundLoad, optional
-        Loads; all of the system when not given.
+    ``motion``: kinematics; loads on coordinates need the state only. ``loads``: loads; all of the system when not given.
 
-    Attributes
-    ----------
-    F, M : list of ndarray
-        Main force (3,) [N] and main moment about the centre of mass (3,) [N m] of each body, world axes.
-    P : ndarray, shape (p,)
-        Generalised forces along the joint rates.
-    driven, loaded, dissipated : float
-        Power of drives, of forces on bodies, and dissipated in dampers [W].
+    Attributes: ``F``, ``M``: main force (3,) [N] and main moment about the centre of mass (3,) [N m] of each body, world
+    axes. ``P`` (p,): generalised forces along the joint rates. ``driven``, ``loaded``, ``dissipated``: power of drives, of
+    forces on bodies, and dissipated in dampers [W].
     """
 
     def __init__(self, motion: Kinematics, loads=None):

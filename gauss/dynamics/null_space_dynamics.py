@@ -45,17 +45,9 @@ class NullSpaceDynamics:
 
     SimulationError if too few digits are left.
 
-    Parameters
-    ----------
-    state : State
-        State that meets the constraints.
-    load : ndarray, shape (n_v,)
-        Generalised forces added to the loads.
+    ``state``: state that meets the constraints. ``load`` (n_v,): generalised forces added to the loads.
 
-    Attributes
-    ----------
-    rates : ndarray, shape (n_v,)
-        Accelerations.
+    Attributes: ``rates`` (n_v,): accelerations.
     """
 
     def __init__(self, system: System, laws: Laws, state: State, load):
@@ -120,12 +112,8 @@ class NullSpaceDynamics:
     def response(self, force: np.ndarray, off: np.ndarray) -> np.ndarray:
         """Changes (n_v, k) of the accelerations that remove residuals.
 
-        Parameters
-        ----------
-        force : ndarray, shape (n_v, k)
-            Of the equations of motion, along the joints of the tree.
-        off : ndarray, shape (m, k)
-            Of the loop constraints.
+        ``force`` (n_v, k): of the equations of motion, along the joints of the tree. ``off`` (m, k): of the loop
+        constraints.
         """
         return self.L @ self._response(force, off)
 
@@ -160,12 +148,8 @@ def null_space_terms(system: System, requests: Sequence, state: State, given: di
 
     SimulationError if too few digits are left.
 
-    Parameters
-    ----------
-    state : State
-        State that meets the constraints.
-    given : dict
-        Rates, accelerations and generalised forces (n_v,), by their names.
+    ``state``: state that meets the constraints. ``given``: rates, accelerations and generalised forces (n_v,), by their
+    names.
     """
     laws, load, found = traced_loads(system), given["load"], list[np.ndarray]()
     dynamics = NullSpaceDynamics(system, laws, state, load)

@@ -51,10 +51,7 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
 def with_numbers(system: System, values, dynamics: Dynamics) -> System:
     """System of the same kind with other numbers, which may be expressions of a shared graph.
 
-    Parameters
-    ----------
-    values : sequence of float or Expression
-        Numbers in the order of :func:`numbers`.
+    ``values``: numbers in the order of :func:`numbers`.
     """
     values, place = np.asarray(values, dtype=object), 0
     constraint_scales(system)  # cached for the numbers: expressions have no scales
@@ -148,12 +145,7 @@ class ParametrisedSystem:
 def parametrised(pattern: System, members: np.ndarray) -> ParametrisedSystem:
     """Parametrised system of systems of one kind.
 
-    Parameters
-    ----------
-    pattern : System
-        One of them.
-    members : ndarray, shape (batch, n)
-        Numbers of each, see :func:`gauss.dynamics.parameters.numbers`.
+    ``pattern``: one of them. ``members`` (batch, n): numbers of each, see :func:`gauss.dynamics.parameters.numbers`.
     """
     varied = np.flatnonzero((members != members[0]).any(axis=0))
     values, graph = members[0].astype(object), Graph(shared=True)

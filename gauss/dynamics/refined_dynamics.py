@@ -65,13 +65,9 @@ class RefinedAccelerations(NamedTuple):
 class RefinedForwardDynamics(ConstrainedArticulatedBody):
     """Forward dynamics of a subsystem in one state with iterative refinement.
 
-    Parameters
-    ----------
-    subsystem, q, v, relations
-        As of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
-    cut : float or Expression
-        Rank tolerance: loop constraints with less than this share of their length outside the span of the others are
-        left out.
+    ``subsystem``, ``q``, ``v``, ``relations``: as of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
+    ``cut``: rank tolerance: loop constraints with less than this share of their length outside the span of the others are
+    left out.
     """
 
     def __init__(self, subsystem, q, v, relations, cut):

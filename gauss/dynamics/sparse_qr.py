@@ -17,12 +17,8 @@ SMALLEST_DIVISOR = 1e-300
 class QR:
     """Triangular factor of a matrix of numbers or expressions, for solving WᵀW y = b.
 
-    Parameters
-    ----------
-    least_length : float
-        Columns below this length are left out.
-    cut : float or Expression
-        Rank tolerance: columns with less than this share of their length outside the span of the earlier ones are left out.
+    ``least_length``: columns below this length are left out. ``cut``: rank tolerance: columns with less than this share of
+    their length outside the span of the earlier ones are left out.
     """
 
     def __init__(self, W: np.ndarray, least_length: float, cut):

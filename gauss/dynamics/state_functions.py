@@ -219,16 +219,8 @@ def _on_device(system: System, requests, columns, key, device: str) -> Callable:
 def compiled(system: System, function: TracedFunction, columns, key: tuple) -> Callable:
     """Machine code of a function of a state, with the checks of its arguments.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    function : TracedFunction
-        The function.
-    columns : sequence of int or None
-        Places of its independent coordinates in v, None where none are chosen.
-    key : tuple
-        What tells it from other functions of the system in the cache.
+    ``columns``: places of its independent coordinates in v, None where
+    none are chosen. ``key``: what tells it from other functions of the system in the cache.
     """
     trace, interface, name, by_null_space = function
     sizes, limits = interface.vectors, interface.limits

@@ -34,14 +34,8 @@ def efforts(terms: StateTerms, loads, acceleration) -> np.ndarray:
 def independent_acceleration_derivatives(terms: ConstrainedTerms, loads, load) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of the independent accelerations by displacements, rates and efforts, each (k, k).
 
-    Parameters
-    ----------
-    terms : ConstrainedTerms
-        The system in one state, with k independent coordinates.
-    loads : sequence of BoundLoad
-        Its loads, with traced laws.
-    load : ndarray, shape (n_v,)
-        Generalised forces added to the loads.
+    ``terms``: the system in one state, with k independent coordinates. ``loads``: its loads, with traced laws. ``load``
+    (n_v,): generalised forces added to the loads.
     """
     free = terms.independent
     found = LinearTerms(terms, loads, load).acceleration_changes[free]
@@ -51,12 +45,8 @@ def independent_acceleration_derivatives(terms: ConstrainedTerms, loads, load) -
 def independent_effort_derivatives(terms: ConstrainedTerms, loads, acceleration) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of the efforts by displacements and by rates, each (k, k), at given independent accelerations.
 
-    Parameters
-    ----------
-    terms, loads
-        As of :func:`independent_acceleration_derivatives`.
-    acceleration : ndarray, shape (n_v,)
-        Accelerations; those of the independent coordinates are read.
+    ``terms``, ``loads``: as of :func:`independent_acceleration_derivatives`. ``acceleration`` (n_v,): accelerations; those
+    of the independent coordinates are read.
     """
     load = _balancing(terms, loads, acceleration)
     by_displacement, by_rate, _ = independent_acceleration_derivatives(terms, loads, load)
@@ -66,12 +56,8 @@ def independent_effort_derivatives(terms: ConstrainedTerms, loads, acceleration)
 def independent_accelerations_by_parameter(terms: ConstrainedTerms, loads, load, parameter: str) -> np.ndarray:
     """Derivative (k, p) of the independent accelerations by a parameter of p values, at fixed independent coordinates.
 
-    Parameters
-    ----------
-    terms, loads, load
-        As of :func:`independent_acceleration_derivatives`.
-    parameter : str
-        As of :meth:`gauss.System.parameter_derivatives`.
+    ``terms``, ``loads``, ``load``: as of :func:`independent_acceleration_derivatives`. ``parameter``: as of
+    :meth:`gauss.System.parameter_derivatives`.
     """
     system, state = terms.system, State(terms.t, terms.q, terms.v)
     if system.has_closures and parameter.partition(":")[0] in OF_JOINTS:

@@ -59,21 +59,12 @@ class Kernels(NamedTuple):
 class Program:
     """Functions of one system.
 
-    Parameters
-    ----------
-    system : System
-        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
-    memory : int
-        Numbers of the state of the method.
-    family : ParametrisedSystem, optional
-        The parametrised system, if some numbers of the system are parameters.
-    inputs : bool
-        Whether the inputs of the scene are parameters, held in each step; otherwise they are zero.
+    ``system``: one without obstacles (see :func:`gauss.dynamics.conditions.obstacles`). ``memory``: numbers of the state of
+    the method. ``family``: the parametrised system, if some numbers of the system are parameters. ``inputs``: whether the
+    inputs of the scene are parameters, held in each step; otherwise they are zero.
 
-    Attributes
-    ----------
-    checks_bodies : bool
-        Whether accelerations of a tree are checked by inverse dynamics of all bodies, independent of link frames.
+    Attributes: ``checks_bodies``: whether accelerations of a tree are checked by inverse dynamics of all bodies, independent
+    of link frames.
     """
 
     checks_bodies = True

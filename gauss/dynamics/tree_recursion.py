@@ -143,12 +143,7 @@ def symmetric(upper) -> np.ndarray:
 class _LinkCode:
     """Kind of link whose steps are traced.
 
-    Parameters
-    ----------
-    constants : ndarray
-        Numbers of a link of this kind.
-    varying : ndarray of int
-        Which of them differ from link to link.
+    ``constants``: numbers of a link of this kind. ``varying``: which of them differ from link to link.
     """
 
     def __init__(self, pair: Pair, kind: LinkKind, constants: np.ndarray, varying: np.ndarray):

@@ -156,10 +156,7 @@ def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
 
     Joints are taken in the order in which the scene names them: of the joints of a loop the last one is cut.
 
-    Raises
-    ------
-    SceneError
-        If no chain of joints leads from the ground to some body.
+    SceneError if no chain of joints leads from the ground to some body.
     """
     reached, edges = {GROUND}, []
     waiting = sorted(scene.joints.values(), key=lambda joint: joint.child_frame is not None)  # these close loops

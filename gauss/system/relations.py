@@ -126,15 +126,9 @@ NO_RELATIONS = Relations((), None, (), ())
 def place_relations(system, relations) -> Relations:
     """Relations of a scene on its system.
 
-    Parameters
-    ----------
-    relations : iterable of Relation
-        The relations, of any scene on it.
+    ``relations``: the relations, of any scene on it.
 
-    Raises
-    ------
-    SceneError
-        If a residual cannot be traced, or binds nothing.
+    SceneError if a residual cannot be traced, or binds nothing.
     """
     graph, placed, outputs = Graph(), list[PlacedRelation](), list[object]()
     bodies: dict[int, tuple] = {}
@@ -203,10 +197,7 @@ def _moves(rate: np.ndarray, velocities) -> bool:
 def _traced_residuals(relation, view: Symbols) -> tuple[np.ndarray, np.ndarray]:
     """Position and velocity residuals of a relation as expressions.
 
-    Raises
-    ------
-    SceneError
-        If its function cannot be traced, or returns something else than numbers.
+    SceneError if its function cannot be traced, or returns something else than numbers.
     """
     try:
         c, g = view.residuals(relation)

@@ -193,11 +193,8 @@ def kept_joints(subsystem: Subsystem, joints) -> Subsystem:
 def spanning_tree(joints, preference=None) -> tuple[Edge, ...]:
     """Edges from the ground to every body, inner bodies first.
 
-    Parameters
-    ----------
-    preference : callable, optional
-        Joints of the least value are taken first; among equals those whose outer body turns with the fewest joints, then
-        those near the ground. Without it, joints are taken in their order.
+    ``preference``: joints of the least value are taken first; among equals those whose outer body turns with the fewest
+    joints, then those near the ground. Without it, joints are taken in their order.
     """
     at: dict[int, list[int]] = {}
     for index, joint in enumerate(joints):

@@ -32,10 +32,7 @@ class Assembler:
     TypeError if a law cannot be traced.
     SceneError if there are unilateral constraints, which have no fixed rows.
 
-    Parameters
-    ----------
-    system : System
-        The laws of its loads must be written with :mod:`gauss.math`.
+    ``system``: the laws of its loads must be written with :mod:`gauss.math`.
     """
 
     def __init__(self, system: System):
@@ -88,12 +85,7 @@ def _blocks(compulsion: Compulsion):
 class CertifiedEngine(Engine):
     """Accelerations of one system by one backend with a persistent workspace.
 
-    Parameters
-    ----------
-    backend : str, Backend or class
-        Backend, or "auto".
-    gains : tuple of float or None
-        Baumgarte gains α and β [1/s] of the feedback −2α ċ − β² c.
+    ``backend``: backend, or "auto". ``gains``: Baumgarte gains α and β [1/s] of the feedback −2α ċ − β² c.
     """
 
     evaluations, rescued = 0, 0

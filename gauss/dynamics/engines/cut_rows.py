@@ -88,14 +88,8 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
 
     SimulationError if the iteration does not converge.
 
-    Parameters
-    ----------
-    residual : callable
-        Forces (m,) → residual (m,).
-    guess : ndarray, shape (m,)
-        Initial forces.
-    units : ndarray, shape (m,)
-        Forces of the scene: smaller ones, as near a reversal, have round-off relative to these.
+    ``residual``: forces (m,) → residual (m,). ``guess`` (m,): initial forces. ``units`` (m,): forces of the scene: smaller
+    ones, as near a reversal, have round-off relative to these.
     """
     Q, left = guess, residual(guess)
     if not np.isfinite(left).all():
@@ -122,12 +116,7 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
 def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndarray, Solution]:
     """Forces Q (m,) of rows in a compulsion with all rows and no inequalities, and the solution with losses.
 
-    Parameters
-    ----------
-    compulsion : Compulsion
-        Without the losses.
-    answer : callable
-        Compulsion → certified solution.
+    ``compulsion``: without the losses. ``answer``: compulsion → certified solution.
     """
     if links.ideal:
         found = answer(compulsion)
@@ -148,14 +137,7 @@ def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndar
 class CutRowEngine(Engine):
     """Accelerations of a phase with cut rows: compiled, or by numpy up to a threshold of evaluations.
 
-    Parameters
-    ----------
-    system : System
-        The phase, with all rows.
-    cut : System
-        The same without the cut rows.
-    backend : str, Backend or class
-        How accelerations are solved.
+    ``system``: the phase, with all rows. ``cut``: the same without the cut rows. ``backend``: how accelerations are solved.
     """
 
     def __init__(self, system: System, cut: System, links: CutRows, backend: str | Backend | type, plan: Plan):

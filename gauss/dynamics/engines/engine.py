@@ -14,10 +14,7 @@ class DistrustError(SimulationError):
 class Engine(ABC):
     """Source of accelerations along one motion.
 
-    Attributes
-    ----------
-    handed_over : float or None
-        Time from which the certified engine is in use [s]; None while this one is.
+    Attributes: ``handed_over``: time from which the certified engine is in use [s]; None while this one is.
     """
 
     handed_over: float | None = None

@@ -107,10 +107,7 @@ class Step(NamedTuple):
 class ConstraintModes:
     """Modes of the constraints of a system.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Relations that have conditions on the state.
+    Attributes: ``names``: relations that have conditions on the state.
     """
 
     def __init__(self, system: System):

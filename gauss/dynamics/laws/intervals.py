@@ -59,18 +59,7 @@ class Interval(NamedTuple):
 
 
 def enclose(outputs, given: dict[int, Interval]) -> list[Interval]:
-    """Enclosures of expressions.
-
-    Parameters
-    ----------
-    given : dict
-        Interval of every symbol, or of any expression, by its index.
-
-    Returns
-    -------
-    list of Interval
-        One for each output.
-    """
+    """Enclosures of expressions, given the interval of every symbol, or of any expression, by its index."""
     known = dict(given)
     for node in _needed(outputs, known):
         if node.index not in known:

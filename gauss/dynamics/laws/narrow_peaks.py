@@ -31,14 +31,9 @@ COMPOSITE = np.array([1.0, 4.0, 2.0, 4.0, 2.0, 4.0, 2.0, 4.0, 1.0]) / 24.0
 class NarrowPeaks:
     """Products and exponential functions of a state in laws, which may be narrow.
 
-    Parameters
-    ----------
-    symbols, accelerations : list of Expression
-        Symbols of (t, q, v), and of the accelerations.
-    exponents, phases : list of Expression
-        Arguments of exponential functions, and of sines and cosines.
-    slopes : callable
-        Expressions → their time derivatives; empty if there are none.
+    ``symbols``, ``accelerations``: symbols of (t, q, v), and of the accelerations. ``exponents``, ``phases``: arguments of
+    exponential functions, and of sines and cosines. ``slopes``: expressions → their time derivatives; empty if there are
+    none.
     """
 
     def __init__(self, system: System, symbols, accelerations, products: Products, exponents: list, phases: list, slopes):
@@ -63,12 +58,7 @@ class NarrowPeaks:
     def unresolved(self, evaluate: Callable[[State], np.ndarray], order: Callable = lambda t: None) -> CheckedSwitch:
         """(t, q, v, q̈) at both ends of a fixed step → 1 if three samples of the accelerations do not resolve them, else 0.
 
-        Parameters
-        ----------
-        evaluate : callable
-            Accelerations of a traced state.
-        order : callable
-            Called with the symbol of time before anything is traced.
+        ``evaluate``: accelerations of a traced state. ``order``: called with the symbol of time before anything is traced.
         """
 
         def whole(t, *ends):
@@ -163,14 +153,8 @@ def ends_of(begin: Point, end: Point) -> list:
 def missed(system: System, evaluate: Callable[[State], np.ndarray], begin: State, first, end: State, last) -> Scalar:
     """1 where Simpson's rule by three samples of the accelerations in a step misses their integral by nine, else 0.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Accelerations of a state.
-    begin, end : State
-        Ends of the step, numbers or expressions.
-    first, last : ndarray, shape (n_v,)
-        Accelerations there.
+    ``evaluate``: accelerations of a state. ``begin``, ``end``: ends of the step, numbers or expressions. ``first``, ``last``
+    (n_v,): accelerations there.
     """
     nodes, _ = enclosed_parts(system, begin, first, end, last)
     a = np.array([first, *(evaluate(_state(system, node)) for node in nodes[1:-1]), last])

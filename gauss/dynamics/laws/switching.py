@@ -56,12 +56,7 @@ NO_SWITCHING = Switching()
 def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
     """Switching times, switching functions and velocity jumps of a motion.
 
-    Parameters
-    ----------
-    end : float
-        Final time [s].
-    breaks : sequence of float
-        Further switching times [s].
+    ``end``: final time [s]. ``breaks``: further switching times [s].
     """
     begin, monotone = start.t, bool(system.scene.nonsmooth)  # release of contacts is checked at few times of a step
     times, jumps = timed_switching(system, laws, start, end, breaks, monotone)
