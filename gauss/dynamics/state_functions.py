@@ -81,16 +81,14 @@ def state_function(
     return cached(system, (*key, device), lambda: _on_device(system, requests, columns, key, device))
 
 
-def traced_function(
-    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None
-) -> tuple[Function, Interface]:
+def traced_function(system: System, names: Sequence[str]) -> tuple[Function, Interface]:
     """Trace of a function of a state, or of several at once, with its arguments and the shapes of its results.
 
     The last outputs of the trace are error measures, one for each limit of the interface.
 
     ArgumentError, StateError, SimulationError as of :func:`state_function`.
     """
-    found = _function(system, *_requested(system, names, reference, independent))
+    found = _function(system, *_requested(system, names, REFERENCES[0], None))
     return found.trace(), found.interface
 
 

@@ -14,7 +14,7 @@ from gauss.dynamics.assemble import assemble
 from gauss.dynamics.engines import refined, tiering
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.sparse_qr import QR
+from gauss.dynamics.refined_dynamics import QR
 from gauss.dynamics.traced_system import Program
 from gauss.system import random_state
 from tests.support import mechanisms
