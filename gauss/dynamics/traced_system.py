@@ -5,7 +5,7 @@ Integrator loops and engines are compiled from them. Points are vectors (:class:
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -281,7 +281,7 @@ class Program:
             q = retract(self.system, q, shared.newton_step(place, shared.loop_residual(t, q)))
         place = shared.place(t, q, often=True)
         v = shared.nearest(place, v, np.zeros(m), 1.0, often=True)
-        residual = _fold(math.maximum, [0.0, *np.abs(shared.loop_residual(t, q)[:m] * self.shares)])
+        residual = reduce(math.maximum, [0.0, *np.abs(shared.loop_residual(t, q)[:m] * self.shares)])
         acceleration, power, _, monitored = shared.motion(place, v, often=True)
         return q, v, acceleration, power, monitored[1:], [residual]
 
@@ -298,7 +298,7 @@ class Program:
     def monitored(self, mechanism: Mechanism) -> list:
         """Least pivot of S, and its singularity, 1 plus the sum of the inverse pivots; 1 if these are not monitored."""
         pivots = mechanism.pivots if self.has_full_rank else ()
-        return [_fold(math.minimum, [1.0, *pivots]), 1.0 + sum(1.0 / pivot for pivot in pivots)]
+        return [reduce(math.minimum, [1.0, *pivots]), 1.0 + sum(1.0 / pivot for pivot in pivots)]
 
     def applied(self, state: State):
         """Generalised forces, forces on bodies and power of its loads, see :func:`applied_loads`."""
@@ -358,7 +358,7 @@ def applied_loads(system: System, loads, state: State):
 
 def largest(values):
     """Largest absolute value."""
-    return _fold(math.maximum, np.abs(values))
+    return reduce(math.maximum, np.abs(values))
 
 
 def absolute_sum(*vectors):
@@ -368,10 +368,3 @@ def absolute_sum(*vectors):
         half = len(values) // 2
         values = np.concatenate([values[:half] + values[half : 2 * half], values[2 * half :]])
     return values.sum()
-
-
-def _fold(function, values):
-    total = values[0]
-    for value in values[1:]:
-        total = function(total, value)
-    return total

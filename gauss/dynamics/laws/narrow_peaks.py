@@ -7,7 +7,7 @@ peak by one enclosure of the whole step.
 """
 
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 
 import numpy as np
 
@@ -160,9 +160,9 @@ def missed(system: System, evaluate: Callable[[State], np.ndarray], begin: State
     a = np.array([first, *(evaluate(_state(system, node)) for node in nodes[1:-1]), last])
     h, units = end.t - begin.t, system.scale.coordinates
     off, found = np.abs((SIMPSON - COMPOSITE) @ a) * h / units, 0.0
-    fastest = _largest(np.abs([*(begin.v / units), *(end.v / units)]))
+    fastest = reduce(math.maximum, np.abs([*(begin.v / units), *(end.v / units)]))
     for k, change in enumerate(off):
-        spread = h * _largest(np.abs(a[1:, k] - a[0, k])) / units[k]
+        spread = h * reduce(math.maximum, np.abs(a[1:, k] - a[0, k])) / units[k]
         counts = math.where(change > NEGLIGIBLE_RATE * fastest, 1.0, 0.0)
         found = math.where(change > UNRESOLVED_SHARE * spread, math.maximum(found, counts), found)
     return found
@@ -174,10 +174,3 @@ def _state(system: System, node: np.ndarray) -> State:
     for place in system.quaternions.values():
         q[place] = q[place] / np.sqrt(np.sum(q[place] * q[place]))
     return State(node[0], q, node[1 + system.n_q :])
-
-
-def _largest(values) -> Scalar:
-    found = values[0]
-    for value in values[1:]:
-        found = math.maximum(found, value)
-    return found
