@@ -46,7 +46,7 @@ from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.scene import JointDryFriction
 from gauss.system import State, System, retract, sides
-from gauss.system.contact_gaps import slips
+from gauss.system.contact_mode import slips
 
 MIDPOINT = 0.5  # share of a step in which coordinates move with the rates before it
 INCONSISTENT_RESPONSE = 1e-6  # relative: responses that violate the constraints by more are round-off

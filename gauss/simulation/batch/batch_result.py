@@ -8,11 +8,11 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import FORCES, shape_of, split
+from gauss.dynamics.programs import CalledProgram
 from gauss.dynamics.sensor_values import INERTIAL
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean

@@ -10,7 +10,7 @@ from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.constraint_modes import constraint_modes
 from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.parametrised_system import parametrised
+from gauss.dynamics.parameters import parametrised
 from gauss.dynamics.plan import BATCHES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
