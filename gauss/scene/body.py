@@ -57,7 +57,6 @@ class Body:
     inertia_as_given: bool = False
 
     def __post_init__(self):
-        """Check every value and keep plain tuples."""
         what = f"body {values.text(self.name, 'name of a body')!r}"
         keep = {
             "mass": values.number(self.mass, f"{what}: mass", "kg", non_negative=True),
@@ -109,7 +108,6 @@ class Frame:
     rotation: tuple = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
-        """Check every value and keep plain tuples."""
         what = f"frame {values.text(self.name, 'name of a frame')!r}"
         values.keep(self, position=values.vector(self.position, f"{what}: position", "m"))
         values.keep(self, rotation=values.rotation(self.rotation, f"{what}: rotation"))

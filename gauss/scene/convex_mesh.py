@@ -38,7 +38,6 @@ class ConvexMesh(ConvexCollider):
     kind: ClassVar[str] = "mesh"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
         points = _table(self.vertices, f"{self.what}: vertices", "points [m]", float)

@@ -70,7 +70,6 @@ class Input:
     forces: tuple[Force, ...] = ()
 
     def __post_init__(self):
-        """Check every value."""
         what = f"input {values.text(self.name, 'name of an input')!r}"
         self._check_what_it_acts_on(what)
         if self.limits is None:
@@ -156,7 +155,6 @@ class Output:
     relative_to: str = ""
 
     def __post_init__(self):
-        """Check every value."""
         what = f"output {values.text(self.name, 'name of an output')!r}"
         if self.kind not in SENSORS:
             raise SceneError(f"{what}: no kind {self.kind!r}. {did_you_mean(str(self.kind), SENSORS)}")

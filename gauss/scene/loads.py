@@ -35,7 +35,6 @@ class Drive:
     breaks: tuple = ()
 
     def __post_init__(self):
-        """Check every value."""
         what = f"drive {values.text(self.name, 'name of a drive')!r}"
         effort = self.effort
         if isinstance(effort, (list, tuple)) or getattr(effort, "ndim", False):
@@ -95,7 +94,6 @@ class Force:
     breaks: tuple = ()
 
     def __post_init__(self):
-        """Check every value."""
         what = f"force {values.text(self.name, 'name of a force')!r}"
         values.keep(self, force=values.law(self.force, f"{what}: force", "N", 3))
         values.keep(self, moment=values.law(self.moment, f"{what}: moment", "N m", 3))
@@ -129,7 +127,6 @@ class JointSpring:
     rest: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"joint spring {values.text(self.name, 'name of a spring')!r}"
         _check_spring(self, what)
         values.keep(self, rest=values.number(self.rest, f"{what}: rest", "rad or m"))
@@ -163,7 +160,6 @@ class Spring:
     length: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"spring {values.text(self.name, 'name of a spring')!r}"
         _check_spring(self, what)
         values.keep(self, length=values.number(self.length, f"{what}: length", "m", non_negative=True))
@@ -200,7 +196,6 @@ class Start:
     rate: float | tuple = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"start of joint {values.text(self.joint, 'name of a joint')!r}"
         for key, unit in (("position", "rad or m"), ("rate", "rad/s or m/s")):
             value = getattr(self, key)

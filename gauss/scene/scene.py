@@ -74,7 +74,6 @@ class Scene(ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputB
     source: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self):
-        """Check the name and gravity."""
         values.text(self.name, "name of the scene")
         values.keep(self, gravity=values.vector(self.gravity, "gravity", "m/s²"))
 

@@ -155,20 +155,9 @@ def _finite(entries: np.ndarray, given: tuple, what: str, size: int) -> np.ndarr
 
 
 def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
-    """Value of a law (size,): floats, or objects where it is traced.
+    """Value of a law (size,), called with arguments of which the first is the time: floats, or objects where it is traced.
 
     SceneError if it raises, or returns something else; the message names the law and the time.
-
-    Parameters
-    ----------
-    law : callable
-        A law of the user's.
-    given : tuple
-        Its arguments, the time first.
-    what : str
-        Its name in messages.
-    size : int
-        Number of values that it must return.
     """
     return _checked(_asked(law, given, what), given, what, size)
 

@@ -33,7 +33,6 @@ class Motor:
     coordinate: str
 
     def __post_init__(self):
-        """Check the names."""
         values.text(self.coordinate, f"motor {values.text(self.name, 'name of an actuator')!r}: coordinate")
 
 
@@ -68,7 +67,6 @@ class Thruster:
     axes: str = "world"
 
     def __post_init__(self):
-        """Check every value."""
         what = f"thruster {values.text(self.name, 'name of an actuator')!r}"
         for key, unit in (("force", "N"), ("moment", "N m"), ("at", "m")):
             object.__setattr__(self, key, values.vector(getattr(self, key), f"{what}: {key}", unit))
@@ -107,7 +105,6 @@ class Cable:
     slack: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"cable {values.text(self.name, 'name of an actuator')!r}"
         object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m"))
         object.__setattr__(self, "other_at", values.vector(self.other_at, f"{what}: other_at", "m"))
@@ -142,7 +139,6 @@ class AuxiliarySupport:
     joints: tuple[str, ...]
 
     def __post_init__(self):
-        """Check the names."""
         what = f"support {values.text(self.name, 'name of an actuator')!r}"
         joints = (self.joints,) if isinstance(self.joints, str) else tuple(self.joints)
         if not joints:

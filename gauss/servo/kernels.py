@@ -18,13 +18,7 @@ from gauss.system import State, System
 
 
 class ShapedKernel:
-    """Machine code of arrays of expressions.
-
-    Parameters
-    ----------
-    inputs : sequence of Expression
-        Symbols.
-    """
+    """Machine code of arrays of expressions of symbols."""
 
     def __init__(self, inputs, outputs):
         flat = [entry for output in outputs for entry in np.ravel(np.asarray(output, dtype=object))]

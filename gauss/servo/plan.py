@@ -71,10 +71,8 @@ def neighbours(servo: Servo, state: State) -> list[State]:
 def reduced(servo: Servo, state: State) -> RelationPlan:
     """Plan with hidden relations, found near a state.
 
-    Raises
-    ------
-    NoReductionError
-        If the equations of motion cannot be differentiated, or no effort ever acts on a relation; the message says why.
+    NoReductionError if the equations of motion cannot be differentiated, or no effort ever acts on a relation; the message
+    says why.
     """
     _check(servo)
     samples, table = neighbours(servo, state), list(servo.scalars)

@@ -165,17 +165,7 @@ def _correction(servo: Servo, plan: RelationPlan, state: State, residual, level:
 
 
 def first_accepted(trial_at: Callable[[float], Trial], accepted: Callable[[Trial], bool], smallest: float) -> Trial | None:
-    """First accepted trial; None if there is none down to the smallest share.
-
-    Parameters
-    ----------
-    trial_at : callable
-        Share of the step → trial.
-    accepted : callable
-        Whether a trial lowers the residual.
-    smallest : float
-        Smallest share of the step.
-    """
+    """First accepted trial of a share of a step, halved down to the smallest one; None if there is none."""
     share = 1.0
     while share >= smallest:
         trial = trial_at(share)

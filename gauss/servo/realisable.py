@@ -76,12 +76,8 @@ def planned(servo: Servo, state: State) -> RelationPlan:
 def instant(servo: Servo, state: State, plan: RelationPlan) -> ServoInstant:
     """Instant at a state on the contacts, by machine code where the dynamics can be traced.
 
-    Raises
-    ------
-    UnrealisableError
-        If a number is not finite: an actuator has no direction, or the state is singular.
-    StateError
-        If a loop that cannot move has another pose than in the scene.
+    UnrealisableError if a number is not finite: an actuator has no direction, or the state is singular. StateError if a loop
+    that cannot move has another pose than in the scene.
     """
     if untraced(servo):
         found = Saddle(servo, state).instant

@@ -40,7 +40,6 @@ class ServoRelation:
     unit: str = "rad, m"
 
     def __post_init__(self):
-        """Check every value."""
         what = f"relation {text(self.name, 'name of a relation')!r}"
         if not callable(self.residual):
             raise SceneError(f"{what}: residual must be a function of (t, motion), got {self.residual!r}.")
@@ -51,14 +50,7 @@ class ServoRelation:
 def as_relations(thing, motion, ideal: bool = False) -> list[ServoRelation]:
     """Relation as it is; any constraint of :mod:`gauss.scene` as relations, of its positions and of its velocities.
 
-    Parameters
-    ----------
-    thing : ServoRelation or gauss.scene.Relation
-        What is held.
-    motion : Observed
-        Motion in symbols, by which it is found out which residuals there are.
-    ideal : bool
-        Whether a contact keeps the constraint.
+    The motion in symbols tells which residuals there are. ``ideal``: whether a contact keeps the constraint.
     """
     if isinstance(thing, ServoRelation):
         return [thing]

@@ -83,13 +83,7 @@ def _constant(entry: Expression, symbols: list[Expression]) -> bool:
 
 
 def rows(found: list[ScalarRelation], symbols: MotionSymbols) -> ServoRows:
-    """Rows of scalar relations, in the symbols.
-
-    Raises
-    ------
-    SceneError
-        If a relation of accelerations is not linear in them.
-    """
+    """Rows of scalar relations, in the symbols; SceneError if a relation of accelerations is not linear in them."""
     zero = symbols.t.graph.constant(0.0)
     position: list[Expression] = []
     velocity: list[Expression] = []

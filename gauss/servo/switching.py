@@ -26,18 +26,9 @@ class _RelationLaws(NamedTuple):
 
 
 def servo_switching(servo: Servo, plan: RelationPlan, start: State, end: float, breaks) -> Switching:
-    """Switching times and functions that the steps of a motion under servos resolve.
+    """Switching times and functions that the steps of a motion under servos resolve, up to its end [s].
 
-    Parameters
-    ----------
-    plan : RelationPlan
-        Rows by which its relations are held.
-    start : State
-        Initial state.
-    end : float
-        Final time [s].
-    breaks : ndarray
-        Further switching times [s].
+    ``breaks``: further switching times [s].
     """
     loads = switching(servo.system, Laws(servo.system), start, end, breaks)
     laws = _relation_laws(servo, plan)

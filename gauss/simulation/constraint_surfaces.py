@@ -53,10 +53,7 @@ class ModeMotion(NamedTuple):
 def across_surfaces(problem: Problem, drive: Drive) -> Trajectory:
     """Motion of a problem, by ``drive`` from problem to trajectory; in one piece where no constraint jumps.
 
-    Raises
-    ------
-    SimulationError
-        If a position residual jumps where the motion crosses a surface, or the next mode drives the motion back.
+    SimulationError if a position residual jumps where the motion crosses a surface, or the next mode drives the motion back.
     """
     modes = constraint_modes(problem.system)
     if modes is None:

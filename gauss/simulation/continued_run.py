@@ -17,10 +17,7 @@ from gauss.system import State
 def continued(run: CompiledRun, fallback: Callable[[State, np.ndarray | None], Trajectory]) -> Trajectory:
     """Trajectory of a run, continued by ``fallback(start, samples)``.
 
-    Raises
-    ------
-    SimulationError
-        If the motion cannot continue; its ``trajectory`` holds the motion so far.
+    SimulationError if the motion cannot continue; its ``trajectory`` holds the motion so far.
     """
     first = run.trajectory()
     if run.control.status == LoopStatus.UNSOLVED:

@@ -14,16 +14,10 @@ SHORTEST_CONTACT_STEP = 1e-3  # relative to the step: the rounding of a gap over
 
 
 def grid(begin: float, end: float, step: float, samples, switching: Timetable = NO_TIMES) -> np.ndarray:
-    """Pairs (end of a step, :class:`gauss.codegen.kernels.Due` there), in order.
+    """Pairs (end of a step [s], :class:`gauss.codegen.kernels.Due` there), in order.
 
-    Parameters
-    ----------
-    begin, end, step : float
-        Interval and step [s]; the last step is shortened to meet the end.
-    samples : ndarray or None
-        Times to return [s]; the end of every step when None.
-    switching : Timetable
-        Switching times, just before and just after which a step ends.
+    The last step is shortened to meet the end. ``samples`` are times to return [s]; the end of every step when None. A step
+    ends just before and just after each switching time.
     """
     pairs = _even(begin, end, step, samples)
     if not switching.switches.size:
@@ -77,25 +71,10 @@ def _with_ends(pairs: np.ndarray, movable: np.ndarray, afters: list[float], begi
 
 
 def with_samples(pairs: np.ndarray, times: np.ndarray, step: float, rows: bool) -> tuple[np.ndarray, dict[int, int]]:
-    """Pairs with steps that end at the samples of a control law, too, and the sample that begins after so many pairs.
+    """Pairs (n, 2) with steps that end at samples of a control law, too; and number of pairs before a sample → its number.
 
-    Parameters
-    ----------
-    pairs : ndarray, shape (m, 2)
-        Pairs as of :func:`grid`.
-    times : ndarray, shape (k,)
-        Samples after the start [s], ascending.
-    step : float
-        Step [s].
-    rows : bool
-        Whether every end of a step is a row of the trajectory.
-
-    Returns
-    -------
-    pairs : ndarray, shape (n, 2)
-        Pairs; a step that nearly ends at a sample serves it.
-    begins : dict of int to int
-        Number of pairs before a sample → its number, the first of ``times`` being 1.
+    ``times`` (k,) are the samples after the start [s], ascending, numbered from 1; a step that nearly ends at one serves it.
+    ``rows``: whether every end of a step is a row of the trajectory.
     """
     equal = np.maximum(EQUAL_TIMES * step, 4.0 * APART * np.abs(times))
     ends = pairs[pairs[:, 1] != Due.OFF_GRID_SAMPLE, 0]
@@ -108,13 +87,7 @@ def with_samples(pairs: np.ndarray, times: np.ndarray, step: float, rows: bool) 
 
 
 def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
-    """Pairs of an equidistant grid.
-
-    Raises
-    ------
-    SimulationError
-        If they do not fit into memory.
-    """
+    """Pairs of an equidistant grid; SimulationError if they do not fit into memory."""
     steps = (end - begin) / step
     refuse_beyond_memory(STEP_NUMBERS * steps, f"step: {steps:.3g} steps of {step:.3g} s over {end - begin:.3g} s", SHORTER)
     count = max(1, int(np.ceil((end - begin) / step * (1 - EQUAL_TIMES))))

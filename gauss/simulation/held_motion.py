@@ -15,19 +15,10 @@ from gauss.system import State
 
 
 def held_motion(problem: Problem, drive: Callable[[Problem], Trajectory]) -> Trajectory:
-    """Motion whose inputs are drives of constant effort from one sample to the next.
+    """Motion whose inputs are drives of constant effort from one sample to the next; it may begin between two samples.
 
-    Parameters
-    ----------
-    problem : Problem
-        Initial value problem with held inputs; it may begin between two samples.
-    drive : callable
-        Initial value problem without held inputs → its trajectory.
-
-    Raises
-    ------
-    SimulationError
-        If the motion cannot continue; its ``trajectory`` holds the motion so far.
+    ``drive``: problem without held inputs → trajectory. SimulationError if the motion cannot continue; its ``trajectory``
+    holds the motion so far.
     """
     held, state = problem.held, problem.start
     pieces: list[Trajectory] = []

@@ -10,19 +10,10 @@ FEW_STEPS = 16  # so many times are written one by one in less time than as arra
 
 
 class StepEnds:
-    """Ends of steps.
+    """Ends of steps of one length [s].
 
-    Parameters
-    ----------
-    step : float
-        Step [s].
-
-    Attributes
-    ----------
-    grid : ndarray, shape (room, 2)
-        Times [s], and :attr:`Due.UNCHECKED`: steps are checked every few ones, not where a call ends.
-    times : ndarray, shape (room,)
-        The times, a view.
+    ``grid`` (room, 2): times [s], and :attr:`Due.UNCHECKED`, as steps are checked every few ones, not where a call ends;
+    ``times`` (room,): the times, a view.
     """
 
     def __init__(self, step: float):
@@ -30,13 +21,7 @@ class StepEnds:
         self.make_room(1)
 
     def make_room(self, n: int):
-        """Hold the ends of n steps.
-
-        Raises
-        ------
-        SimulationError
-            If they do not fit into memory.
-        """
+        """Hold the ends of n steps; SimulationError if they do not fit into memory."""
         refuse_beyond_memory(STEP_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
         self.grid = np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
         self.times, self._numbers = self.grid[:, 0], self.grid.data.cast("B").cast("d")

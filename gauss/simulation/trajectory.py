@@ -320,10 +320,7 @@ def spline_rates(system: System, t: np.ndarray, q: np.ndarray) -> np.ndarray:
 def _recorded_samples(system: System, t, q) -> tuple[np.ndarray, np.ndarray]:
     """Times (k,) and coordinates (k, n_q) of the user, checked but for their size and units.
 
-    Raises
-    ------
-    StateError
-        If they are no numbers, do not fit, or times do not increase.
+    StateError if they are no numbers, do not fit, or times do not increase.
     """
     times, samples = real_numbers(t), real_numbers(q)
     if times is None or samples is None:

@@ -177,10 +177,7 @@ class Rollout:
 def kept_on_interruption(make: Callable[..., Rollout]):
     """Attach a rollout to a KeyboardInterrupt, for a ``with`` statement: of its ``samples`` (batch, k, n_q + n_v …), if any.
 
-    Parameters
-    ----------
-    make : callable
-        (samples, fields) → rollout.
+    ``make``: (samples, fields) → rollout.
     """
     try:
         yield

@@ -16,10 +16,7 @@ class DeviceFixedStepBatch(FixedStepBatch):
     ) -> np.ndarray:
         """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps; ``threads`` has no meaning.
 
-        Raises
-        ------
-        DeviceError
-            If one motion alone does not fit into the memory of the device.
+        DeviceError if one motion alone does not fit into the memory of the device.
         """
         loop = self.loop
         assert isinstance(loop, DeviceFixedStepLoop)

@@ -20,14 +20,8 @@ CHUNKS_PER_THREAD = 4  # of the motions: a delayed thread does not delay the oth
 class FixedStepBatch:
     """Points of a batch of motions, one column each; the last one is repeated to fill a vector register.
 
-    Parameters
-    ----------
-    loop : FixedStepBatchLoop or DeviceFixedStepLoop
-        Compiled loop.
-    starts : ndarray, shape (n_q + n_v, batch)
-        Initial states, at t = 0.
-    parameters : ndarray, shape (n, batch), optional
-        Parameters of each motion, of a parametrised system.
+    Initial states are (n_q + n_v, batch), at t = 0; ``parameters`` (n, batch) those of each motion, of a parametrised
+    system.
     """
 
     def __init__(

@@ -249,10 +249,7 @@ def _result(system: System, t: np.ndarray, samples: np.ndarray, **fields) -> Rol
 def _checked_control(system: System, control, batch: int, steps: int) -> np.ndarray:
     """Inputs (batch, k, n_u) of all motions.
 
-    Raises
-    ------
-    SimulationError
-        If the scene has no inputs, the shape is wrong, or a value is not finite.
+    SimulationError if the scene has no inputs, the shape is wrong, or a value is not finite.
     """
     names = tuple(system.scene.inputs)
     if not names:
@@ -317,10 +314,7 @@ def _adaptive(
 def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
     """Switching times of laws of time, and jumps of prescribed velocities.
 
-    Raises
-    ------
-    SimulationError
-        If a prescribed position jumps.
+    SimulationError if a prescribed position jumps.
     """
     switched = switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end)
     warn_of_times(system, switched.times)

@@ -365,13 +365,7 @@ class SimulatorBatch:
 
 
 def _chosen(which, batch: int) -> np.ndarray:
-    """Numbers of some motions.
-
-    Raises
-    ------
-    StateError
-        If there are no such motions.
-    """
+    """Numbers of some motions; StateError if there are no such motions."""
     try:
         return np.ravel(np.arange(batch)[which])
     except (IndexError, ValueError, TypeError) as error:
