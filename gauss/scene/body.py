@@ -58,6 +58,7 @@ class Body:
 
     def __post_init__(self):
         what = f"body {values.text(self.name, 'name of a body')!r}"
+        values.text(self.on, f"{what}: on")
         keep = {
             "mass": values.number(self.mass, f"{what}: mass", "kg", non_negative=True),
             "com": values.vector(self.com, f"{what}: com", "m"),

@@ -9,6 +9,7 @@ Computer-Controlled Systems, 3rd ed., 2.3); its effort is u itself, or a law of 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf
+from numbers import Real
 
 from gauss.errors import SceneError, did_you_mean, listed
 from gauss.scene import values
@@ -74,7 +75,7 @@ class Input:
         self._check_what_it_acts_on(what)
         if self.limits is None:
             return
-        if isinstance(self.limits, int | float):
+        if isinstance(self.limits, Real):
             values.keep(self, limits=values.number(self.limits, f"{what}: limits", "N m or N", positive=True))
             return
         low, high = values.vector(self.limits, f"{what}: limits", "N m or N", 2)
@@ -156,7 +157,7 @@ class Output:
 
     def __post_init__(self):
         what = f"output {values.text(self.name, 'name of an output')!r}"
-        if self.kind not in SENSORS:
+        if not isinstance(self.kind, str) or self.kind not in SENSORS:
             raise SceneError(f"{what}: no kind {self.kind!r}. {did_you_mean(str(self.kind), SENSORS)}")
         values.text(self.of, f"{what}: of")
         if self.relative_to != "":

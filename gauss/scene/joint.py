@@ -66,8 +66,8 @@ class Joint:
 
     def __post_init__(self):
         what = f"joint {values.text(self.name, 'name of a joint')!r}"
-        if self.kind not in PAIRS:
-            raise SceneError(f"{what}: unknown type {self.kind!r}. {did_you_mean(self.kind, PAIRS)}")
+        if not isinstance(self.kind, str) or self.kind not in PAIRS:
+            raise SceneError(f"{what}: unknown type {self.kind!r}. {did_you_mean(str(self.kind), PAIRS)}")
         if self.parent == self.child:
             raise SceneError(f"{what}: parent and child are both {self.child!r}; a joint binds two bodies.")
         keep = {

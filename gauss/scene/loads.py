@@ -8,6 +8,8 @@ from collections.abc import Callable, Sized
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
+
 from gauss.errors import SceneError
 from gauss.scene import values
 
@@ -201,10 +203,7 @@ class Start:
             value = getattr(self, key)
             if value is None:
                 continue
-            scalar = isinstance(value, (int, float, str))
-            checked = (
-                values.number(value, f"{what}: {key}", unit)
-                if scalar
-                else values.vector(value, f"{what}: {key}", unit, len(value))
-            )
+            is_one = not np.asarray(value, dtype=object).ndim
+            what_of = f"{what}: {key}"
+            checked = values.number(value, what_of, unit) if is_one else values.vector(value, what_of, unit, len(value))
             values.keep(self, **{key: checked})

@@ -87,7 +87,8 @@ class Guided(Relation):
 
     def __post_init__(self):
         what = f"guide {values.text(self.name, 'name of a guide')!r}"
-        along = tuple(values.direction(row, f"{what}: along") for row in self.along)
+        rows = self.along if np.iterable(self.along) else (self.along,)
+        along = tuple(values.direction(row, f"{what}: along") for row in rows)
         values.keep(
             self,
             at=values.vector(self.at, f"{what}: at", "m"),

@@ -62,7 +62,7 @@ def vector(value, what: str, unit: str, size: int = 3) -> tuple[float, ...]:
 
 def times(value, what: str) -> tuple[float, ...]:
     """Tuple of finite times, in order."""
-    if isinstance(value, str) or np.ndim(value) != 1:
+    if isinstance(value, str) or np.asarray(value, dtype=object).ndim != 1:
         raise SceneError(f"{what}: expected times in [s], as [5.0, 6.0]; got {value!r}.")
     return tuple(sorted(vector(value, what, "s", len(value)))) if len(value) else ()
 

@@ -12,7 +12,7 @@ from gauss.dynamics.traced_system import applied_loads
 from gauss.servo.actuators import push
 from gauss.servo.instant import ServoInstant
 from gauss.servo.observed import MotionSymbols, body_inputs, body_symbols
-from gauss.servo.rows import ScalarRelation, ServoRows, rows, scalars
+from gauss.servo.relation import ScalarRelation, ServoRows, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.system import State, System
 

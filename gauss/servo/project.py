@@ -14,11 +14,11 @@ import numpy as np
 
 from gauss.dynamics.assembly_search import NEWTON_STEPS
 from gauss.dynamics.consistent_states import project
-from gauss.errors import StateError
+from gauss.errors import StateError, require
 from gauss.servo.kernels import tree_rows
 from gauss.servo.plan import RelationPlan
 from gauss.servo.realisable import contact_responses, instant, planned
-from gauss.servo.rows import ServoRows
+from gauss.servo.relation import ServoRows
 from gauss.servo.servo import Servo
 from gauss.system import State, System, retract
 
@@ -61,6 +61,7 @@ def initial_state(servo: Servo, state: State | None = None) -> State:
     >>> state.t, state.q.round(6)
     (0.0, array([0., 0.]))
     """
+    require(servo, (Servo,), "servo.initial_state")
     state = servo.system.initial_state() if state is None else servo.system.projected(state)
     plan = planned(servo, state)
     state = projected(servo, plan, state, NEWTON_STEPS)

@@ -26,7 +26,7 @@ from gauss.errors import BackendError, SimulationError
 from gauss.servo.allocate import allocate
 from gauss.servo.instant import ServoInstant, number
 from gauss.servo.kernels import body_directions, body_rows
-from gauss.servo.rows import ServoRows
+from gauss.servo.relation import ServoRows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State

@@ -12,7 +12,7 @@ from gauss.dynamics.laws.switching_times import timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.servo.instant import number
 from gauss.servo.plan import RelationPlan
-from gauss.servo.rows import rows
+from gauss.servo.relation import rows
 from gauss.servo.servo import Servo
 from gauss.system import State
 

@@ -114,6 +114,16 @@ def warn_of_balance(trajectory: Trajectory):
         _warn(trajectory, found)
 
 
+def balance_in_words(trajectory: Trajectory) -> str:
+    """Residual of the energy balance of a motion, as its loop recorded it or by a few samples, in one line."""
+    if not len(trajectory):
+        return "energy balance: no samples"
+    record = trajectory.energies or energy_record(_some(trajectory, trajectory.state(0), FEW_SAMPLES))
+    if np.isnan(record.off):
+        return "energy balance: unknown"
+    return f"energy balance: off by {record.off:.3g} J, largest energy {record.scale:.3g} J"
+
+
 def shares(system: System, energies: EnergyRecord, starts: np.ndarray, samples: np.ndarray, duration: float) -> np.ndarray:
     """Imbalance (batch,) of a batch of motions relative to their largest energies; zero at rest.
 

@@ -1,4 +1,4 @@
-"""Time grid of a fixed-step method."""
+"""Ends of fixed steps: the time grid of a motion, and those of one call of a stepping object."""
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from gauss.simulation.memory_limit import SHORTER, refuse_beyond_memory
 
 EQUAL_TIMES = 1e-9  # relative to the step: closer times are one
 STEP_NUMBERS = 4  # in memory for each step of a motion
+CALL_NUMBERS = 6  # the same of a call of a stepping object
+FEW_STEPS = 16  # of a call: so many times are written one by one in less time than as arrays
 SHORTEST_CONTACT_STEP = 1e-3  # relative to the step: the rounding of a gap over the step is a velocity error
 
 
@@ -112,3 +114,30 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
         return pairs
     pairs = np.concatenate([pairs, np.column_stack([off_grid, np.full(off_grid.size, float(Due.OFF_GRID_SAMPLE))])])
     return pairs[np.argsort(pairs[:, 0], kind="stable")]
+
+
+class StepEnds:
+    """Ends of the steps of one call, of one length [s], in an array that machine code reads.
+
+    ``grid`` (room, 2): times [s], and :attr:`Due.UNCHECKED`, as steps are checked every few ones, not where a call ends;
+    ``times`` (room,): the times, a view.
+    """
+
+    def __init__(self, step: float):
+        self.step = step
+        self.make_room(1)
+
+    def make_room(self, n: int):
+        """Hold the ends of n steps; SimulationError if they do not fit into memory."""
+        refuse_beyond_memory(CALL_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
+        self.grid = np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
+        self.times, self._numbers = self.grid[:, 0], self.grid.data.cast("B").cast("d")
+
+    def write(self, begin: float, first: int, n: int):
+        """Write the ends of n steps of a motion that began at a time [s], from step ``first`` on."""
+        h, last = self.step, first + n
+        if n > FEW_STEPS:
+            self.times[:n] = begin + h * np.arange(first, last)
+        else:
+            for k in range(n):
+                self._numbers[2 * k] = begin + h * (first + k)

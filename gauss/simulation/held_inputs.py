@@ -32,7 +32,8 @@ class HeldInputs:
         self.system, self.names = system, tuple(system.scene.inputs)
         if not self.names:
             raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
-        if not isinstance(rate, int | float) or not 0.0 < rate <= LARGEST_FLOAT:
+        rate = rate.item() if isinstance(rate, np.number) else rate
+        if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate <= LARGEST_FLOAT:
             raise SimulationError(f"rate: expected a positive number of samples in a second [Hz], got {rate!r}.")
         asked = (end - start) * rate
         refuse_beyond_memory(SAMPLE_NUMBERS * asked, f"rate: {rate:.3g} Hz are {asked:.2g} samples that", SHORTER)

@@ -102,6 +102,6 @@ def _is_positive(value) -> bool:
 
 def checked_count(name: str, value) -> int:
     """A positive whole number; SimulationError if it is none."""
-    if not isinstance(value, Integral) or not 1 <= int(value) <= sys.maxsize:
+    if not isinstance(value, Integral) or isinstance(value, bool) or not 1 <= int(value) <= sys.maxsize:
         raise SimulationError(f"{name}: expected a positive whole number, got {value!r:.80}.")
     return int(value)

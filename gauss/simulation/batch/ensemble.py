@@ -16,8 +16,7 @@ from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
-from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
-from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
+from gauss.simulation.batch.fixed_step_batch import DeviceFixedStepBatch, FixedStepBatch
 from gauss.simulation.batch.machine_code import FIXED
 from gauss.simulation.batch.rollout import ADAPTIVE
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch

@@ -1,4 +1,4 @@
-"""Fixed-step batch: motions side by side in vector registers, by a compiled loop, in several threads."""
+"""Fixed-step batch: motions side by side in vector registers, by a compiled loop, in several threads; or on devices."""
 
 import os
 from collections.abc import Callable, Iterable
@@ -17,7 +17,41 @@ NEVER = 2**52  # steps: beyond the end of any motion
 CHUNKS_PER_THREAD = 4  # of the motions: a delayed thread does not delay the others
 
 
-class FixedStepBatch:
+class BatchPoints:
+    """Points of motions, one column each, of which the first ``size`` count, and their worst checks so far."""
+
+    points: np.ndarray  # (m, columns)
+    worst: np.ndarray  # (k, columns), as of WORST_RECORD
+    states: slice  # of a point: coordinates and rates
+    size: int
+
+    @property
+    def error(self) -> np.ndarray:
+        """Largest error of the accelerations so far, relative to the largest of them."""
+        return self.worst[0, : self.size]
+
+    @property
+    def residual(self) -> np.ndarray:
+        """Largest constraint residual so far, relative to the sizes of the constraints."""
+        return self.worst[1, : self.size]
+
+    @property
+    def unseen(self) -> np.ndarray:
+        """Above 0 where a step may have passed a condition of a law undetected."""
+        return self.worst[2, : self.size]
+
+    @property
+    def unsolved(self) -> np.ndarray:
+        """Above 0 where the equations of a step were not solved."""
+        return self.worst[3, : self.size]
+
+    @property
+    def reached(self) -> np.ndarray:
+        """States (n_q + n_v, batch) so far, NaN of motions that cannot continue."""
+        return self.points[self.states, : self.size]
+
+
+class FixedStepBatch(BatchPoints):
     """Points of a batch of motions, one column each; the last one is repeated to fill a vector register.
 
     Initial states are (n_q + n_v, batch), at t = 0; ``parameters`` (n, batch) those of each motion, of a parametrised
@@ -44,34 +78,9 @@ class FixedStepBatch:
         return np.pad(columns, ((0, 0), (0, -self.size % self.loop.width)), mode="edge")
 
     @property
-    def error(self) -> np.ndarray:
-        """Largest error of the accelerations so far, relative to the largest of them."""
-        return self.worst[0, : self.size]
-
-    @property
-    def residual(self) -> np.ndarray:
-        """Largest constraint residual so far, relative to the sizes of the constraints."""
-        return self.worst[1, : self.size]
-
-    @property
-    def unseen(self) -> np.ndarray:
-        """Above 0 where a step may have passed a condition of a law undetected."""
-        return self.worst[2, : self.size]
-
-    @property
-    def unsolved(self) -> np.ndarray:
-        """Above 0 where the equations of a step were not solved."""
-        return self.worst[3, : self.size]
-
-    @property
     def energies(self) -> EnergyRecord:
         """Energies (batch,) so far."""
         return EnergyRecord(*self.worst[WORST_RECORD.index("kinetic") :, : self.size])
-
-    @property
-    def reached(self) -> np.ndarray:
-        """States (n_q + n_v, batch) so far."""
-        return self.points[self.states, : self.size]
 
     def kept(self) -> tuple:
         """What motions continue from."""
@@ -157,6 +166,32 @@ class FixedStepBatch:
             rows[np.arange(rows.shape[1]) > made[:, None] // keep] = np.nan
             error.samples = rows[: self.size]  # type: ignore[attr-defined]
             raise
+        return rows[: self.size]
+
+
+class DeviceFixedStepBatch(FixedStepBatch):
+    """Points of a batch of motions on devices: all at once, in parts that fit into their memory."""
+
+    def run(
+        self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None, with_work: bool = False
+    ) -> np.ndarray:
+        """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps; ``threads`` has no meaning.
+
+        DeviceError if one motion alone does not fit into the memory of the device.
+        """
+        loop = self.loop
+        assert isinstance(loop, DeviceFixedStepLoop)
+        sample = loop.written if with_work else self.states
+        rows = np.empty((self.columns, steps // keep + 1, sample.stop - sample.start))
+        rows[:, 0] = self.points[sample].T
+        settings = {"h": h, "keep": keep, "every": steps_per_check(loop.evaluations), "columns": self.columns}
+        settings |= {"rows": rows.shape[1], "row": rows.shape[2], "begin": 0, "end": self.columns}
+        if control is not None:
+            settings |= {"hold": steps // control.shape[1], "motions": len(control), "changes": control.shape[1]}
+        spans = [
+            BatchSpan(first=first, last=min(first + BUDGET, steps), **settings) for first in range(0, steps, BUDGET)
+        ]  # a program is no longer than the driver allows on a GPU with a display
+        loop.move(spans, self.points, self.worst, rows, *([] if control is None else [control]))
         return rows[: self.size]
 
 
