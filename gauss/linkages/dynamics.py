@@ -1,5 +1,7 @@
 """Forward dynamics of a linkage in one coordinate, J_e θ̈ + b θ̇² = M1 + Q, by one compiled kernel."""
 
+import ctypes
+import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +18,7 @@ from gauss.linkages.crank_ranges import closing_ranges, follow, near
 from gauss.linkages.elements import CrankMotor
 from gauss.linkages.kernels import inertia_terms, reduced_kernel
 from gauss.linkages.motion import move
-from gauss.scene.values import evaluated
+from gauss.scene.values import put
 from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 DEFAULT_ATOL = 1e-12  # rad, and relative to the speed of the drive
@@ -54,11 +56,11 @@ class ReducedLinkage:
 
     def terms(self, angle: float, speed: float) -> tuple[float, float, float]:
         """J_e, b, and Q of all loads at a crank angle and speed."""
-        inputs = np.array([angle, speed])
-        if self.branch is not None:
-            inputs = np.concatenate([inputs, *self.branch.at(angle).values()])
-        J_e, b, Q = self.kernel(inputs).tolist()
-        if not np.isfinite(J_e):
+        poses = () if self.branch is None else np.concatenate([*self.branch.at(angle).values()])
+        inputs, outputs = (ctypes.c_double * self.kernel.n_in)(angle, speed, *poses), (ctypes.c_double * 3)()
+        self.kernel.at(ctypes.addressof(inputs), ctypes.addressof(outputs))
+        J_e, b, Q = outputs
+        if not math.isfinite(J_e):
             ranges = " and ".join(f"from {degrees(x)} to {degrees(y)}" for x, y in closing_ranges(self.chain))
             raise SimulationError(f"{self.chain.name} does not close at crank angle {degrees(angle)}; it closes {ranges}.")
         return J_e + self.added, b, Q
@@ -181,8 +183,11 @@ def run(
     fastest = max(abs(float(speed)), abs(chain.driver.speed)) or 1.0 / duration
     absolute = [DEFAULT_ATOL, DEFAULT_ATOL * fastest] if atol is None else atol
 
-    def torque(t, angle, speed):
-        return float(evaluated(motor, (t, angle, speed), f"{chain.name}: motor", 1)[0])
+    value, what = np.zeros(1), f"{chain.name}: motor"
+
+    def torque(*state):
+        put(motor, state, what, 1, value, 0)
+        return value.item()
 
     def rates(t, y):
         return [y[1], equation.acceleration(y[0], y[1], torque(t, y[0], y[1]))]
