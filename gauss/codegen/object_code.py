@@ -20,9 +20,12 @@ from gauss.codegen.terminal_line import units_in_progress
 from gauss.codegen.whole_selection import selected_whole
 
 OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
-PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
+# Straight-line code of a hash-consed graph gains nothing by passes; steps of a few bodies, by inlining of their functions.
+PASSES = "passes where control flows, in units; modules of a length as a whole, inlined"
 RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one object for that of another
 UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
+# Lengths of modules that are optimised as a whole: in shorter ones the first motion waits for it, in longer ones others do.
+SHORTEST_WHOLE, LONGEST_WHOLE = 50_000, 250_000
 SELECTED_WHOLE = "x86_64"  # processor on which some functions are (gauss.codegen.whole_selection)
 CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
 FUNCTION = re.compile(r"^define [^\n]*\n\{\n.*?^\}\n", re.MULTILINE | re.DOTALL)
@@ -69,15 +72,18 @@ def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
     optimise : int
         As of :func:`gauss.codegen.machine.load`, at least 1; modules that are optimised as a whole are one unit.
     """
-    if optimise == 1:
+    if optimise > 1 or (SHORTEST_WHOLE <= len(ir_text) <= LONGEST_WHOLE and CONTRACTED not in ir_text):
+        yield from map(_inlined, units_in_progress([ir_text]))
+    else:
         short = len(ir_text) <= UNIT_LENGTH
         yield from map(_optimised, units_in_progress([ir_text] if short else ModuleUnits(ir_text).short(UNIT_LENGTH)))
-    else:
-        (unit,) = units_in_progress([ir_text])
-        module, builder = _parsed(unit), _builder()
-        module.verify()
-        builder.getModulePassManager().run(module, builder)
-        yield target(OPTIMISED).emit_object(module)
+
+
+def _inlined(unit: str) -> bytes:
+    module, builder = _parsed(unit), _builder()
+    module.verify()
+    builder.getModulePassManager().run(module, builder)
+    return target(OPTIMISED).emit_object(module)
 
 
 def _optimised(unit: str) -> bytes:

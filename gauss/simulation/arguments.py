@@ -31,6 +31,7 @@ from gauss.simulation.tolerances import check_tolerances, shares_of_scale, toler
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System, refuse_changed
 
+FITTING_NUMBERS = 1e6  # in memory of any machine
 SAMPLE_NUMBERS = 6  # in memory for each sample of a motion, beside coordinates and rates: times, steps and work
 LEAST_CONTROLLED_RTOL = 1e-7  # of time stepping by error control: gaps are rounded, and its order is low
 
@@ -106,9 +107,9 @@ def _refuse_beyond_memory(system: System, method: Integrator, duration: float, s
     asked = "times"
     if samples is None and step is not None and isinstance(method, FixedStep):
         count, asked = duration / step, f"step: each step of {step:.3g} s"
-    if not count:
-        return
     numbers = count * (SAMPLE_NUMBERS + system.n_q + system.n_v)
+    if numbers <= FITTING_NUMBERS:
+        return
     refuse_beyond_memory(
         numbers, f"{asked}: {count:.3g} samples of {system.scene.name!r}", f"give fewer times=, or {SHORTER}"
     )
