@@ -76,8 +76,9 @@ def _scipy(method: str) -> Callable:
                     if solver.status == "failed":
                         break
                     if not sampled or solver.t != reached:
+                        inside = sampled and np.searchsorted(times, reached) < np.searchsorted(times, solver.t, "right")
                         reached = solver.t
-                        steps.append((solver.t, solver.y, solver.dense_output() if sampled else None))
+                        steps.append((solver.t, solver.y, solver.dense_output() if inside else None))  # three evaluations
             except KeyboardInterrupt as error:
                 interruption = error
         counts = len(steps), solver.nfev, int(solver.nlu)
