@@ -70,6 +70,8 @@ class Stats(NamedTuple):
         Time from which the fallback of the plan continued [s]; None if it was not needed.
     sleep : SleepRecord or None
         Which bodies slept, of a motion with ``sleeping=``.
+    law_error : float or None
+        Largest residual of the laws of contact and friction in time stepping, relative; None of other motions.
     """
 
     evaluations: int
@@ -86,12 +88,15 @@ class Stats(NamedTuple):
     plan: Plan | None = None
     handed_over: float | None = None
     sleep: SleepRecord | None = None
+    law_error: float | None = None
 
     def __repr__(self):
         rejected = f" and {self.rejected} rejected" if self.rejected else ""
         plan = "" if self.plan is None else f", {self.plan.driver}, {self.plan.dynamics} dynamics"
         sleep = "" if self.sleep is None else f", {self.sleep}"
-        return f"Stats({self.steps} steps{rejected}, {self.evaluations} evaluations, {self.wall_time:.3g} s{plan}{sleep})"
+        laws = "" if self.law_error is None else f", laws of contact met to {self.law_error:.0e}"
+        cost = f"{self.steps} steps{rejected}, {self.evaluations} evaluations, {self.wall_time:.3g} s"
+        return f"Stats({cost}{plan}{laws}{sleep})"
 
 
 SUMMED = "evaluations", "steps", "rejected", "factorisations", "wall_time", "rescued", "unseen"
