@@ -14,9 +14,8 @@ import gauss
 from gauss.errors import FileError
 from gauss.view.skeleton import placed
 from gauss.view.viewer import export_html, page, show
-from gauss.view.viewer.cameras import CAMERAS, placed_camera
 from gauss.view.viewer.forms import forms
-from gauss.view.viewer.framing import FIELD, framing, joined
+from gauss.view.viewer.framing import CAMERAS, FIELD, framing, joined, placed_camera
 from gauss.view.viewer.show import LOOPBACK, _free_port
 from gauss.view.viewer.shown import resampled
 from gauss.view.viewer.stage import own_colour

@@ -1,6 +1,6 @@
 """The mechanism on the stage of a viser server: meshes, frames, paths, arrows; one call moves it to a sample."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -8,10 +8,8 @@ from gauss.analysis import reactions
 from gauss.dynamics.kinematics import kinematics
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS
-from gauss.view.viewer.cameras import SIDE_SHARE, shifted
 from gauss.view.viewer.forms import BodyMesh, forms, size
-from gauss.view.viewer.framing import FIELD, framing, joined
-from gauss.view.viewer.ground import ground, sky
+from gauss.view.viewer.framing import FIELD, SIDE_SHARE, framing, joined, shifted
 from gauss.view.viewer.shown import Shown, resampled
 from gauss.view.viewer.touches import touches
 
@@ -235,3 +233,30 @@ def _quaternions(R: np.ndarray) -> np.ndarray:
     from scipy.spatial.transform import Rotation  # takes long to import
 
     return Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*R.shape[:-2], 4)
+
+
+class Ground(NamedTuple):
+    """Colours behind and under a mechanism."""
+
+    top: tuple[int, int, int]  # top, bottom: red, green, blue of the sky from 0 to 255, at its top and its bottom
+    bottom: tuple[int, int, int]
+    cell: tuple[int, int, int]  # cell, section: lines of the floor
+    section: tuple[int, int, int]
+    shadow: float  # opacity of shadows on the floor
+    dark: bool  # whether controls are light on dark
+
+
+LIGHT = Ground((168, 184, 204), (222, 227, 233), (198, 205, 214), (164, 174, 188), 0.3, False)  # white bodies are brighter
+DARK = Ground((16, 20, 27), (44, 50, 60), (66, 73, 84), (94, 103, 117), 0.5, True)
+
+
+def ground(dark: bool) -> Ground:
+    """Light or dark ground."""
+    return DARK if dark else LIGHT
+
+
+def sky(colours: Ground) -> np.ndarray:
+    """Background from top to bottom, shape (256, 8, 3)."""
+    share = np.linspace(0.0, 1.0, 256)[:, None, None]
+    shades = (1 - share) * np.array(colours.top) + share * np.array(colours.bottom)
+    return np.broadcast_to(shades, (256, 8, 3)).astype(np.uint8)
