@@ -1,5 +1,6 @@
 """The mechanism on the stage of a viser server: meshes, frames, paths, arrows; one call moves it to a sample."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,8 @@ from gauss.view.viewer.framing import FIELD, SIDE_SHARE, framing, joined, shifte
 from gauss.view.viewer.shown import Shown, resampled
 from gauss.view.viewer.touches import touches
 
-STEEL, CONTACT = (0.32, 0.34, 0.38), (0.85, 0.65, 0.3)  # colours of joints and shapes of contact
+STEEL = (0.32, 0.34, 0.38)  # colour of joints
+TINT = 0.35  # of white in the colours of shapes of contact: links are seen against those of their body
 LAND = (0.6, 0.66, 0.58)  # colour of shapes of contact on the ground
 ARROW = 0.35  # longest arrow, of the size of the mechanism
 RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contact forces
@@ -24,9 +26,21 @@ SMOOTHNESS, FINEST_PATH = 6, 6000  # points of a path for each picture, and most
 ROLES = ("link", "joint", "contact", "frame", "path")
 
 
-def own_colour(form: BodyMesh) -> tuple[float, float, float] | None:
-    """Colour of a joint or of a shape of contact; None of a link, which has that of its body."""
-    return LAND if (form.role, form.body) == ("contact", GROUND) else {"joint": STEEL, "contact": CONTACT}.get(form.role)
+def colour_of(form: BodyMesh, bodies: Sequence[str]) -> tuple[float, float, float]:
+    """Colour of a mesh: its own, that of joints or of the ground, or that of its body; shapes of contact are lighter."""
+    if form.colour or form.role == "joint":
+        return form.colour or STEEL
+    if form.body == GROUND:
+        return LAND if form.role == "contact" else STEEL
+    red, green, blue = body_colour(bodies.index(form.body))
+    white = TINT if form.role == "contact" else 0.0
+    return red + white * (1 - red), green + white * (1 - green), blue + white * (1 - blue)
+
+
+def body_colour(number: int) -> tuple[float, float, float]:
+    """Colour of a body by its number, red, green and blue from 0 to 1."""
+    red, green, blue = (int(COLOURS[number % len(COLOURS)][k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return red, green, blue
 
 
 class ViewerStage:
@@ -49,7 +63,6 @@ class ViewerStage:
         self.size = size(trajectory.system)
         self.positions, rotations = trajectory.poses()
         self.turns = _quaternions(rotations)
-        self.colours = {name: rgb(COLOURS[k % len(COLOURS)]) for k, name in enumerate(self.bodies)}
         self.reactions = {joint: reactions(trajectory, joint).force for joint in shown.joints}
         self.largest = max((float(np.linalg.norm(f, axis=1).max()) for f in self.reactions.values()), default=0.0)
         self.root = "" if beside is None else "/beside"
@@ -132,7 +145,7 @@ class ViewerStage:
         self.parts: dict[str, list] = {role: [] for role in ROLES}
         for number, form in enumerate(forms(self.trajectory.system, visuals)):
             parent = f"{self.root}/ground" if form.body == GROUND else f"{bodies}/{_path(form.body)}"
-            colour = form.colour or own_colour(form) or self.colours.get(form.body, STEEL)
+            colour = colour_of(form, self.bodies)
             faces, vertices = np.asarray(form.mesh.faces, np.uint32), np.asarray(form.mesh.vertices, np.float32)
             handle = scene.add_mesh_simple(f"{parent}/{form.role} {number}", vertices, faces, color=colour, side="double")
             self.parts[form.role].append(handle)
@@ -155,13 +168,13 @@ class ViewerStage:
         poses, frames = fine.poses(), self.trajectory.system.frames  # of all bodies by one function
         for name in shown.traces:
             body = frames[name].body
-            carrier, own = self.bodies[body], frames[self.bodies[body]]
+            own = frames[self.bodies[body]]
             arm = own.R.T @ ((0.0 if name in self.bodies else frames[name].p) - own.p)
             points = np.asarray(poses[0][:, body] + poses[1][:, body] @ arm, np.float32)
             segments = np.stack([points[:-1], points[1:]], axis=1)
             look = {"thickness": 0.006 * self.size}
             handle = self.server.scene.add_line_segments(
-                f"{self.root}/paths/{_path(name)}", segments, self.colours[carrier], **look
+                f"{self.root}/paths/{_path(name)}", segments, body_colour(body), **look
             )
             self.parts["path"].append(handle)
 
@@ -209,7 +222,8 @@ class ContactMarks:
         for (ball, arrow), place in zip(self.handles, self.places, strict=True):
             ball.visible = bool(self.visible and place.closed[k])
             arrow.visible = bool(ball.visible and np.linalg.norm(place.forces[k]) > FAINT * self.largest)
-            ball.position = place.points[k]
+            if ball.visible:
+                ball.position = place.points[k]
             if arrow.visible:
                 arrow.points = self._points(place, k)
 
@@ -220,12 +234,6 @@ class ContactMarks:
 def _path(name: str) -> str:
     """Name without the slash, which separates the levels of the tree of nodes."""
     return name.replace("/", "∕")
-
-
-def rgb(colour: str) -> tuple[float, float, float]:
-    """Red, green and blue, from 0 to 1, of a colour such as "#0072B2"."""
-    red, green, blue = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
-    return red, green, blue
 
 
 def _quaternions(R: np.ndarray) -> np.ndarray:
