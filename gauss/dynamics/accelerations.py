@@ -95,10 +95,7 @@ class Accelerations:
 def forward_dynamics(system: System) -> Callable:
     """Compiled function (q, v, load, out=None, t=0.0) → q̈.
 
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled, with the reasons.
+    SimulationError if the system cannot be compiled, with the reasons.
     """
     if not system.n_v:
         return _last(system, system.loads)
