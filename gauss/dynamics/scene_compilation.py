@@ -51,6 +51,12 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
         return build(floating(scene, system), SystemDynamics())
 
 
+def system_of(given: Scene | System, what: str) -> System:
+    """System of a scene, or a given one; ArgumentError of the function ``what`` if it is neither."""
+    require(given, (System, Scene), what)
+    return compile_scene(given) if isinstance(given, Scene) else given
+
+
 def floating(scene: Scene, tree: System) -> Scene:
     """Scene with a free joint "BODY floats" for every body, in which its own joints are loop joints.
 
