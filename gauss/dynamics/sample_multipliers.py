@@ -36,17 +36,9 @@ def are_unique(system: System) -> bool:
 
 
 def sample_multipliers(system: System, t, q, v) -> tuple[np.ndarray, np.ndarray] | None:
-    """Multipliers (k, r) of all constraints at k states, and whether they are certain (k,).
+    """Multipliers (k, r) of all constraints at k states t (k,), q (k, n_q), v (k, n_v), and whether they are certain (k,).
 
-    Parameters
-    ----------
-    t, q, v : ndarray, shape (k,), (k, n_q), (k, n_v)
-        Times, coordinates, rates.
-
-    Returns
-    -------
-    tuple of ndarray, or None
-        None where they are not unique, or a law of a load cannot be traced.
+    None where they are not unique, or a law of a load cannot be traced.
     """
     laws = Laws(system)
     if laws.called or not are_unique(system):

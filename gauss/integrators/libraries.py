@@ -104,11 +104,6 @@ class _Interruptible:
     """A callback (…, out) of compiled code, which loses its steps where a callback raises: after Ctrl-C it gives NaN.
 
     As a context it takes care of Ctrl-C within the compiled code, which Python would raise at the first line of a callback.
-
-    Parameters
-    ----------
-    function : callable
-        Writes into its last argument.
     """
 
     def __init__(self, function: Callable):

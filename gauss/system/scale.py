@@ -81,13 +81,7 @@ class Scale:
 
 
 def scale_of(system) -> Scale:
-    """Scale of a system.
-
-    Parameters
-    ----------
-    system : System
-        With its scene.
-    """
+    """Scale of a system."""
     turns = turning(system)
     length = _length(system, turns)
     coordinates = np.where(turns, 1.0, length)

@@ -3,10 +3,9 @@
 Coordinates move with the rates before the step over a share s of it; forces are evaluated there, rate-dependent ones at
 rates that the free accelerations and the contact forces of the last step have changed by then; the rest of the way takes the
 rates after the step (midpoint rule: Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). With an impact s = 0.
-Impulses of an impact are no forces of the step after it, which expects none. A gap that would close within the step
-closes at its end (:mod:`gauss.dynamics.contact.gap_laws`); one with an impact opens with e times its speed (Moreau 1988;
-Stewart, Trinkle 1996).
-Friction and set-valued elements act on the rates after the step. The forces f solve the problem of
+Impulses of an impact are no forces of the step after it, which expects none. A gap that would close within the step closes
+at its end (:mod:`gauss.dynamics.contact.gap_laws`); one with an impact opens with e times its speed (Moreau 1988; Stewart,
+Trinkle 1996). Friction and set-valued elements act on the rates after the step. The forces f solve the problem of
 :mod:`gauss.dynamics.contact.contact_step`.
 """
 
@@ -22,11 +21,10 @@ from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import contact_scales, gap_scales
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, laws_of
-from gauss.dynamics.contact.damped_step import DampedResponses, DampedStep
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
-from gauss.dynamics.contact.implicit_damping import ImplicitDamping
+from gauss.dynamics.contact.implicit_damping import DampedResponses, DampedStep, ImplicitDamping
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps, penetration_error
 from gauss.dynamics.contact.paradox import (
     MOST_CONTACTS,
@@ -46,7 +44,7 @@ from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.scene import JointDryFriction
 from gauss.system import State, System, retract, sides
-from gauss.system.contact_gaps import slips
+from gauss.system.contact_mode import slips
 
 MIDPOINT = 0.5  # share of a step in which coordinates move with the rates before it
 INCONSISTENT_RESPONSE = 1e-6  # relative: responses that violate the constraints by more are round-off

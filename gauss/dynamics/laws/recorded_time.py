@@ -16,15 +16,7 @@ BARE = {"__new__", "__getattribute__"}  # methods of a float that say nothing of
 class RecordedTime:
     """Time that behaves as the number it is, and records whether it was read.
 
-    Parameters
-    ----------
-    t : float
-        Time [s].
-
-    Attributes
-    ----------
-    is_read : bool
-        Whether its value, its text or its type was asked for.
+    Attributes: ``is_read``: whether its value, its text or its type was asked for.
     """
 
     __slots__ = "is_read", "value"
@@ -62,10 +54,7 @@ def reads_time(law: Callable, motion: Kinematics) -> tuple[bool, bool]:
 
     A law that keeps one of them, or returns it, or raises an exception, reads it.
 
-    Parameters
-    ----------
-    law : callable
-        Of (t, motion).
+    ``law``: of (t, motion).
     """
     own, of_motion = RecordedTime(motion.state.t), RecordedTime(motion.state.t)
     given = KinematicsAtTime(motion, of_motion)
@@ -93,15 +82,7 @@ def _reads(law: Callable, given: tuple, recorded: tuple[RecordedTime, ...]) -> l
 
 
 class KinematicsAtTime(Kinematics):
-    """Kinematics of the same coordinates and rates at another time: poses are those of the other one.
-
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics of these coordinates and rates.
-    t : float
-        Time [s].
-    """
+    """Kinematics of the same coordinates and rates at another time: poses are those of the other one."""
 
     def __init__(self, motion: Kinematics, t):
         self.system, self.state, self._other = motion.system, State(t, motion.state.q, motion.state.v), motion

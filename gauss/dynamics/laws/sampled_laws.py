@@ -29,20 +29,9 @@ def sampled_times(
 ) -> Timetable:
     """Jumps of one law, and ends of the intervals in which it is constant; with the law itself unless it is constant.
 
-    Parameters
-    ----------
-    law : callable
-        Of (t, motion).
-    motion : Kinematics
-        Kinematics of the initial state; None for laws of rotors.
-    begin, end : float
-        Interval of time [s].
-    what : str
-        Name of the law in warnings.
-    uses_time : bool
-        Whether the law is known to use the time: a constant value is then warned of.
-    known : KnownSearch, optional
-        Last search of this law of loads, which is not repeated for the same law.
+    ``law``: of (t, motion). ``motion``: kinematics of the initial state; None for laws of rotors. ``what``: name of the law
+    in warnings. ``uses_time``: whether the law is known to use the time: a constant value is then warned of. ``known``: last
+    search of this law of loads, which is not repeated for the same law.
     """
     own, of_motion = (reads_first(law, begin, None), False) if motion is None else reads_time(law, motion)
     values = partial(_values, law, motion, of_motion)

@@ -26,27 +26,13 @@ class Laws:
 
     A law that returns numbers when it is traced does not depend on its arguments, or hides how: it is opaque.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    trace : bool
-        False: all laws are opaque.
+    ``trace``: False: all laws are opaque.
 
-    Attributes
-    ----------
-    traced, called : list of BoundLoad
-        Loads with traced laws, which become machine code, and loads with opaque laws.
-    reasons : dict
-        Why the law of a load is opaque, {name of the load: reason}.
-    key : Hashable
-        Key of the set of traced laws, those of inputs included: a law may have changed since it was traced.
-    motion : Kinematics or None
-        The system in symbols, where there are laws.
-    functions : list of (str, Function)
-        Traced laws over these symbols, each with the name of its load.
-    of_smooth : Laws or None
-        Laws of the system without unilateral and set-valued elements, once they are asked for.
+    Attributes: ``traced``, ``called``: loads with traced laws, which become machine code, and loads with opaque laws.
+    ``reasons``: why the law of a load is opaque, {name of the load: reason}. ``key``: key of the set of traced laws, those
+    of inputs included: a law may have changed since it was traced. ``motion``: the system in symbols, where there are laws.
+    ``functions``: traced laws over these symbols, each with the name of its load. ``of_smooth``: laws of the system without
+    unilateral and set-valued elements, once they are asked for.
     """
 
     def __init__(self, system: System, trace: bool = True):
