@@ -19,7 +19,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.sample_multipliers import sample_multipliers
 from gauss.errors import SimulationError
 from gauss.simulation import Trajectory
-from gauss.simulation.moreau.moreau_jean import step_at, with_forces
+from gauss.simulation.moreau.moreau_jean import steps_at, with_forces
 
 MANY_SAMPLES = 1000  # above, machine code is made: certified solutions take about as long for so many
 UNKNOWN = "machine code"  # in place of the name of a backend
@@ -107,7 +107,7 @@ def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
     """
     system, state = trajectory.system, trajectory.state(index)
     if trajectory.step is not None:
-        return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
+        return with_forces(trajectory.motions[index], steps_at(trajectory)(index).force, backend)
     if system.set_valued.placed or system.losses:
         return active_mode(system, state, backend=backend).solution
     solution = solve(assemble(system, state), backend)

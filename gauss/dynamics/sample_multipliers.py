@@ -17,7 +17,7 @@ from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
-from gauss.dynamics.mobility import mobility
+from gauss.dynamics.mobility import mobility_at_start
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_system import largest
 from gauss.rotations import cross
@@ -31,7 +31,7 @@ def are_unique(system: System) -> bool:
     """Whether the state determines all multipliers: no redundant rows, contacts, set-valued elements, losses."""
     if system.contacts.placed or system.set_valued.placed or system.losses or not system.n_v:
         return False
-    found = cached(system, (mobility,), lambda: mobility(system))
+    found = mobility_at_start(system)
     return not found.redundant and not found.is_singular
 
 

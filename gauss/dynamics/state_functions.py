@@ -17,7 +17,7 @@ from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.constraint_leak import LARGEST_LEAK, REFUSED_LEAK, constraint_leak, may_leak
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
-from gauss.dynamics.mobility import mobility
+from gauss.dynamics.mobility import mobility_at_start
 from gauss.dynamics.null_space_dynamics import null_space_terms
 from gauss.dynamics.parameter_terms import size_of
 from gauss.dynamics.projection import fixed_columns
@@ -157,7 +157,7 @@ def _columns(system: System, independent) -> tuple[int, ...]:
     """Places of independent coordinates in v."""
     names = (independent,) if isinstance(independent, str) else tuple(independent)
     columns = fixed_columns(system, names)
-    freedoms = cached(system, (mobility,), lambda: mobility(system)).nearby
+    freedoms = mobility_at_start(system).nearby
     if len(columns) != freedoms or len(set(columns)) != freedoms:
         raise StateError(
             f"independent: expected {freedoms} different coordinates, one for each degree of freedom, "

@@ -82,6 +82,7 @@ def equilibrium(servo: Servo, state: State | None = None) -> Equilibrium:
     """
     state, system = state_of(servo, state, "servo.equilibrium"), servo.system
     require_written(system)
+    servo.follow_laws()
     form = servo.made((_Form,), lambda: _Form(servo))
     state = State(state.t, state.q, np.zeros(system.n_v))
     unknown = np.zeros(form.n_contacts + len(servo.efforts))

@@ -155,6 +155,7 @@ def free_displacements(blocked: np.ndarray) -> np.ndarray:
 def _terms(servo: Servo, state: State) -> Terms:
     require(servo, (Servo,), "servo.lagrange")
     require(state, (State,), "servo.lagrange: state")
+    servo.follow_laws()
     return servo.made((LagrangeForm,), lambda: LagrangeForm(servo))(state)
 
 

@@ -37,6 +37,7 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
         True if they can be held; else with the reason.
     """
     state = state_of(servo, state, "servo.realisable")
+    servo.follow_laws()
     plan = direct(servo)
     verdict = verdict_of(instant(servo, state, plan), servo.held, servo.efforts)
     if verdict.outcome != "rank lost":

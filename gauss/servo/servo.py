@@ -1,6 +1,6 @@
 """Servo: a system, servo-constraints, and the actuators that hold them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -9,6 +9,7 @@ import numpy as np
 
 from gauss.arguments import table
 from gauss.dynamics import compile_scene
+from gauss.dynamics.laws.traced_laws import present_laws
 from gauss.dynamics.store import Store
 from gauss.errors import ArgumentError, SceneError, did_you_mean, require
 from gauss.scene import Scene, values
@@ -117,6 +118,14 @@ class Servo:
     @cached_property
     def _made(self) -> Store:
         return Store()
+
+    @cached_property
+    def _stores(self) -> dict[Hashable, Store]:
+        return {}
+
+    def follow_laws(self):
+        """Use what was made for the laws of the loads as they are now, which may have changed since it was made."""
+        vars(self)["_made"] = self._stores.setdefault(present_laws(self.system).key, Store())
 
     def made(self, key: tuple, make: Callable):
         """Result of ``make``, kept under a key: machine code, index reduction."""

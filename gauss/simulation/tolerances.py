@@ -24,7 +24,8 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
     """
     if atol is None:
         make = lambda: _default(system, rtol)  # noqa: E731
-        return make() if system.dynamics is None else system.dynamics.on_demand((_default, rtol), make)
+        key = _default, rtol, system.scale.length, system.scale.time
+        return make() if system.dynamics is None else system.dynamics.on_demand(key, make)
     if not isinstance(atol, Mapping):
         return Tolerance(rtol, *_pair(atol, "atol"))
     own = _units(system)

@@ -85,6 +85,7 @@ def scale_of(system) -> Scale:
     turns = turning(system)
     length = _length(system, turns)
     coordinates = np.where(turns, 1.0, length)
+    coordinates.flags.writeable = False  # kept with the system, and shown to the user
     mass = _mass(system, length)
     return Scale(length, _time(system, length, mass, coordinates), mass, coordinates)
 
