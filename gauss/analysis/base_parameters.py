@@ -1,9 +1,8 @@
 """Base parameters: the combinations of standard parameters that forces depend on, by the rank of the regressor.
 
 Over many states W = [W₁ W₂] with independent columns W₁ and W₂ = W₁ β, so that W π = W₁ (π₁ + β π₂): no measurement of
-forces
-tells more than π₁ + β π₂ (Gautier, Numerical calculation of the base inertial parameters of robots, J. Robotic Systems 8(4),
-1991). QR with pivoting chooses W₁, of columns in the units of the scene.
+forces tells more than π₁ + β π₂ (Gautier, Numerical calculation of the base inertial parameters of robots, J. Robotic
+Systems 8(4), 1991). QR with pivoting chooses W₁, of columns in the units of the scene.
 """
 
 from collections.abc import Sequence

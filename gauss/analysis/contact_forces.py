@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.analysis.sample_forces import kept_with
-from gauss.analysis.sample_solution import refuse_doubtful
+from gauss.analysis.sample_forces import kept_with, refuse_doubtful
 from gauss.backends import Backend, solve
 from gauss.backends.certificate import UNDETERMINED_SHARE
 from gauss.backends.closure import Factor

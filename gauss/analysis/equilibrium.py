@@ -17,13 +17,13 @@ from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.loop_closure import POSITION_STEPS
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import generator, named_arguments
-from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.consistent_states import violations
 from gauss.dynamics.energies import potential_energy
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import fixed_columns, project_positions
-from gauss.errors import ArgumentError, GaussError, SimulationError, StateError, did_you_mean, require
+from gauss.dynamics.scene_compilation import system_of
+from gauss.errors import ArgumentError, GaussError, SimulationError, StateError, did_you_mean
 from gauss.scene import Scene
 from gauss.system import State, System, retract
 
@@ -105,7 +105,7 @@ def equilibrium(
     >>> round(gauss.equilibrium(gauss.load("pendulum")).energy, 6)
     -4.905
     """
-    system = _compiled(system, "equilibrium")
+    system = system_of(system, "equilibrium")
     start = state_at(system, start, t, "equilibrium")
     return _found(system, start, fixed_columns(system, keep), _load(system, loads))
 
@@ -141,7 +141,7 @@ def equilibria(
     """
     if not isinstance(starts, (int, np.integer)) or starts < 0:
         raise ArgumentError(f"equilibria: starts: expected a whole number, 0 or more, got {starts!r}.")
-    system, rng = _compiled(system, "equilibria"), generator(seed, "equilibria")
+    system, rng = system_of(system, "equilibria"), generator(seed, "equilibria")
     held, load, found = fixed_columns(system, keep), _load(system, loads), list[StaticEquilibrium]()
     base, why = state_at(system, None, t, "equilibria"), None
     for k in range(starts + 1):
@@ -155,11 +155,6 @@ def equilibria(
     if not found:
         raise SimulationError(f"no equilibrium was found from {starts + 1} starts; the last search ended so: {why}")
     return tuple(sorted(found, key=lambda one: one.energy))
-
-
-def _compiled(system: System | Scene, name: str) -> System:
-    require(system, (System, Scene), name)
-    return compile_scene(system) if isinstance(system, Scene) else system
 
 
 def _random(system: System, base: State, rng: np.random.Generator, held: list[int], keep) -> State:

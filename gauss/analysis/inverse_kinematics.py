@@ -17,8 +17,8 @@ from gauss.analysis.target import Target
 from gauss.analysis.target_levels import LevelRows, lexicographic, solver_of
 from gauss.analysis.target_problem import TargetProblem, bounds, positive_values
 from gauss.arguments import generator, named_arguments
-from gauss.dynamics import compile_scene
 from gauss.dynamics.projection import clipped, project_rates
+from gauss.dynamics.scene_compilation import system_of
 from gauss.errors import ArgumentError, GaussError, require
 from gauss.scene import Scene
 from gauss.system import State, System, retract
@@ -131,7 +131,7 @@ def inverse_kinematics(
     >>> gauss.inverse_kinematics(gauss.load("double_pendulum"), target).reached
     True
     """
-    system = _compiled(system, "inverse_kinematics")
+    system = system_of(system, "inverse_kinematics")
     problem, solver = TargetProblem(system, targets, limits), solver_of(backend)
     for name, value, least in (("starts", starts, 0), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
@@ -200,7 +200,7 @@ def differential_inverse_kinematics(
     SimulationError
         If no rates are within the limits.
     """
-    system = _compiled(system, "differential_inverse_kinematics")
+    system = system_of(system, "differential_inverse_kinematics")
     require(state, (State,), "differential_inverse_kinematics: state")
     for name, value, least in (("step", step, 1e-300), ("damping", damping, 0.0)):
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value < np.inf:
@@ -221,11 +221,6 @@ def differential_inverse_kinematics(
     G, h = bounds(N, low, high, units, driven)
     y = lexicographic(problem.levels(rows, wanted, N), G, h, float(damping), solver_of(backend))
     return (driven + N @ y) / step
-
-
-def _compiled(system: System | Scene, name: str) -> System:
-    require(system, (System, Scene), name)
-    return compile_scene(system) if isinstance(system, Scene) else system
 
 
 def _within(problem: TargetProblem, start: State | None) -> State:

@@ -13,22 +13,21 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from gauss.analysis.derivatives import AccelerationChanges
+from gauss.analysis.derivatives import AccelerationChanges, changes_along
 from gauss.analysis.frozen_time import state_at
 from gauss.analysis.linear_modes import LinearModes
 from gauss.analysis.regulator import gain, unreached, weights
-from gauss.analysis.tangent_changes import changes_along
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, write
-from gauss.dynamics import compile_scene
 from gauss.dynamics.consistent_states import refuse_off_constraints
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.outputs import FORCES
 from gauss.dynamics.projection import fixed_columns
+from gauss.dynamics.scene_compilation import system_of
 from gauss.dynamics.sensor_values import measured
-from gauss.errors import ArgumentError, MissingPackageError, SimulationError, StateError, did_you_mean, require
+from gauss.errors import ArgumentError, MissingPackageError, SimulationError, StateError, did_you_mean
 from gauss.scene import Scene
 from gauss.system import State, System, coordinate_rates
 from gauss.system.coordinate_names import displacement_names, rate_names
@@ -239,8 +238,7 @@ def linearise(
     >>> model.states
     ('A', 'A rate')
     """
-    require(system, (System, Scene), "linearise")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "linearise")
     state = state_at(system, state, t, "linearise")
     refuse_off_constraints(system, state, "linearise")
     changes = AccelerationChanges(system, state, load)

@@ -17,7 +17,6 @@ from gauss.analysis.target_problem import positive_values
 from gauss.analysis.time_scaling import REST_LENGTH, along_lines, extremes, through_points
 from gauss.arguments import LARGEST_FLOAT, named_arguments, real_array
 from gauss.codegen import Expression
-from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -26,6 +25,7 @@ from gauss.dynamics.projection import (
     held_factor,
     limits,
 )
+from gauss.dynamics.scene_compilation import system_of
 from gauss.errors import ArgumentError, SimulationError, StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation.trajectory import Trajectory
@@ -266,8 +266,7 @@ def plan_motion(
     StateError
         If a name is none of the system, or no coordinate.
     """
-    require(system, (System, Scene), "plan_motion")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "plan_motion")
     if shape not in SHAPES:
         raise ArgumentError(f"plan_motion: no shape {shape!r}. {did_you_mean(str(shape), SHAPES)}")
     _refuse_begin(begin)

@@ -20,8 +20,8 @@ from gauss.analysis.target_problem import positive_values
 from gauss.analysis.targets import PointTarget, PoseTarget
 from gauss.analysis.time_scaling import phases, rested, stretch, stretched
 from gauss.arguments import named_arguments
-from gauss.dynamics import compile_scene
-from gauss.errors import ArgumentError, SimulationError, require
+from gauss.dynamics.scene_compilation import system_of
+from gauss.errors import ArgumentError, SimulationError
 from gauss.scene import Scene, values
 from gauss.system import State, System, retract
 
@@ -95,8 +95,7 @@ def plan_path(
     >>> round(line.duration, 9)
     1.05
     """
-    require(system, (System, Scene), "plan_path")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "plan_path")
     lines = _lines(points)
     most = _most(
         speed=speed, acceleration=acceleration, turning_speed=turning_speed, turning_acceleration=turning_acceleration

@@ -12,7 +12,6 @@ from gauss.analysis.linear_model import LinearModel, linearise
 from gauss.analysis.linear_model_each import LinearModelOfEach, output_names
 from gauss.arguments import named_arguments
 from gauss.codegen import Interface, forward, write
-from gauss.dynamics import compile_scene
 from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.kinematics import kinematics
@@ -20,11 +19,12 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.linear_terms import LinearTerms
 from gauss.dynamics.plan import LINEAR_MODELS
 from gauss.dynamics.rules import Plan, Question
+from gauss.dynamics.scene_compilation import system_of
 from gauss.dynamics.sensor_values import measured
 from gauss.dynamics.state_functions import TracedFunction, compiled, error_limits, error_measures
 from gauss.dynamics.store import cached
 from gauss.dynamics.term_table import traced_loads
-from gauss.errors import SimulationError, require
+from gauss.errors import SimulationError
 from gauss.scene import Scene
 from gauss.system import State, System
 
@@ -130,8 +130,7 @@ def prepare_linear_model(
     >>> A.shape
     (2, 2)
     """
-    require(system, (System, Scene), "prepare_linear_model")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "prepare_linear_model")
     plan = LINEAR_MODELS.plan(Question(system, Laws(system)))
     if state is None:
         start = system.initial_state()

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gauss.analysis.load_sharing import shared
-from gauss.analysis.sample_forces import kept_with, sample_forces
-from gauss.analysis.sample_solution import refuse_doubtful, solution_at
+from gauss.analysis.sample_forces import kept_with, refuse_doubtful, sample_forces, solution_at
 from gauss.backends import Backend
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.laws.traced_laws import Laws

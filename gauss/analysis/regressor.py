@@ -1,11 +1,9 @@
 """Regressor of inverse dynamics: Y(q, v, q̈) π = τ, with the loads of the scene on the left side of τ, by named columns.
 
-Ten standard inertial parameters of each body (:mod:`gauss.dynamics.inertial_regressor`), then friction of joints, d v + f
-sign v.
-With loops, Nᵀ Y with v = N ẏ: the equations of motion of independent coordinates y. Forces of all joints, loop joints too,
-enter
-them as Nᵀ τ; those of the constraints do not (Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, ch.
-12).
+Ten standard inertial parameters of each body (:mod:`gauss.dynamics.inertial_regressor`), then friction of joints,
+d v + f sign v. With loops, Nᵀ Y with v = N ẏ: the equations of motion of independent coordinates y. Forces of all joints,
+loop joints too, enter them as Nᵀ τ; those of the constraints do not (Khalil and Dombre, Modeling, Identification and Control
+of Robots, 2002, ch. 12).
 """
 
 from collections.abc import Sequence
@@ -15,11 +13,11 @@ import numpy as np
 
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import name_list, named_arguments, real_array
-from gauss.dynamics import compile_scene
 from gauss.dynamics.conditions import refuse_motionless
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.projection import fixed_columns
-from gauss.errors import StateError, require
+from gauss.dynamics.scene_compilation import system_of
+from gauss.errors import StateError
 from gauss.scene import Body, Scene
 from gauss.scene.motions import Prescribed
 from gauss.scene.set_valued import JointFriction
@@ -38,10 +36,8 @@ class Regressor:
         Y, generalised forces of unit parameters.
     names : tuple of str
         Names of the p columns: "mass:arm" [kg], "mx:arm", "my:arm", "mz:arm" (mass × centre of mass [kg m]), "Ixx:arm",
-        "Iyy:arm",
-        "Izz:arm", "Ixy:arm", "Ixz:arm", "Iyz:arm" (entries of the inertia matrix about the origin of the body frame [kg
-        m²]),
-        "viscous:joint" [N m s, N s/m], "coulomb:joint" [N m, N].
+        "Iyy:arm", "Izz:arm", "Ixy:arm", "Ixz:arm", "Iyz:arm" (entries of the inertia matrix about the origin of the body
+        frame [kg m²]), "viscous:joint" [N m s, N s/m], "coulomb:joint" [N m, N].
     rows : tuple of str
         Names of the k rates: all, or the independent ones.
     parameters : ndarray, shape (p,)
@@ -113,8 +109,7 @@ class RegressorModel:
     """
 
     def __init__(self, system: System | Scene, independent: Sequence[str] | None = None, friction: Sequence[str] = ()):
-        require(system, (System, Scene), "regressor")
-        self.system = system = compile_scene(system) if isinstance(system, Scene) else system
+        self.system = system = system_of(system, "regressor")
         refuse_motionless(system, "regressor")
         _refuse_prescribed(system.scene)
         given = None if independent is None else name_list(independent, "independent", "names of joints")

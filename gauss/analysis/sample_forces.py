@@ -1,6 +1,7 @@
 """Multipliers of all constraints at all samples of a motion, in one pass: machine code of many samples, certified where not.
 
-Kept with the motion, so that forces of further joints cost nothing.
+Kept with the motion, so that forces of further joints cost nothing. Near singular configurations multipliers lose digits
+although accelerations are certified.
 """
 
 from collections.abc import Callable
@@ -9,10 +10,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from gauss.analysis.sample_solution import refuse_uncertain, solution_at
+from gauss.backends import solve
+from gauss.backends.solution import Solution
+from gauss.codegen import Scalar
+from gauss.dynamics.assemble import assemble
+from gauss.dynamics.contact.mode_selection import active_mode
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.sample_multipliers import sample_multipliers
+from gauss.errors import SimulationError
 from gauss.simulation import Trajectory
+from gauss.simulation.moreau.moreau_jean import steps_at, with_forces
 
 MANY_SAMPLES = 1000  # above, machine code is made: certified solutions take about as long for so many
 UNKNOWN = "machine code"  # in place of the name of a backend
@@ -89,3 +96,49 @@ def _solve_sample(found: SampleForces, trajectory: Trajectory, index: int, backe
     found.loose[index] = loose[:size] if loose.size else False
     found.errors[index] = solution.certificate.dual.errors[[places[constraint.rows.start] for constraint in constraints]]
     found.tolerances[index], found.backends[index] = solution.status.tolerance, solution.backend
+
+
+def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
+    """Solution at a sample; with time stepping, over the next step.
+
+    Rows of joints, couplings and relations come first, as in the structure of the system; sticking elements follow.
+
+    SimulationError if it is not certified.
+    """
+    system, state = trajectory.system, trajectory.state(index)
+    if trajectory.step is not None:
+        return with_forces(trajectory.motions[index], steps_at(trajectory)(index).force, backend)
+    if system.set_valued.placed or system.losses:
+        return active_mode(system, state, backend=backend).solution
+    solution = solve(assemble(system, state), backend)
+    if not solution.status.certified:
+        raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+    return solution
+
+
+def refuse_doubtful(solution: Solution, places, name: str, t: Scalar):
+    """Raise a SimulationError if some multipliers of a solution are not certified.
+
+    Parameters
+    ----------
+    solution : Solution
+        Solution of a sample.
+    places : int or array of int
+        Indices of constraints, then of inequality rows.
+    name : str
+        Name of the joint or constraint.
+    t : float
+        Time of the sample [s].
+    """
+    error = float(np.max(solution.certificate.dual.errors[places], initial=0.0))
+    if error > solution.status.tolerance:
+        refuse_uncertain(error, solution.status.tolerance, solution.backend, name, t)
+
+
+def refuse_uncertain(error: float, tolerance: float, backend: str, name: str, t: Scalar):
+    """Raise the SimulationError of forces with an estimated relative error above the tolerance."""
+    raise SimulationError(
+        f"t = {t:.6g} s, backend {backend!r}: the forces of {name!r} are not certified, though accelerations are: "
+        f"estimated relative error {error:.1e}, expected at most {tolerance:.0e}. Near a singular "
+        "configuration forces lose digits; take samples farther from it (times= of simulate)."
+    )

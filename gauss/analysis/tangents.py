@@ -67,6 +67,13 @@ class Tangents:
         return np.linalg.lstsq(whole, right, rcond=None)[0]
 
     @cached_property
+    def of_states(self) -> np.ndarray:
+        """Changes (n_q + n_v, k + l) of (q, v) by independent displacements, then by changes of independent rates."""
+        N, rate, n_q = self.position, self.rate, self.system.n_q
+        moved = np.array([coordinate_rates(self.system, self.state.q, column) for column in N.T]).reshape(-1, n_q).T
+        return np.block([[moved, np.zeros((n_q, rate.shape[1]))], [self.change, rate]])
+
+    @cached_property
     def turning(self) -> np.ndarray:
         """Γ (n_v, n_v)."""
         n, v = self.system.n_v, self.state.v

@@ -53,6 +53,12 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
         return build(floating(scene, system), SystemDynamics())
 
 
+def system_of(given: Scene | System, what: str) -> System:
+    """System of a scene, or a given one; ArgumentError of the function ``what`` if it is neither."""
+    require(given, (System, Scene), what)
+    return compile_scene(given) if isinstance(given, Scene) else given
+
+
 def _as_it_is(scene: Scene) -> Scene:
     """Scene with collections of its own: elements do not change, and those of later do not reach a system."""
     made = copy(scene)

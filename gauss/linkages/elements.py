@@ -44,9 +44,9 @@ class PlanarLink:
     def __post_init__(self):
         """Check every value and keep plain numbers."""
         what = f"link {values.text(self.name, 'name of a link')!r}"
-        object.__setattr__(self, "mass", values.number(self.mass, f"{what}: mass", "kg", non_negative=True))
-        object.__setattr__(self, "inertia", values.number(self.inertia, f"{what}: inertia", "kg m²", non_negative=True))
-        object.__setattr__(self, "com", values.vector(self.com, f"{what}: com", "m", 2))
+        values.keep(self, mass=values.number(self.mass, f"{what}: mass", "kg", non_negative=True))
+        values.keep(self, inertia=values.number(self.inertia, f"{what}: inertia", "kg m²", non_negative=True))
+        values.keep(self, com=values.vector(self.com, f"{what}: com", "m", 2))
         if self.inertia and not self.mass:
             raise SceneError(f"{what}: inertia {self.inertia} kg m² without mass; give a mass > 0, or zero inertia.")
 
@@ -98,9 +98,9 @@ class LinkJoint:
         if self.parent == self.child:
             raise SceneError(f"{what}: parent and child are both {self.child!r}; a joint binds two links.")
         for key in ("at", "child_at"):
-            object.__setattr__(self, key, values.vector(getattr(self, key), f"{what}: {key}", "m", 2))
+            values.keep(self, **{key: values.vector(getattr(self, key), f"{what}: {key}", "m", 2)})
         for key in ("angle", "child_angle"):
-            object.__setattr__(self, key, values.number(getattr(self, key), f"{what}: {key}", "rad"))
+            values.keep(self, **{key: values.number(getattr(self, key), f"{what}: {key}", "rad")})
             if getattr(self, key) and self.kind == "revolute":
                 raise SceneError(f"{what}: {key} has no meaning for a pin; only a guide has a direction.")
 
@@ -189,11 +189,11 @@ class Load:
     def __post_init__(self):
         """Check every value and keep plain numbers."""
         what = f"load on link {self.link!r}"
-        object.__setattr__(self, "force", values.vector(self.force, f"{what}: force", "N", 2))
-        object.__setattr__(self, "moment", values.number(self.moment, f"{what}: moment", "N m"))
-        object.__setattr__(self, "viscous", values.number(self.viscous, f"{what}: viscous", "N m s/rad", non_negative=True))
+        values.keep(self, force=values.vector(self.force, f"{what}: force", "N", 2))
+        values.keep(self, moment=values.number(self.moment, f"{what}: moment", "N m"))
+        values.keep(self, viscous=values.number(self.viscous, f"{what}: viscous", "N m s/rad", non_negative=True))
         if self.at is not None:
-            object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m", 2))
+            values.keep(self, at=values.vector(self.at, f"{what}: at", "m", 2))
         if self.axes not in FORCE_AXES:
             raise SceneError(f"{what}: axes must be 'world' or 'link', got {self.axes!r}.")
         if not isinstance(self.resisting, bool):
@@ -236,8 +236,8 @@ class CrankMotor:
         """Check every value."""
         count = len(self.speed) if isinstance(self.speed, list | tuple) else 2
         for key, symbol in (("speed", "rad/s"), ("torque", "N m")):
-            object.__setattr__(self, key, values.vector(getattr(self, key), f"motor: {key}", symbol, count))
-        object.__setattr__(self, "inertia", values.number(self.inertia, "motor: inertia", "kg m²", non_negative=True))
+            values.keep(self, **{key: values.vector(getattr(self, key), f"motor: {key}", symbol, count)})
+        values.keep(self, inertia=values.number(self.inertia, "motor: inertia", "kg m²", non_negative=True))
         if count < 2 or any(b <= a for a, b in pairwise(self.speed)):
             raise SceneError(f"motor: speed: expected two or more increasing numbers, got {self.speed}.")
 
@@ -279,4 +279,4 @@ class Driver:
         """Check every value."""
         units = {"speed": "rad/s", "acceleration": "rad/s²", "start": "rad"}
         for key, symbol in units.items():
-            object.__setattr__(self, key, values.number(getattr(self, key), f"drive of {self.joint!r}: {key}", symbol))
+            values.keep(self, **{key: values.number(getattr(self, key), f"drive of {self.joint!r}: {key}", symbol)})

@@ -64,7 +64,7 @@ class Linkage:
     def __post_init__(self):
         """Check the name and gravity."""
         values.text(self.name, "name of the linkage")
-        object.__setattr__(self, "gravity", values.vector(self.gravity, "gravity", "m/s²", 2))
+        values.keep(self, gravity=values.vector(self.gravity, "gravity", "m/s²", 2))
 
     def link(self, name: str, mass: float = 0.0, inertia: float = 0.0, com=(0.0, 0.0)) -> PlanarLink:
         """Add a link; see :class:`gauss.linkages.PlanarLink`."""

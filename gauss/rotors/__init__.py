@@ -24,12 +24,11 @@ from gauss.rotors.laws import (
     Viscous,
 )
 from gauss.rotors.links import GearPair, TorsionSpring
-from gauss.rotors.motion import RotorEnergy, RotorMotion
+from gauss.rotors.motion import RotorEnergy, RotorMotion, run_up_time
 from gauss.rotors.network import Network
 from gauss.rotors.operating_point import OperatingPoint
 from gauss.rotors.report import mode_table, report, steady_table, table
 from gauss.rotors.run import BeltSlipWarning
-from gauss.rotors.runup import run_up_time
 from gauss.rotors.scene import to_scene
 from gauss.rotors.simulate import simulate
 from gauss.rotors.steady import operating_points

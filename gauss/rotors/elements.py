@@ -38,10 +38,10 @@ class Shaft:
     def __post_init__(self):
         """Check every value."""
         what = f"shaft {values.text(self.name, 'name of a shaft')!r}"
-        object.__setattr__(self, "inertia", values.number(self.inertia, f"{what}: inertia", "kg m²", positive=True))
-        object.__setattr__(self, "angle", values.number(self.angle, f"{what}: angle", "rad"))
+        values.keep(self, inertia=values.number(self.inertia, f"{what}: inertia", "kg m²", positive=True))
+        values.keep(self, angle=values.number(self.angle, f"{what}: angle", "rad"))
         if self.speed is not None:
-            object.__setattr__(self, "speed", values.number(self.speed, f"{what}: speed", "rad/s"))
+            values.keep(self, speed=values.number(self.speed, f"{what}: speed", "rad/s"))
 
 
 @dataclass(frozen=True)
@@ -84,17 +84,17 @@ class Torque:
         """Check every value."""
         what = f"torque {values.text(self.name, 'name of a torque')!r}"
         law = as_law(self.law, what)
-        object.__setattr__(self, "law", law)
+        values.keep(self, law=law)
         for key in ("begin", "until"):
             if getattr(self, key) is not None:
-                object.__setattr__(self, key, values.number(getattr(self, key), f"{what}: {key}", "s"))
+                values.keep(self, **{key: values.number(getattr(self, key), f"{what}: {key}", "s")})
         if self.timed and self.until is not None and self.begin is not None and self.until <= self.begin:
             raise SceneError(f"{what}: until {self.until} s must be after the begin at {self.begin} s.")
-        object.__setattr__(self, "breaks", values.times(self.breaks, f"{what}: breaks"))
+        values.keep(self, breaks=values.times(self.breaks, f"{what}: breaks"))
         role = law.role if self.role is None else self.role
         if role not in ROLES:
             raise SceneError(f"{what}: unknown role {role!r}. {did_you_mean(role, ROLES)}")
-        object.__setattr__(self, "role", role)
+        values.keep(self, role=role)
 
     @property
     def timed(self) -> bool:

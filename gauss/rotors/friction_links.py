@@ -44,11 +44,11 @@ class FrictionDrive(ShaftLink):
     def __post_init__(self) -> None:
         """Check every value."""
         super().__post_init__()
-        object.__setattr__(self, "curve", as_curve(self.curve, self.what))
+        values.keep(self, curve=as_curve(self.curve, self.what))
         keep_efficiencies(self)
         if self.largest_slip is not None:
             limit = values.number(self.largest_slip, f"{self.what}: largest_slip", "1", positive=True)
-            object.__setattr__(self, "largest_slip", limit)
+            values.keep(self, largest_slip=limit)
 
     @property
     def dry(self) -> bool:
@@ -104,14 +104,14 @@ class FrictionClutch(ShaftLink):
             time, torque = points(self.torque["time"], self.torque["torque"], self.what, "time", "s", "torque", "N m")
             if min(torque) < 0:
                 raise SceneError(f"{self.what}: torque: no entry may be negative.")
-            object.__setattr__(self, "torque", Interpolant(time, torque, smooth=False))
+            values.keep(self, torque=Interpolant(time, torque, smooth=False))
         elif not isinstance(self.torque, Interpolant):
             checked = values.number(self.torque, f"{self.what}: torque", "N m", non_negative=True)
-            object.__setattr__(self, "torque", checked)
+            values.keep(self, torque=checked)
         static = values.number(self.static, f"{self.what}: static", "1", positive=True)
         if static < 1:
             raise SceneError(f"{self.what}: static: expected at least 1, got {static:g}; sliding friction is not larger.")
-        object.__setattr__(self, "static", static)
+        values.keep(self, static=static)
 
     @property
     def corners(self) -> tuple[float, ...]:

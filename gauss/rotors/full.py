@@ -21,6 +21,7 @@ from gauss.rotors.mode_search import find_phase
 from gauss.rotors.network import Network
 from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import CYCLE
+from gauss.scene import values
 
 FORMS = ("reduced", "full")
 REDUNDANT_ROW = 1e-12  # singular value, relative to the largest, of redundant rows
@@ -75,6 +76,8 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
     ------
     StateError
         If speeds contradict the gears, or the form does not exist.
+    SceneError
+        If the time is no finite number.
 
     Examples
     --------
@@ -85,6 +88,7 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
     >>> rotors.snapshot(drum, speeds=[49.0, 100.0, 150.0], form="full").torques.round(3)
     array([178.852, 121.669])
     """
+    t = values.number(t, "snapshot: t", "s")
     if form not in FORMS:
         raise StateError(f"no form {form!r}. {did_you_mean(form, FORMS)}")
     reduced = reduce(network)
@@ -107,10 +111,10 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
     return Snapshot(accelerations, phase.link_torques(found), phase.mode.forward)
 
 
-def _checked(values, reduced, what: str) -> np.ndarray:
-    array = real_numbers(values)
+def _checked(given, reduced, what: str) -> np.ndarray:
+    array = real_numbers(given)
     if array is None or array.shape != (len(reduced.names),) or not np.isfinite(array).all():
-        raise StateError(f"{what}: expected {len(reduced.names)} finite numbers, one for each shaft, got {values!r}.")
+        raise StateError(f"{what}: expected {len(reduced.names)} finite numbers, one for each shaft, got {given!r}.")
     return array
 
 

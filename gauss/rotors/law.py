@@ -56,4 +56,4 @@ def check_fields(law: Law, **rules: tuple[str, dict[str, bool]]) -> None:
     """
     for key, (unit, sign) in rules.items():
         checked = values.number(getattr(law, key), f"law {type(law).__name__.lower()!r}: {key}", unit, **sign)
-        object.__setattr__(law, key, checked)
+        values.keep(law, **{key: checked})

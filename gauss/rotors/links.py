@@ -71,7 +71,7 @@ class ShaftLink:
 
     def __post_init__(self) -> None:
         """Check every value."""
-        object.__setattr__(self, "ratio", values.number(self.ratio, f"{self.what}: ratio", "1"))
+        values.keep(self, ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
         if self.ratio == 0:
             raise SceneError(f"{self.what}: ratio: expected ω_driver/ω_driven other than 0.")
         if self.driven == self.driver:
@@ -140,7 +140,7 @@ class GearPair(ShaftLink):
     def __post_init__(self) -> None:
         """Check every value."""
         super().__post_init__()
-        object.__setattr__(self, "slip", checked_slip(self.slip, self.what))
+        values.keep(self, slip=checked_slip(self.slip, self.what))
         keep_efficiencies(self, 1.0 - self.slip)
 
     @property

@@ -142,9 +142,8 @@ class TorqueTable(Law):
 
     def __post_init__(self):
         """Check every value."""
-        checked = points(self.speed, self.torque, "law 'table'", "speed", "rad/s", "torque", "N m")
-        for key, column in zip(("speed", "torque"), checked, strict=True):
-            object.__setattr__(self, key, column)
+        speed, torque = points(self.speed, self.torque, "law 'table'", "speed", "rad/s", "torque", "N m")
+        values.keep(self, speed=speed, torque=torque)
 
     @cached_property
     def _curve(self) -> Interpolant:
@@ -185,7 +184,7 @@ class Periodic(Law):
         check_fields(self, period=("rad", POSITIVE))
         if not isinstance(self.torque, (tuple, list, np.ndarray)) or not len(self.torque):
             raise SceneError(f"law 'periodic': torque: expected a list of numbers in [N m], got {self.torque!r}.")
-        object.__setattr__(self, "torque", values.vector(self.torque, "law 'periodic': torque", "N m", len(self.torque)))
+        values.keep(self, torque=values.vector(self.torque, "law 'periodic': torque", "N m", len(self.torque)))
 
     @cached_property
     def _harmonics(self) -> list[tuple]:

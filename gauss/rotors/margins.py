@@ -4,18 +4,12 @@ Power flow of lossy links, slip of dry links, gap function of backlash sides, di
 reserve of the locks, and the indicators, which only report events.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from gauss.rotors.mechanics import NetworkInstant, link_kinematics
 from gauss.rotors.mode import indicate
+from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import REST_SPEED
-
-if TYPE_CHECKING:
-    from gauss.rotors.phase import NetworkPhase
 
 Margins = list[tuple[tuple[str, int], float]]  # (kind, number of the link, group or indicator), value
 

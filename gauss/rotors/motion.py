@@ -1,13 +1,17 @@
-"""Motion of a rotor network: samples, events, energies."""
+"""Motion of a rotor network: samples, events, energies, run-up times."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
 
 from gauss.dynamics import Plan
-from gauss.errors import StateError, did_you_mean
+from gauss.errors import StateError
 from gauss.rotors.events import RotorEvent
 from gauss.rotors.reduced import ReducedNetwork
+
+FRACTION = 0.95  # of the last speed: default end of a run-up
 
 
 @dataclass(frozen=True)
@@ -95,10 +99,12 @@ class RotorMotion:
         Elastic energy of each link [J].
     stuck : ndarray of bool, shape (k, n)
         Shafts stuck at rest: by dry friction of a shaft of their group, or by the losses of its gears.
-    events : tuple of Event
+    events : tuple of RotorEvent
         What happened.
     stats : RotorStats
         What it cost.
+    elastic_at_start : float
+        Elastic energy of all links at the start of the run [J].
 
     Examples
     --------
@@ -125,6 +131,7 @@ class RotorMotion:
     stuck: np.ndarray
     events: tuple[RotorEvent, ...]
     stats: RotorStats
+    elastic_at_start: float = 0.0
 
     def __len__(self):
         return len(self.t)
@@ -137,30 +144,30 @@ class RotorMotion:
 
     def angle(self, shaft) -> np.ndarray:
         """Angle (k,) of a shaft [rad]."""
-        return self.angles[:, self._shaft(shaft)]
+        return self.angles[:, self.reduced.shaft_place(shaft)]
 
     def speed(self, shaft) -> np.ndarray:
         """Speed (k,) of a shaft [rad/s]."""
-        return self.speeds[:, self._shaft(shaft)]
+        return self.speeds[:, self.reduced.shaft_place(shaft)]
 
     def acceleration(self, shaft) -> np.ndarray:
         """Acceleration (k,) of a shaft [rad/s²]."""
-        return self.accelerations[:, self._shaft(shaft)]
+        return self.accelerations[:, self.reduced.shaft_place(shaft)]
 
     def torque(self, link) -> np.ndarray:
         """Torque (k,) of a link on its driven shaft [N m]."""
-        return self.torques[:, self._link(link)]
+        return self.torques[:, self.reduced.link_place(link)]
 
     def slip(self, link) -> np.ndarray:
         """Slip (k,) 1 − i ω_driven/ω_driver of a link (III.73); NaN while the driver is at rest."""
-        b = self._link(link)
+        b = self.reduced.link_place(link)
         v_d = self.speeds[:, self.reduced.driver[b]]
         v = self.reduced.links[b].ratio * self.speeds[:, self.reduced.driven[b]]
         return 1.0 - np.divide(v, v_d, out=np.full_like(v, np.nan), where=np.abs(v_d) > self.reduced.v_0)
 
     def loss(self, link) -> np.ndarray:
         """Heat (k,) of a link since the start, by slip and mesh [J]."""
-        b = self._link(link)
+        b = self.reduced.link_place(link)
         return self.slip_heat[:, b] + self.mesh_heat[:, b]
 
     def energy(self) -> RotorEnergy:
@@ -169,20 +176,45 @@ class RotorMotion:
         elastic = self.elastic.sum(axis=1)
         motor, load, loss = self.work.T
         slip, mesh = self.slip_heat.sum(axis=1), self.mesh_heat.sum(axis=1)
-        # kinetic energy is counted from the start of the run, which need not be a sample
+        # counted from the start of the run, which need not be a sample
         first = self.reduced.speed[self.reduced.group] * self.reduced.K
         start = 0.5 * float(first**2 @ self.reduced.inertia)
-        return RotorEnergy(motor, -load, -loss, slip, mesh, kinetic - start, elastic - self._elastic_start())
+        return RotorEnergy(motor, -load, -loss, slip, mesh, kinetic - start, elastic - self.elastic_at_start)
 
-    def _elastic_start(self) -> float:
-        return float(self.elastic[0].sum()) if len(self) and self.t[0] == 0 else 0.0
 
-    def _shaft(self, name) -> int:
-        return self.reduced.names.index(self.reduced.network.require_shaft(name))
+def run_up_time(motion: RotorMotion, shaft, speed: float | None = None) -> float:
+    """Time [s] at which a shaft first reaches a speed, by cubics through speeds and accelerations of the samples.
 
-    def _link(self, name) -> int:
-        name = getattr(name, "name", name)
-        names = [link.name for link in self.reduced.links]
-        if name not in names:
-            raise StateError(f"no link {name!r} in {self.reduced.network.name!r}. {did_you_mean(str(name), names)}")
-        return names.index(name)
+    Parameters
+    ----------
+    motion : RotorMotion
+        The motion.
+    shaft : str or Shaft
+        The shaft.
+    speed : float, optional
+        [rad/s]; 95 % of the last speed when not given.
+
+    Returns
+    -------
+    float
+        Time [s].
+
+    Raises
+    ------
+    StateError
+        If the shaft never reaches it.
+    """
+    values, t = motion.speed(shaft), motion.t
+    speed = FRACTION * values[-1] if speed is None else float(speed)
+    reached = values >= speed if speed >= values[0] else values <= speed
+    if not reached.any():
+        raise StateError(
+            f"the shaft never reaches {speed:g} rad/s: it moves between {values.min():.6g} and {values.max():.6g} rad/s "
+            f"within {t[-1]:g} s. Simulate longer, or ask for another speed."
+        )
+    k = int(np.argmax(reached))
+    if k == 0:
+        return float(t[0])
+    curve = CubicHermiteSpline(t[k - 1 : k + 1], values[k - 1 : k + 1], motion.acceleration(shaft)[k - 1 : k + 1])
+    left, right = (float(curve(time)) - speed for time in t[k - 1 : k + 1])
+    return float(t[k]) if left * right > 0 or right == 0 else float(brentq(lambda s: curve(s) - speed, t[k - 1], t[k]))

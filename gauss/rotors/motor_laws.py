@@ -8,6 +8,7 @@ from gauss.codegen import Scalar
 from gauss.errors import SceneError
 from gauss.rotors.interpolant import Interpolant, points
 from gauss.rotors.law import ANY, NOT_NEGATIVE, POSITIVE, MotorLaw, check_fields
+from gauss.scene import values
 
 
 @dataclass(frozen=True)
@@ -159,9 +160,8 @@ class Diesel(MotorLaw):
 
     def __post_init__(self):
         """Check every value."""
-        checked = points(self.speed, self.torque, "law 'diesel'", "speed", "rad/s", "torque", "N m")
-        for key, column in zip(("speed", "torque"), checked, strict=True):
-            object.__setattr__(self, key, column)
+        speed, torque = points(self.speed, self.torque, "law 'diesel'", "speed", "rad/s", "torque", "N m")
+        values.keep(self, speed=speed, torque=torque)
         check_fields(self, governed=("rad/s", POSITIVE), idle=("rad/s", POSITIVE), drag=("N m", NOT_NEGATIVE))
         if self.idle <= self.governed:
             raise SceneError(f"law 'diesel': idle {self.idle} must be above governed {self.governed} [rad/s].")

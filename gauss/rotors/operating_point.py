@@ -67,11 +67,11 @@ class OperatingPoint:
 
     def speed(self, shaft) -> float:
         """Speed of a shaft [rad/s]."""
-        return float(self.speeds[self.reduced.names.index(self.reduced.network.require_shaft(shaft))])
+        return float(self.speeds[self.reduced.shaft_place(shaft)])
 
     def slip(self, link) -> float:
         """Slip 1 − i ω_driven/ω_driver (III.73) of a link; nan where the driver stands."""
-        b = list(self.reduced.network.links).index(getattr(link, "name", link))
+        b = self.reduced.link_place(link)
         v_d = self.speeds[self.reduced.driver[b]]
         return float(1.0 - self.reduced.links[b].ratio * self.speeds[self.reduced.driven[b]] / v_d) if v_d else float("nan")
 

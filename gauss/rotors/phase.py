@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.rotors.links import TorsionSpring
-from gauss.rotors.margins import margins
 from gauss.rotors.mechanics import Conditions, NetworkEquations, NetworkInstant
 from gauss.rotors.mode import Mode, indicate
 from gauss.rotors.pattern import group_pattern, resting_torques
@@ -165,10 +164,6 @@ class NetworkPhase:
         if np.array_equal(signs, self.mode.signs):
             return self
         return NetworkPhase(self.equations, replace(self.mode, signs=signs))
-
-    def margins(self, t: float, theta, w, scale: float) -> tuple[list[tuple[str, int]], np.ndarray]:
-        """Names (kind, number) and values of the margins of the mode, see :func:`gauss.rotors.margins.margins`."""
-        return margins(self, t, theta, w, scale)
 
     def breakaway(self, group: int, found: NetworkInstant, direction: float) -> tuple[float, np.ndarray]:
         """Acceleration and pattern of power flow of a group at rest that breaks away in a direction (1 or −1)."""

@@ -10,10 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.errors import StateError, did_you_mean
 from gauss.rotors.elements import Torque
 from gauss.rotors.friction_links import FrictionDrive
 from gauss.rotors.links import GearPair
 from gauss.rotors.network import Network
+from gauss.scene.builder import name_of
 
 CYCLE = 1e-9  # relative difference of ratios round a cycle that rounding of typed numbers explains
 REST_SPEED = 1e-6  # v_0 relative to the largest known speed (Rotor chains, section 4)
@@ -38,7 +40,7 @@ class ReducedNetwork:
     ----------
     names : tuple of str
         Shafts, n of them.
-    links : tuple of Link
+    links : tuple of ShaftLink
         Links, n_l of them.
     driven, driver : ndarray of int, shape (n_l,)
         Shafts of each link.
@@ -48,7 +50,7 @@ class ReducedNetwork:
         Group of each shaft, and its speed over that of the root of the group.
     roots : tuple of int
         Root shaft of each group, n_g of them.
-    inward : tuple of Branch
+    inward : tuple of GearBranch
         Gears from the leaves to the roots.
     redundant : tuple of int
         Gears that close a loop, redundant constraints.
@@ -95,6 +97,17 @@ class ReducedNetwork:
     def n_groups(self) -> int:
         """Number of coordinates."""
         return len(self.roots)
+
+    def shaft_place(self, shaft) -> int:
+        """Index of a shaft, or of its name; SceneError if there is none."""
+        return self.names.index(self.network.require_shaft(shaft))
+
+    def link_place(self, link) -> int:
+        """Index of a link, or of its name; StateError if there is none."""
+        name, names = name_of(link), [one.name for one in self.links]
+        if name not in names:
+            raise StateError(f"no link {name!r} in {self.network.name!r}. {did_you_mean(str(name), names)}")
+        return names.index(name)
 
     @cached_property
     def frictional(self) -> tuple[int, ...]:

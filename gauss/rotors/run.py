@@ -1,9 +1,8 @@
 """Event-driven integration of a network: smooth phases by an integrator of scipy, each left at a located event.
 
-A step is accepted if the margins of its phase stay positive and no torque law switches unseen within it. Mandatory ends of
-steps are those of :mod:`gauss.rotors.stops`. Explicit steps keep h |λ| ≤ 1/2 for the fastest decay λ: nearer to the limit of
-stability the error estimate of DOP853 fails. Where that asks for too many steps, Radau IIA takes over (Hairer and Wanner,
-Solving ODEs II, IV.2 and IV.8).
+A step is accepted if the margins of its phase stay positive and no torque law switches unseen within it. Explicit steps keep
+h |λ| ≤ 1/2 for the fastest decay λ: nearer to the limit of stability the error estimate of DOP853 fails. Where that asks for
+too many steps, Radau IIA takes over (Hairer and Wanner, Solving ODEs II, IV.2 and IV.8).
 
 The loop is not that of :mod:`gauss.simulation.phases`, which gives the same motions of ``to_scene(network)``, to 2e-10 of
 the largest speed, but has no implicit steps, no limit by the decay, and machine code for each phase: the shipped networks
@@ -24,12 +23,12 @@ from gauss.rotors.events import RotorEvent, backward_with_slip, changes
 from gauss.rotors.jacobian import Jacobian
 from gauss.rotors.landing import land
 from gauss.rotors.laws import ROLES
+from gauss.rotors.margins import margins
 from gauss.rotors.mechanics import NetworkEquations
 from gauss.rotors.mode_search import find_phase
 from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import REST_SPEED
-from gauss.rotors.stops import StepEnd
-from gauss.rotors.switching import NetworkSwitching, resolved_share
+from gauss.rotors.switching import NetworkSwitching, StepEnd, resolved_share
 
 METHODS: dict[str, type[OdeSolver]] = {"dop853": DOP853, "radau": Radau}
 STABLE_STEP = 0.5  # largest explicit step times the fastest decay: nearer to the limit of stability the error estimate fails
@@ -39,10 +38,8 @@ SMALLEST_RTOL = 100 * np.finfo(float).eps  # that scipy accepts
 MOST_STEPS = 500_000  # of a run: about a minute of a small network
 MOST_REFUSALS = 40  # in a row: 40 halvings are below the resolution of time
 HOP_RESOLUTIONS = 4.0  # resolutions of time: a discontinuity of a law as near as this is crossed by one Euler step
-MOST_CROSSINGS, CHATTER_SHARE = (
-    100,
-    0.1,
-)  # in a row, at a rate by which MOST_STEPS of them take this share of the run: chattering
+MOST_CROSSINGS = 100  # of discontinuities in a row, while a law chatters
+CHATTER_SHARE = 0.1  # of the run: a law chatters if MOST_STEPS crossings at its rate take no more
 POWER_ITERATIONS, DIFFERENCE = 8, 1e-3  # of the fastest decay, and its step of differences relative to v_0
 REMEDY = " Of shafts: the law Dry, or a clutch."
 
@@ -114,6 +111,7 @@ class RotorRun:
         self.backward: dict[str, float] = {}  # gears of constant slip that were driven backward, and since when
         self._jacobian: Jacobian | None = None
         self.stalled = self._unchecked = 0
+        self.elastic_at_start = 0.0  # [J]
         self.first_step: float | None = None  # of the next piece [s]
         self._rate: float | None = None  # fastest decay [1/s], None where it is to be estimated
         self.phase: NetworkPhase
@@ -162,8 +160,8 @@ class RotorRun:
         return y[: self.n_g], y[self.n_g : 2 * self.n_g]
 
     def margins(self, t: float, y: np.ndarray) -> tuple[list, np.ndarray]:
-        """Margins of the phase, see :meth:`NetworkPhase.margins`."""
-        return self.phase.margins(t, *self.split(y), self.scale)
+        """Names and values of the margins of the phase."""
+        return margins(self.phase, t, *self.split(y), self.scale)
 
     # Steps.
 
@@ -191,8 +189,8 @@ class RotorRun:
             self.refused, self.longest = 0, max(self.longest, h)
             middle = 0.5 * (solver.t_old + solver.t)
             ends = (middle, self.margins(middle, dense(middle))[1]), (solver.t, self.margins(solver.t, solver.y)[1])
-            for t, margins in ends:
-                negative = np.flatnonzero((margins < -self.slack) & (margins < before))
+            for t, values in ends:
+                negative = np.flatnonzero((values < -self.slack) & (values < before))
                 if negative.size:
                     land(self, kind, dense, solver.t_old, t, keys, before, negative)
                     return
@@ -251,6 +249,7 @@ class RotorRun:
         """Find the first phase."""
         self.phase = find_phase(self.equations, self.t, *self.split(self.y), slack=self.slack)
         self._arrive()
+        self.elastic_at_start = float(self.phase.elastic(self.split(self.y)[0]).sum())
 
     def change(self, fired=(), probe=None) -> None:
         """Find the phase that follows, and record the events between the two."""

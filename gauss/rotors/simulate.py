@@ -15,11 +15,9 @@ from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import NetworkEquations
 from gauss.rotors.motion import RotorMotion, RotorStats
 from gauss.rotors.network import Network
-from gauss.rotors.reduced import ReducedNetwork
 from gauss.rotors.run import METHODS, RotorRun
-from gauss.rotors.stops import stops
-from gauss.rotors.switching import switching
-from gauss.simulation.arguments import check_breaks, numbers
+from gauss.rotors.switching import step_ends, switches, switching
+from gauss.simulation.arguments import check_breaks, sample_times
 from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 CHOICES = ("auto", *METHODS)
@@ -99,7 +97,7 @@ def simulate(
     run = RotorRun(NetworkEquations(reduced, compiled), method, rtol, allowed, max_step, resolved)
     began = time.perf_counter()
     try:
-        wall_time = run.collect(stops(duration, resolved.times, switches(reduced, duration), samples), samples is None)
+        wall_time = run.collect(step_ends(duration, resolved.times, switches(reduced, duration), samples), samples is None)
     except KeyboardInterrupt as error:
         reached = _motion(run, samples, time.perf_counter() - began) if run.records else None
         error.trajectory = reached  # type: ignore[attr-defined]  # kept on the interruption for the caller
@@ -122,24 +120,7 @@ def _checked(duration: float, times, rtol: float, atol: float | None, method: st
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if method not in CHOICES:
         raise SimulationError(f"no method {method!r}. {did_you_mean(method, CHOICES)}")
-    return None if times is None else _sample_times(times, duration)
-
-
-def _sample_times(times, duration: float) -> np.ndarray:
-    """Times of samples as an array, checked [s]."""
-    samples = numbers(times, "times: expected increasing times [s]")
-    inside = samples.ndim == 1 and samples.size and (np.diff(samples) > 0).all()
-    if not inside or samples[0] < 0 or samples[-1] > duration:
-        raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
-    return samples
-
-
-def switches(reduced: ReducedNetwork, duration: float) -> np.ndarray:
-    """Times within a run at which a torque begins or ends, or the data of a link have a corner [s]."""
-    torques = reduced.network.torques.values()
-    times = [t for torque in torques for t in (torque.begin, torque.until) if t is not None]
-    times += [t for link in reduced.links for t in link.corners]
-    return np.unique([t for t in times if 0 < t < duration])
+    return sample_times(times, 0.0, duration)
 
 
 def _motion(run: RotorRun, samples: np.ndarray | None, wall_time: float) -> RotorMotion:
@@ -166,4 +147,5 @@ def _motion(run: RotorRun, samples: np.ndarray | None, wall_time: float) -> Roto
         stuck,
         tuple(run.events),
         RotorStats(run.evaluations, run.steps, wall_time, run.equations.plan),
+        run.elastic_at_start,
     )

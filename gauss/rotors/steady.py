@@ -20,6 +20,7 @@ from gauss.rotors.network import Network
 from gauss.rotors.operating_point import OperatingPoint, point_of, slopes
 from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import REST_SPEED, ReducedNetwork
+from gauss.scene import values
 
 SCANNED = 400  # speeds of a network of one coordinate
 STARTS = 400  # of Newton's method otherwise, at most
@@ -53,16 +54,21 @@ def operating_points(network: Network, t: float = 0.0) -> list[OperatingPoint]:
     -------
     list of OperatingPoint
         Speeds [rad/s] and torques of each, and whether it is stable.
+
+    Raises
+    ------
+    SceneError
+        If the time is no finite number.
     """
+    t = values.number(t, "operating_points: t", "s")
     v_0 = reduce(network).v_0
     reduced = replace(reduce(_rigid(network, ())), v_0=v_0)
     equations, roots = NetworkEquations(reduced), list(reduced.roots)
-    largest = reduced.v_0 / REST_SPEED
     found: list[NetworkPhase] = []
     points: list[np.ndarray] = []
     for speeds in _candidates(network, t, v_0):
         w = speeds[roots]
-        if all(np.abs(w - other).max() > SPEED_DIFFERENCE * largest for other in points):
+        if all(np.abs(w - other).max() > SPEED_DIFFERENCE * reduced.largest for other in points):
             phase = find_phase(equations, t, np.zeros_like(w), w)
             if _residual(phase, t, w) <= RESIDUAL_TORQUE:
                 points.append(w)
@@ -74,8 +80,8 @@ def operating_points(network: Network, t: float = 0.0) -> list[OperatingPoint]:
 def _candidates(network: Network, t: float, v_0: float):
     """Speeds (n,) of the shafts that might be steady, for every choice of sticking links."""
     dry = [link.name for link in network.links.values() if link.dry]
-    choices = [range(len(dry) + 1)] if len(dry) <= MOST_CHOSEN else [(0, len(dry))]
-    for held in (names for count in choices[0] for names in combinations(dry, count)):
+    counts = range(len(dry) + 1) if len(dry) <= MOST_CHOSEN else (0, len(dry))
+    for held in (names for count in counts for names in combinations(dry, count)):
         try:
             reduced = replace(reduce(_rigid(network, held)), v_0=v_0)
         except SceneError:  # the links close a loop whose ratios contradict: they cannot all stick
@@ -98,9 +104,7 @@ def _rigid(network: Network, held) -> Network:
         if isinstance(torque.law, Periodic):
             torque = replace(torque, law=Constant(float(np.mean(torque.law.torque))))
         rigid.add(torque)
-    return Network(
-        rigid.name, {name: replace(x, speed=None) for name, x in rigid.shafts.items()}, rigid.links, rigid.torques
-    )
+    return rigid
 
 
 def _torques(phase: NetworkPhase, t: float, w) -> np.ndarray:
@@ -126,9 +130,9 @@ def _scan(equations: NetworkEquations, t: float, largest: float):
         [np.linspace(largest * REST_SPEED, largest, SCANNED), largest * np.geomspace(1.0, FARTHEST, TAIL_SPEEDS)[1:]]
     )
     grid = np.concatenate([-speeds[::-1], speeds])
-    values = [residual(speed) for speed in grid]
+    torques = [residual(speed) for speed in grid]
     yield np.zeros(1)
-    for a, b, u, v in zip(grid, grid[1:], values, values[1:], strict=False):
+    for a, b, u, v in zip(grid, grid[1:], torques, torques[1:], strict=False):
         if u == 0.0:
             yield np.array([a])
         elif u * v < 0 and a * b > 0:

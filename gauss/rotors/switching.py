@@ -1,4 +1,4 @@
-"""Switching of the torque laws of a network: switching times, known beforehand, and switching functions of the state.
+"""Switching of the torque laws of a network: times known beforehand, at which steps end; switching functions of the state.
 
 Switching times of traced laws are found by :mod:`gauss.dynamics.laws.switching_times`, those of opaque laws by samples,
 switching functions of angles and speeds by :mod:`gauss.rotors.surfaces`. Where laws are opaque, the defect y' − f(t, y) of
@@ -93,3 +93,49 @@ def _defective(run: "RotorRun", h: float, times: np.ndarray, y: np.ndarray) -> b
     slope = (y[speeds, 2] - y[speeds, 0]) / (times[2] - times[0])
     defect = slope - run.phase.instant(times[1], *run.split(y[:, 1])).acceleration
     return bool((h * np.abs(defect) > LARGEST_DEFECT * (run.atol[speeds] + run.rtol * np.abs(y[speeds, 1]))).any())
+
+
+def switches(reduced: ReducedNetwork, duration: float) -> np.ndarray:
+    """Times within a run at which a torque begins or ends, or the data of a link have a corner [s]."""
+    torques = reduced.network.torques.values()
+    times = [t for torque in torques for t in (torque.begin, torque.until) if t is not None]
+    times += [t for link in reduced.links for t in link.corners]
+    return np.unique([t for t in times if 0 < t < duration])
+
+
+class StepEnd(NamedTuple):
+    """Mandatory end of a step."""
+
+    before: float  # when it ends [s]
+    after: float  # when the next one begins [s]: a few units in the last place later where a law of time switches
+    switches: bool  # whether torques may be discontinuous there
+    samples: tuple[float, ...]  # times of samples [s]
+
+
+def step_ends(duration: float, times: Timetable, switches: np.ndarray, samples: np.ndarray | None) -> list[StepEnd]:
+    """Mandatory ends of steps in order; the last is that of the run.
+
+    Parameters
+    ----------
+    duration : float
+        Duration of the run [s].
+    times : Timetable
+        Switching times and mesh of laws.
+    switches : ndarray
+        Times at which torques begin or end, or data have a corner [s].
+    samples : ndarray or None
+        Times of samples [s].
+    """
+    found = [StepEnd(before, after, before < after, ()) for before, after in times.stops(0.0, duration)[:-1]]
+    found.append(StepEnd(times.last_end(0.0, duration), duration, False, ()))
+    found += [StepEnd(t, t, True, ()) for t in np.asarray(switches, dtype=float).tolist() if 0 < t < duration]
+    found += [StepEnd(t, t, False, (t,)) for t in ([] if samples is None else samples.tolist())]
+    merged: list[StepEnd] = []
+    for stop in sorted(found):
+        if merged and stop.before <= merged[-1].after:
+            last = merged[-1]
+            both = last.switches or stop.switches, last.samples + stop.samples
+            merged[-1] = StepEnd(last.before, max(last.after, stop.after), *both)
+        else:
+            merged.append(stop)
+    return merged

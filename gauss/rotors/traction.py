@@ -57,7 +57,7 @@ class Hyperbola:
     def __post_init__(self) -> None:
         """Check every value."""
         for key, unit in (("A", "N m"), ("C", "1")):
-            object.__setattr__(self, key, values.number(getattr(self, key), f"curve: {key}", unit, positive=True))
+            values.keep(self, **{key: values.number(getattr(self, key), f"curve: {key}", unit, positive=True)})
         B = self.A * self.C if self.B is None else values.number(self.B, "curve: B", "N m", non_negative=True)
         if abs(B - self.A * self.C) <= COEFFICIENT_ROUNDING * self.A * self.C:
             B = self.A * self.C
@@ -66,7 +66,7 @@ class Hyperbola:
                 f"curve: B = {B:g} is above A C = {self.A * self.C:g}: the torque at small slip would act against the slip "
                 "and make energy from nothing; give B ≤ A C."
             )
-        object.__setattr__(self, "B", B)
+        values.keep(self, B=B)
 
     @property
     def threshold(self) -> float:
@@ -116,8 +116,7 @@ class Measured:
         slip, torque = points(self.slip, self.torque, "curve", "slip", "1", "torque", "N m")
         if slip[0] != 0 or torque[0] != 0 or min(torque) < 0:
             raise SceneError("curve: slip and torque start at 0, and no torque is negative (it would act against the slip).")
-        object.__setattr__(self, "slip", slip)
-        object.__setattr__(self, "torque", torque)
+        values.keep(self, slip=slip, torque=torque)
 
     threshold = 0.0
 

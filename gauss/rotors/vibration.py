@@ -199,6 +199,7 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
     >>> [tuple(round(float(x), 3) for x in crossing) for crossing in diagram.crossings]
     [(1.0, 48.99, 7.797), (2.0, 24.495, 7.797)]
     """
+    orders = np.ravel(real_array(orders, "orders", "numbers"))
     name, speeds = network.require_shaft(shaft), real_array(speeds, "speeds", "speeds [rad/s]")
     if speeds.ndim != 1 or not np.isfinite(speeds).all() or not speeds.all():
         raise SceneError(f"speeds: expected a list of finite speeds [rad/s] other than 0, got {speeds!r}.")
@@ -212,7 +213,10 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
         row[: len(values)] = values
     frequencies = table.imag / (2 * np.pi)
     crossings = tuple(
-        found for order in orders for column in frequencies.T for found in _crossings(order, np.abs(speeds), column)
+        found
+        for order in np.ravel(orders)
+        for column in frequencies.T
+        for found in _crossings(order, np.abs(speeds), column)
     )
     return Campbell(name, speeds, frequencies, -table.real / np.abs(table), crossings)
 

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gauss import load_rotors
 from gauss.codegen import trace
 from gauss.errors import GaussError, SceneError, SimulationError, StateError
 from gauss.rotors import (
@@ -23,6 +24,7 @@ from gauss.rotors import (
     Quadratic,
     TorqueTable,
     Viscous,
+    operating_points,
     simulate,
     snapshot,
 )
@@ -275,3 +277,16 @@ def test_sticking_curve_is_dry():
     (slip,) = [event.time for event in motion.events if event.kind == "slip"]
     assert slip == pytest.approx(20.0 * (2.1 / 2.0) / 10.0, rel=1e-9)  # Q_em = J_drum ω̇ = 20 N m
     assert motion.torque("f").max() < 40.0
+
+
+@pytest.mark.parametrize("t", [np.nan, "late"])
+@pytest.mark.parametrize("ask", [operating_points, snapshot])
+def test_times_that_are_none_are_refused(ask, t):
+    with pytest.raises(SceneError, match="t: expected"):
+        ask(load_rotors("gear_runup"), t)
+
+
+def test_links_that_are_not_there_are_named():
+    point, *_ = operating_points(load_rotors("gear_runup"))
+    with pytest.raises(StateError, match="no link 'chain'"):
+        point.slip("chain")

@@ -333,3 +333,13 @@ def test_ideal_chain_is_the_reduction_by_kinetic_energy(ratio):
     two = two_shafts(ratio)
     two.torque("in", 6.0)
     assert snapshot(two).accelerations[1] == pytest.approx(6.0 / (0.4 + 0.8 / ratio**2), rel=1e-14)
+
+
+def test_energies_do_not_depend_on_the_samples():
+    network = Network("wound up")
+    network.shaft("out", 0.5)
+    network.shaft("in", 0.1)
+    network.spring("spring", "out", "in", stiffness=200.0, rest=0.3)  # elastic at the start
+    whole, part = (simulate(network, 0.5, times=times, **TIGHT).energy() for times in ([0.0, 0.1, 0.5], [0.1, 0.5]))
+    np.testing.assert_allclose(whole.elastic[1:], part.elastic, atol=BALANCE * whole.scale)
+    assert np.abs(part.balance).max() <= BALANCE * part.scale

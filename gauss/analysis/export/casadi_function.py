@@ -5,12 +5,12 @@ Mathematical Programming Computation 11 (2019). Such a function takes columns, a
 """
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
 
 import numpy as np
 
-from gauss.analysis.export.exported_function import ExportedFunction, exported_functions
-from gauss.codegen import Column, Expression
+from gauss.analysis.export.exported_function import ExportedFunction, evaluated, exported_functions
+from gauss.codegen import Column
 from gauss.errors import extra
 from gauss.scene import Scene
 from gauss.system import System
@@ -64,7 +64,7 @@ def casadi_function(exported: ExportedFunction):
         import casadi
     arguments = {one: casadi.SX.sym(one, *shape) for one, shape in exported.inputs.items()}
     flat = [entry for own in arguments.values() for entry in casadi.vertsplit(own)]
-    values = _evaluated(casadi, exported, flat)
+    values = evaluated(exported.function, flat, _operations(casadi), casadi.SX, partial(_entry, casadi))
     results = [_shaped(casadi, part) for part in exported.split(values, exported.outputs).values()]
     return casadi.Function(exported.identifier, list(arguments.values()), results, list(arguments), list(exported.outputs))
 
@@ -84,23 +84,6 @@ def _operations(casadi) -> dict[str, Callable]:
         "max": lambda x, y: casadi.if_else(x < y, y, _unless_missing(casadi, y <= x, x)),
         "select": casadi.if_else,
     } | {op: getattr(casadi, op) for op in ("sqrt", "sin", "cos", "exp", "log", "floor")}
-
-
-def _evaluated(casadi, exported: ExportedFunction, given: list) -> list:
-    """Outputs of the graph for symbols of CasADi."""
-    operations = _operations(casadi)
-    function = exported.function
-    values: dict[int, Any] = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
-    for node in function.nodes:
-        if node.is_constant:
-            values[node.index] = casadi.SX(node.value)
-        elif node.op == "row":
-            values[node.index] = values[node.operands[0].index], node.value
-        elif node.op == "entry":
-            values[node.index] = _entry(casadi, node.value, *values[node.operands[0].index])
-        elif node.op != "symbol":
-            values[node.index] = operations[node.op](*(values[x.index] for x in node.operands))
-    return [values[x.index] if isinstance(x, Expression) else casadi.SX(float(x)) for x in function.outputs]
 
 
 def _entry(casadi, column: Column, x, breaks: Column):

@@ -5,26 +5,27 @@ CasADi, JAX and SymPy read the graph, and know no mechanics.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import prod
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gauss.arguments import name_list
 from gauss.codegen import Expression, Function, Graph, write
 from gauss.codegen.python_wrapper import Shape
-from gauss.dynamics import compile_scene
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism, acceleration_derivatives
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import EXPORTS
 from gauss.dynamics.rules import Question
+from gauss.dynamics.scene_compilation import system_of
 from gauss.dynamics.state_functions import traced_function
 from gauss.dynamics.term_table import TERMS
-from gauss.errors import ArgumentError, SimulationError, did_you_mean, require, writing
+from gauss.errors import ArgumentError, SimulationError, did_you_mean, writing
 from gauss.scene import Scene
 from gauss.system import System, refuse_changed
 
@@ -113,8 +114,7 @@ def exported_functions(system: System | Scene, names: Sequence[str] | str | None
     >>> [each.name for each in exported_functions(gauss.load("double_pendulum"), ["mass_matrix", "bias_forces"])]
     ['mass_matrix', 'bias_forces']
     """
-    require(system, (System, Scene), "export")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "export")
     if names is None:
         names = (*DEFAULTS, "loop_constraints") if system.has_closures else DEFAULTS
     names = name_list(names, "export", "names of functions")
@@ -183,6 +183,35 @@ def _loaded(system: System, name: str) -> ExportedFunction:
     inputs |= ({"u": (len(given),)} if given else {}) | {"t": ()}
     shapes = {result: (system.n_v,) * len(letters) for result, letters in LOADED[name].items()}
     return ExportedFunction(name, without_calls(Function(name, [*state, *u, t], found.outputs)), inputs, shapes)
+
+
+def evaluated(
+    function: Function, given: Sequence, operations: dict[str, Callable], number: Callable, entry: Callable
+) -> list:
+    """Outputs of a graph without calls in the arithmetic of another library.
+
+    Parameters
+    ----------
+    given : sequence
+        Symbols of that library for the inputs.
+    operations : dict of str to callable
+        Its operations, by those of the graph.
+    number : callable
+        Its constant of a number.
+    entry : callable
+        (column, x, breaks) → number of a column in the row of x among breaks.
+    """
+    values: dict[int, Any] = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
+    for node in function.nodes:
+        if node.is_constant:
+            values[node.index] = number(float(node.value))
+        elif node.op == "row":
+            values[node.index] = values[node.operands[0].index], node.value
+        elif node.op == "entry":
+            values[node.index] = entry(node.value, *values[node.operands[0].index])
+        elif node.op != "symbol":
+            values[node.index] = operations[node.op](*(values[x.index] for x in node.operands))
+    return [values[x.index] if isinstance(x, Expression) else number(float(x)) for x in function.outputs]
 
 
 def without_calls(function: Function) -> Function:

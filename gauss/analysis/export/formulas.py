@@ -9,15 +9,16 @@ which λ is absent. They are traced from the mechanics, M and h with symbols for
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from gauss.analysis.export.exported_function import ExportedFunction, exported_functions
+from gauss.analysis.export.exported_function import ExportedFunction, evaluated, exported_functions
 from gauss.analysis.export.symbolic_system import has_symbols, in_symbols
 from gauss.arguments import name_list
-from gauss.codegen import Column, Expression
-from gauss.dynamics import compile_scene
+from gauss.codegen import Column
+from gauss.dynamics.scene_compilation import system_of
 from gauss.errors import SimulationError, extra, require
 from gauss.scene import Scene
 from gauss.system import System
@@ -98,8 +99,7 @@ def to_sympy(system: System | Scene, name: str = "inverse_dynamics", simplify: b
     with extra("symbolic"):
         import sympy
     require(name, (str,), "to_sympy: name")
-    require(system, (System, Scene), "export")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "export")
     if has_symbols(system, name):
         exported, values = in_symbols(system, name)
     else:
@@ -178,18 +178,8 @@ def _evaluated(sympy, exported: ExportedFunction, given: list) -> list:
         "min": sympy.Min,
         "max": sympy.Max,
     } | {op: getattr(sympy, op) for op in ("sqrt", "sin", "cos", "exp", "log", "floor", "atan2")}
-    function = exported.function
-    values: dict[int, Any] = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
-    for node in function.nodes:
-        if node.is_constant:
-            values[node.index] = _number(sympy, node.value)
-        elif node.op == "row":
-            values[node.index] = values[node.operands[0].index], node.value
-        elif node.op == "entry":
-            values[node.index] = _entry(sympy, node.value, *values[node.operands[0].index])
-        elif node.op != "symbol":
-            values[node.index] = operations[node.op](*(values[x.index] for x in node.operands))
-    return [values[x.index] if isinstance(x, Expression) else _number(sympy, float(x)) for x in function.outputs]
+    number = partial(_number, sympy)
+    return evaluated(exported.function, given, operations, number, partial(_entry, sympy))
 
 
 def _entry(sympy, column: Column, x, breaks: Column):
@@ -236,8 +226,7 @@ def latex_document(system: System | Scene, names: Sequence[str] | str | None = N
     """
     with extra("symbolic"):
         import sympy
-    require(system, (System, Scene), "export")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "export")
     shown: list[str] = []
     values: dict[Any, float] = {}
     for name in _wanted(system, names):

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr
 
-from gauss.analysis.loop_closure import closed, with_rates
-from gauss.analysis.optimal.continuation import followed
+from gauss.analysis.loop_closure import closed, followed, with_rates
 from gauss.analysis.tangents import Tangents
 from gauss.dynamics.projection import limits
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.errors import ArgumentError, StateError, did_you_mean, require
-from gauss.system import State, System, coordinate_rates
+from gauss.system import State, System
 
 CONSISTENT = 1e-7  # share of the unit, by which conditions may differ from what the constraints make of the others
 STEPS = 32  # from the start to a pose of the end, so that loops stay on their branch
@@ -233,17 +232,9 @@ def _independent_ones(system: System, state: State, conditions, preferred: int =
     fixed = [one for one in conditions if one.is_fixed]
     if not fixed or not (system.has_closures or system.quaternions):
         return tuple(conditions)
-    rows = _tangent_basis(system, state)[[one.place for one in fixed]]
+    rows = Tangents(system, state).of_states[[one.place for one in fixed]]
     rows[:preferred] *= PREFERENCE
     _, R, order = qr(rows.T, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     kept = [fixed[k] for k in order[: np.count_nonzero(sizes > INDEPENDENT * sizes.max(initial=0.0))]]
     return tuple(one for one in conditions if one in kept or not one.is_fixed)
-
-
-def _tangent_basis(system: System, state: State) -> np.ndarray:
-    """Changes (n_q + n_v, m) of (q, v) along the constraints."""
-    tangents, n_q = Tangents(system, state), system.n_q
-    N, D, rate = tangents.position, tangents.change, tangents.rate
-    moved = np.array([coordinate_rates(system, state.q, column) for column in N.T]).reshape(N.shape[1], n_q).T
-    return np.block([[moved, np.zeros((n_q, rate.shape[1]))], [D, rate]])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss.analysis.optimal.continuation import followed
+from gauss.analysis.loop_closure import followed
 from gauss.analysis.optimal.equations import OptimalEquations
 from gauss.analysis.optimal.problem import MotionValues
 from gauss.analysis.optimal.result import OptimalMotion

@@ -9,8 +9,8 @@ from gauss.analysis.optimal.phases import MeshSettings, MotionPhase, PhaseProble
 from gauss.analysis.optimal.refined_meshes import on_refined_meshes
 from gauss.analysis.optimal.result import OptimalMotion
 from gauss.arguments import named_arguments
-from gauss.dynamics import compile_scene
-from gauss.errors import ArgumentError, require
+from gauss.dynamics.scene_compilation import system_of
+from gauss.errors import ArgumentError
 from gauss.scene import Scene
 from gauss.system import State, System
 
@@ -106,11 +106,10 @@ def optimal_hybrid_motion(
     >>> round(float(found.q[-1, 0]), 6)  # without effort: e² of the height
     0.25
     """
-    require(scene, (Scene, System), "optimal_hybrid_motion")
+    system = system_of(scene, "optimal_hybrid_motion")
     given = list(phases) if isinstance(phases, Sequence) else []
     if not given or not all(isinstance(one, MotionPhase) for one in given):
         raise ArgumentError(f"optimal motion: phases: expected a sequence of gauss.MotionPhase, got {phases!r:.80}.")
-    system = compile_scene(scene) if isinstance(scene, Scene) else scene
     settings = MeshSettings(intervals, order, tolerance, refinements, iterations)
     made = PhaseProblems(system, given, settings, start, periodic, reset, meets, cost, limits)
     return _joined(on_refined_meshes(made.problems, made.guesses, tolerance, refinements))

@@ -16,9 +16,9 @@ from gauss.analysis.optimal.cost_derivatives import CostDerivatives
 from gauss.analysis.optimal.equations import unlimited
 from gauss.arguments import named_arguments
 from gauss.codegen import Kernel, forward, reverse
-from gauss.dynamics import compile_scene
 from gauss.dynamics.motion_step import MotionStep
 from gauss.dynamics.rigid_loops import refuse_other_pose
+from gauss.dynamics.scene_compilation import system_of
 from gauss.errors import ArgumentError, SimulationError, judged_later, require
 from gauss.scene import Scene
 from gauss.simulation.passed_switching import examine_steps
@@ -28,12 +28,8 @@ from gauss.system import State, System
 
 SHARES = 0.5 ** np.arange(12)  # of the step that the line search tries
 WORTH = 1e-4  # least reduction of the cost, as a share of the predicted one
-LEAST, SMALL, LARGEST, FACTOR = (
-    1e-12,
-    1e-4,
-    1e15,
-    4.0,
-)  # regularisation, relative to the mean of the diagonal of Q_uu; small ones count as none
+LEAST, SMALL, LARGEST = 1e-12, 1e-4, 1e15  # regularisation, relative to the mean diagonal of Q_uu; small ones count as none
+FACTOR = 4.0  # of it from one iteration to the next
 SLOW_REDUCTION = 1e-2  # relative reduction of the cost below which second derivatives pay: far from the optimum they mislead
 DOMINANT = 1.0  # regularisation from which steps are without feedback, which has kinks where inputs are at their limits
 
@@ -124,7 +120,6 @@ def ilqr(
         State at the start; that of the scene when not given.
     inputs : array_like, shape (steps, n_u), optional
         First guess; zero when not given. From a motion that has no gradient, as of a pole that hangs, it leads nowhere.
-
     second_order : bool
         Whether second derivatives of the steps are used, too (differential dynamic programming): few iterations also about
         unstable motions, for machine code that takes longer to make.
@@ -163,8 +158,7 @@ def ilqr(
     >>> bool(abs(motion.q[-1]).max() < 0.05)
     True
     """
-    require(scene, (Scene, System), "ilqr")
-    system = compile_scene(scene) if isinstance(scene, Scene) else scene
+    system = system_of(scene, "ilqr")
     problem = _Ilqr(system, duration, step, cost, final, start, integrator, second_order)
     check_tolerances(tolerance=tolerance)
     if not isinstance(iterations, int) or isinstance(iterations, bool) or iterations < 1:

@@ -6,8 +6,7 @@ from gauss.analysis.optimal.phases import MeshSettings, MotionPhase, PhaseProble
 from gauss.analysis.optimal.refined_meshes import on_refined_meshes
 from gauss.analysis.optimal.result import OptimalMotion
 from gauss.arguments import named_arguments
-from gauss.dynamics import compile_scene
-from gauss.errors import require
+from gauss.dynamics.scene_compilation import system_of
 from gauss.scene import Scene
 from gauss.system import State, System
 
@@ -107,8 +106,7 @@ def optimal_motion(
     >>> round(motion.duration, 6)  # 1 N on 1 kg: forwards for a second, then backwards
     2.0
     """
-    require(scene, (Scene, System), "optimal_motion")
-    system = compile_scene(scene) if isinstance(scene, Scene) else scene
+    system = system_of(scene, "optimal_motion")
     settings = MeshSettings(intervals, order, tolerance, refinements, iterations)
     phase = MotionPhase(duration, end=end, guess=guess)
     made = PhaseProblems(system, [phase], settings, start, periodic, reset, meets, cost, limits)

@@ -18,7 +18,7 @@ from gauss.analysis.optimal.conditions import (
 from gauss.analysis.optimal.contact_set import ContactSet, impact_between
 from gauss.analysis.optimal.equations import Casadi, OptimalEquations
 from gauss.analysis.optimal.guess import first_guess
-from gauss.analysis.optimal.law_mesh import law_mesh
+from gauss.analysis.optimal.meshes import law_mesh
 from gauss.analysis.optimal.problem import MotionProblem, MotionValues
 from gauss.errors import ArgumentError, did_you_mean, extra
 from gauss.simulation.tolerances import check_tolerances

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.analysis.optimal.infeasible import refuse
-from gauss.analysis.optimal.law_mesh import warn_of_passed
 from gauss.analysis.optimal.limit_excess import LimitExcess, limit_excess, warn_of_excess
-from gauss.analysis.optimal.mesh_error import MeshError, refined
+from gauss.analysis.optimal.meshes import MeshError, refined, warn_of_passed
 from gauss.analysis.optimal.problem import MotionProblem, MotionValues, Solved
 from gauss.analysis.optimal.programme import CollocationProgramme
 from gauss.analysis.optimal.result import OptimalMotion

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.analysis.sensitivity.motion import Motion, smooth_motion
-from gauss.dynamics import compile_scene
 from gauss.dynamics.motion_step import MotionStep
-from gauss.errors import ArgumentError, require
+from gauss.dynamics.scene_compilation import system_of
+from gauss.errors import ArgumentError
 from gauss.scene import Scene
 from gauss.system import System, coordinate_rates
 
@@ -20,8 +20,7 @@ class DifferentiableDynamics:
     """Accelerations of states under the loads of the scene."""
 
     def __init__(self, system: System | Scene):
-        require(system, (System, Scene), "dynamics")
-        self.system = compile_scene(system) if isinstance(system, Scene) else system
+        self.system = system_of(system, "dynamics")
 
     def value(self, q: np.ndarray, v: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Accelerations (…, n_v) of states (…, n_q), (…, n_v) with generalised forces (…, n_v) added."""
@@ -59,8 +58,7 @@ class DifferentiableMotion:
     """
 
     def __init__(self, system: System | Scene, duration: float, step: float, integrator: str = "rk4"):
-        require(system, (System, Scene), "motion")
-        self.system = compile_scene(system) if isinstance(system, Scene) else system
+        self.system = system_of(system, "motion")
         self.settings = {"duration": duration, "step": step, "parameters": (), "integrator": integrator}
         first = Motion(self.system, state=None, inputs=None, **self.settings)
         self.steps, self.n_u = first.steps, first.inputs.shape[1]

@@ -14,13 +14,11 @@ from gauss.analysis.sensitivity.event_parameters import (
     is_of_event,
     refuse_bearing_start,
 )
-from gauss.analysis.sensitivity.law_jumps import warn_of_jumps
 from gauss.analysis.sensitivity.phase_record import RecordedPhase, packed, phase_times, recorded_motion
 from gauss.analysis.sensitivity.saltation import Transition
-from gauss.analysis.sensitivity.timed_steps import SHORTEST, timed_steps
+from gauss.analysis.sensitivity.timed_steps import SHORTEST, timed_steps, warn_of_jumps
 from gauss.analysis.tangents import Tangents
 from gauss.arguments import name_list, real_array
-from gauss.dynamics import compile_scene
 from gauss.dynamics.constraint_leak import may_leak
 from gauss.dynamics.laws.switching import timed_switching
 from gauss.dynamics.laws.traced_laws import Laws
@@ -28,10 +26,10 @@ from gauss.dynamics.mechanism import loop_residual
 from gauss.dynamics.motion_step import MotionStep
 from gauss.dynamics.parameter_terms import OF_JOINTS
 from gauss.dynamics.rigid_loops import refuse_other_pose
+from gauss.dynamics.scene_compilation import system_of
 from gauss.errors import ArgumentError, SimulationError, require
-from gauss.scene import Scene
 from gauss.simulation.tolerances import step_count
-from gauss.system import State, System, coordinate_rates
+from gauss.system import State, System
 from gauss.system.coordinate_names import displacement_names, rate_names
 
 
@@ -98,8 +96,7 @@ class Motion:
     groups: list[list[tuple[float, float]]]
 
     def __init__(self, system, duration, step, state, inputs, parameters, integrator):
-        require(system, (System, Scene), "sensitivities")
-        system = compile_scene(system) if isinstance(system, Scene) else system
+        system = system_of(system, "sensitivities")
         self.steps = step_count(duration, step, "sensitivities")
         self.h, self.start = step, system.initial_state() if state is None else state
         require(self.start, (State,), "sensitivities: state")
@@ -134,14 +131,9 @@ class Motion:
         """Changes (n_x, m) of the start along independent coordinates and rates, and their names."""
         system = self.step.system
         tangents = Tangents(system, self.start)
-        N, D, rate = tangents.position, tangents.change, tangents.rate
-        moved = (
-            np.array([coordinate_rates(system, self.start.q, column) for column in N.T]).reshape(N.shape[1], system.n_q).T
-        )
-        still = np.zeros((system.n_q, rate.shape[1]))
         names = [displacement_names(system)[k] for k in tangents.independent_coordinates]
         names += [rate_names(system)[k] for k in tangents.independent_rates]
-        return np.block([[moved, still], [D, rate]]), tuple(names)
+        return tangents.of_states, tuple(names)
 
     def _smoothly(self):
         """Equal steps of one smooth system."""

@@ -17,8 +17,8 @@ from gauss.analysis.export.exported_function import ExportedFunction, folder_of,
 from gauss.analysis.export.fmu.model_description import build_description, model_description, variables
 from gauss.analysis.export.fmu.unit_functions import unit_functions
 from gauss.analysis.export.fmu.unit_parameters import UnitParameters
-from gauss.dynamics import compile_scene
-from gauss.errors import ArgumentError, MissingPackageError, SimulationError, require
+from gauss.dynamics.scene_compilation import system_of
+from gauss.errors import ArgumentError, MissingPackageError, SimulationError
 from gauss.scene import Scene
 from gauss.system import State, System
 
@@ -67,8 +67,7 @@ def to_fmu(system: System | Scene, folder=".", name: str | None = None, paramete
     >>> export.to_fmu(gauss.load("pendulum"), "/tmp").name  # doctest: +SKIP
     'pendulum.fmu'
     """
-    require(system, (System, Scene), "export")
-    system = compile_scene(system) if isinstance(system, Scene) else system
+    system = system_of(system, "export")
     own = identifier(system.scene.name if name is None else name)
     tuned = UnitParameters(system, parameters)
     functions, start = unit_functions(tuned), system.initial_state()
