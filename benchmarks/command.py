@@ -70,6 +70,18 @@ def chosen(only: str, names: Iterable[str]) -> list[str]:
     return found
 
 
+def agreeing(difference: float, at_most: float, what: str) -> float:
+    """A relative difference of two computations of one quantity, if tolerances or round-off explain it.
+
+    Raises
+    ------
+    AssertionError
+        If it is larger, or NaN: the times of a table are worth nothing beside results that are wrong.
+    """
+    assert difference <= at_most, f"{what}: the results differ by {difference:.1e}; at most {at_most:g} is explained"
+    return difference
+
+
 def load_at_the_end() -> str:
     """Condition of a measurement that has just ended."""
     return f"load average when it ended: {', '.join(f'{load:.1f}' for load in os.getloadavg())}"

@@ -30,7 +30,7 @@ import numpy as np  # noqa: E402
 import pinocchio as pin  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.command import chosen, command, load_at_the_end  # noqa: E402
+from benchmarks.command import agreeing, chosen, command, load_at_the_end  # noqa: E402
 from benchmarks.latency.scenes import FEET, biped  # noqa: E402
 from benchmarks.loop_contacts import LoopContacts  # noqa: E402
 from gauss.analysis.crosscheck.pinocchio_ import Configuration, Twin, twin  # noqa: E402
@@ -49,6 +49,7 @@ PINOCCHIO, MUJOCO, LOOP, MANY, FILL = "Pinocchio", "MuJoCo", "loop", "batch", "f
 ONCE_GOAL, MANY_GOAL = 4.0, 20.0  # ratios to the best peer of one call, and in batch on trees
 TREES = "Panda", "UR5", "Talos"
 DGEMM_SIZE = 512
+ROUNDING = 1e-9  # of derivatives near singular configurations, relative to the largest entry
 COMPETITORS = OURS, LOOP, MANY, PINOCCHIO, MUJOCO
 MECHANISMS: dict[str, Callable[[], gauss.Scene]] = {
     "Panda": lambda: gauss.load("robot:panda", mimic=False),
@@ -243,7 +244,8 @@ def rows(name: str, system: System, rounds: int) -> Iterator[dict]:
         line: dict[str, str | float] = {"mechanism": name, "function": function}
         line |= {task: median(seconds[task]) if task in seconds else np.nan for task in (*COMPETITORS, FILL)}
         line |= {"bytes": sum(part.nbytes for part in parts) / BATCH, "operations": _operations(system, full)}
-        yield line | {"agreement": np.nan if expected is None else difference(found, expected)}
+        what = f"{name}, {function}"
+        yield line | {"agreement": np.nan if expected is None else agreeing(difference(found, expected), ROUNDING, what)}
 
 
 def _operations(system: System, function: str) -> float:

@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks import gpu_peers
-from benchmarks.command import command
+from benchmarks.command import agreeing, command
 from benchmarks.gpu_estimate import SCENES, flops
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
 
+ROUNDING = 1e-9  # of forward dynamics and of a short motion, relative to the largest entry
 STEPS, STEP, FEW = 50, 1e-4, 256  # of a motion; states that are compared
 PEERS = ("scene", "work", "engine", "its time", "per second", "gauss is faster by")
 TITLES = ("scene", "work", "device", "one core of this CPU", "ratio", "per second", "share of the peak", "difference")
@@ -60,7 +61,7 @@ def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[di
             found = one[0][0].numpy() if work == "forward dynamics" else one.q
             known = other if work == "forward dynamics" else other.q
             count = min(len(found), len(known))
-            difference = np.abs(found[:count] - known[:count]).max()
+            apart = np.abs(found[:count] - known[:count]).max() / max(1.0, np.abs(known[:count]).max())
             rows.append(
                 {
                     "scene": name,
@@ -69,7 +70,7 @@ def measure(device: str, states: int, rounds: int, peak: float) -> tuple[list[di
                     "cpu": gpu_peers.seconds(here, rounds) / (len(known) * units),
                     "operations": flops(function.rows.operations) if work == "forward dynamics" else "",
                     "peak": peak,
-                    "difference": difference / max(1.0, np.abs(known[:count]).max()),
+                    "difference": agreeing(float(apart), ROUNDING, f"{name}, {work}"),
                 }
             )
         rows.extend(gpu_peers.rows(name, scene, q, v, STEPS, STEP, rounds))

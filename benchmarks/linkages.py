@@ -24,7 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.command import RESULTS, command  # noqa: E402
+from benchmarks.command import RESULTS, agreeing, command  # noqa: E402
 from gauss.bench.contest import Competitor, interleaved, repeated, with_time  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head  # noqa: E402
@@ -37,6 +37,7 @@ ANGLES = 3600
 STATES = 24
 RUN = 2.0  # s
 STALL, SLOPE = 120.0, 6.0  # motor torque 120 N m less 6 N m s/rad times the speed
+ROUNDING = 1e-12  # relative to the largest torque or reaction
 LIMIT = 2.0  # ms that a cycle of the four-bar may take
 
 
@@ -75,8 +76,12 @@ def measured(name: str, rounds: int) -> dict:
         "kernel_per_angle_ns": 1e9 * seconds["kernel"] / ANGLES,
         "scene_per_angle_us": 1e6 * seconds["scene"],
         "scene_over_numpy": seconds["scene"] * ANGLES / seconds["numpy"],
-        "kernel_agreement": _kernel_agreement(kernel(inputs), found) / scale,
-        "scene_agreement": max(_scene_agreement(system, state, found, k) for k, state in _indexed(states)) / scale,
+        "kernel_agreement": agreeing(_kernel_agreement(kernel(inputs), found) / scale, ROUNDING, f"{name}, kernel"),
+        "scene_agreement": agreeing(
+            max(_scene_agreement(system, state, found, k) for k, state in _indexed(states)) / scale,
+            ROUNDING,
+            f"{name}, scene",
+        ),
         "reduced_us": 1e6 * seconds["reduced"],
         "run_reduced_ms": 1e3 * seconds["run_reduced"],
         "run_scene_ms": 1e3 * seconds["run_scene"],

@@ -21,7 +21,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.command import RESULTS, command  # noqa: E402
+from benchmarks.command import RESULTS, agreeing, command  # noqa: E402
 from gauss.bench.contest import Competitor, interleaved, repeated, with_time  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head  # noqa: E402
@@ -34,6 +34,7 @@ from gauss.view import plot_rotors  # noqa: E402
 
 SIZES = (100, 200, 300, 500, 700, 1000)
 GROUP = 5  # shafts between two friction drives
+ROUNDING = 1e-12  # relative to the largest acceleration
 LIMIT = 0.2  # deviation from a straight line
 KINDS = ("kernel", "rates", "plain")
 
@@ -73,7 +74,8 @@ class MeasuredChain:
         }
         self.tasks = {kind: Competitor(repeated(call, count), count) for kind, (count, call) in calls.items()}
         ours, theirs = (equations(*at).acceleration for equations in (self.equations, self.plain))
-        self.agreement = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
+        apart = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
+        self.agreement = agreeing(apart, ROUNDING, f"chain of {n} shafts")
 
     def row(self, seconds: dict[str, float]) -> dict:
         """Row of the table, of the times of a call by kind."""

@@ -32,7 +32,7 @@ import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
 import gauss.gym  # noqa: E402
-from benchmarks.command import command, load_at_the_end  # noqa: E402
+from benchmarks.command import agreeing, command, load_at_the_end  # noqa: E402
 from gauss.bench.contest import OURS, Competitor, difference, interleaved  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head, in_time  # noqa: E402
@@ -42,6 +42,7 @@ EXAMPLE = Path(__file__).parents[1] / "models" / "examples" / "control" / "mppi.
 MUJOCO, LAW = "MuJoCo", "law"
 ACTIONS = 50  # of an environment in a run
 MANY = 1024  # motions of a vector environment of gauss
+GROWN = 1e-4  # relative difference at the end to which rounding may have grown
 FEW = 16  # of one of MuJoCo's, which makes its motions one after the other
 
 
@@ -101,7 +102,7 @@ def sampling(rounds: int) -> Iterator[dict]:
         peer = MujocoRollout(system, law.run)
         theirs = lambda p=peer, s=start, c=control: p(s.q, s.v, c)  # noqa: E731
         ends = theirs()[:, -1, 1 : 1 + peer.model.nq][:, peer.columns]
-        agreement = difference(ours().q[:, -1], ends)
+        agreement = agreeing(difference(ours().q[:, -1], ends), GROWN, name)
         tasks = {
             OURS: Competitor(ours),
             MUJOCO: Competitor(theirs),

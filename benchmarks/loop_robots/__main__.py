@@ -38,10 +38,10 @@ from statistics import median  # noqa: E402
 import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.command import command, load_at_the_end  # noqa: E402
+from benchmarks.command import agreeing, command, load_at_the_end  # noqa: E402
 from benchmarks.loop_robots.operations import operations  # noqa: E402
 from benchmarks.loop_robots.peers import PEERS, peers  # noqa: E402
-from benchmarks.loop_robots.report import page  # noqa: E402
+from benchmarks.loop_robots.report import WANTED, page  # noqa: E402
 from benchmarks.loop_robots.robots import Robot, robots  # noqa: E402
 from gauss.bench.contest import OURS, Competitor, interleaved, repeated  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
@@ -99,7 +99,8 @@ def _times(robot: Robot, rounds: int) -> dict:
     given = first.state.q, first.state.v, first.load
     batch = [np.tile(one, (BATCH, 1)) for one in given]
     out = ours(*batch)
-    found = {"error": max(one.error(ours(one.state.q, one.state.v, one.load)) for one in instants)}
+    error = max(one.error(ours(one.state.q, one.state.v, one.load)) for one in instants)
+    found = {"error": agreeing(error, WANTED, robot.name)}
     tasks = {OURS: Competitor(lambda: _called(ours, given), CALLS), BATCHED: Competitor(lambda: ours(*batch, out), BATCH)}
     for name, peer in peers(system, first).items():
         tasks[name] = Competitor(repeated(peer.run, CALLS), CALLS)
