@@ -35,7 +35,7 @@ def publish_class(folder: Path, kind: str, table: Path) -> list[Path]:
     page.write_text(class_page(kind, rows, header, chart.name if overall else ""), encoding="utf-8")
     if not overall:
         return [page]
-    from gauss.view.fronts import plot_fronts  # the library of figures is optional and takes long to import
+    from gauss.view.backends import plot_fronts  # the library of figures is optional and takes long to import
 
     lines = {problem: (points, front(points)) for problem, points in panels.items()}
     plot_fronts(names, (overall, front(overall)), lines, chart, f"Class {kind}; {header[0].removeprefix('date: ')}")

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from gauss.cli import bench, doctor, export, linkage, rotors, run, scenes, show, sweep
+from gauss.cli import bench, doctor, linkage, rotors, run, scenes, show, sweep
 from gauss.cli.common import group
 from gauss.errors import GaussError
 from gauss.versions import VERSION
@@ -26,7 +26,7 @@ for command in (
     show.show,
     scenes.check,
     scenes.explain,
-    export.export,
+    scenes.export,
     linkage.linkage,
     rotors.rotors,
     scenes.models,

@@ -1,5 +1,6 @@
 """What is recorded of a motion besides its samples: statistics, events, energies."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -96,6 +97,15 @@ class Stats(NamedTuple):
         laws = "" if self.law_error is None else f", laws of contact met to {self.law_error:.0e}"
         cost = f"{self.steps} steps{rejected}, {self.evaluations} evaluations, {self.wall_time:.3g} s"
         return f"Stats({cost}{plan}{laws}{sleep})"
+
+
+SUMMED = "evaluations", "steps", "rejected", "factorisations", "wall_time", "rescued", "unseen"
+
+
+def joined_stats(parts: Sequence[Stats]) -> Stats:
+    """Statistics of a motion in parts: sums of counts and times, the worst error, and the rest as of the last part."""
+    sums = {name: sum(getattr(part, name) for part in parts) for name in SUMMED}
+    return parts[-1]._replace(**sums, worst_error=max(part.worst_error for part in parts))
 
 
 @dataclass(frozen=True)

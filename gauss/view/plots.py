@@ -3,21 +3,25 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.analysis import Energy, energy, unique_reactions
+from gauss.analysis import energy, unique_reactions
 from gauss.dynamics.assemble import position_residual
 from gauss.simulation import Trajectory
 from gauss.system import coordinate_units, rate_units
-from gauss.view.style import INK, check_format, curves, keep_flat, legend, looks, saved, unit_sizes
+from gauss.view.style import FLAT_CHANGE, INK, check_format, curves, keep_flat, legend, looks, saved, unit_sizes
 
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
-MANY = 8  # names that fit into a title
+MOST_NAMES_IN_TITLE = 8  # names that fit into a title
 BELOW_ZERO = 0.04  # of the height of an axis: a line at zero does not lie on its edge
+WHOLE = 2 * np.pi  # turn
 LEAST_ARM = 1e-6  # m: moments that a force has about this arm are drawn as none
 ANGLES, LENGTHS, QUATERNIONS = "coordinate [rad]", "coordinate [m]", "part of a unit quaternion [1]"
 
 
 def plot_motion(trajectory: Trajectory, path=None) -> Figure:
     """Figure of coordinates, rates, energies and energy balance against time.
+
+    Turns of free bodies are drawn as rotation vectors [rad], which go on over whole turns; :func:`plot_coordinates` draws
+    their quaternions. Of many coordinates, those of a joint have one colour.
 
     Parameters
     ----------
@@ -39,10 +43,12 @@ def plot_motion(trajectory: Trajectory, path=None) -> Figure:
     check_format(path)
     figure = Figure(figsize=(10, 7), layout="constrained")
     (left, right), (below, balance) = figure.subplots(2, 2, sharex=True)
-    curves(left, trajectory.t, scalar_coordinates(trajectory), "coordinate [rad, m]")
+    curves(left, trajectory.t, _displacements(trajectory), "coordinate [rad, m]")
     curves(right, trajectory.t, _rates(trajectory), "rate [rad/s, m/s]")
-    _energies(below, trajectory.t, found := energy(trajectory))
-    _balance(balance, trajectory.t, found)
+    _energies(below, balance, trajectory)
+    sizes = unit_sizes(trajectory.system)
+    keep_flat(left, min(sizes["rad"], sizes["m"]))
+    keep_flat(right, min(sizes["rad/s"], sizes["m/s"]))
     legend(right)
     return _finished(figure, trajectory, (below, balance), path)
 
@@ -118,8 +124,7 @@ def plot_energy(trajectory: Trajectory, path=None) -> Figure:
     check_format(path)
     figure = Figure(figsize=(8, 8), layout="constrained")
     energies, balance, gaps = figure.subplots(3, 1, sharex=True)
-    _energies(energies, trajectory.t, found := energy(trajectory))
-    _balance(balance, trajectory.t, found)
+    _energies(energies, balance, trajectory)
     drift = np.array([abs(position_residual(motion)).max(initial=0.0) for motion in trajectory.motions])
     gaps.set_ylabel("constraint error [rad, m]")
     if drift.any():
@@ -181,13 +186,35 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
     legend(force)
     undrawn = [name for name, (_, loose) in both.items() if loose]
     if undrawn:
-        force.set_title(f"unique components only, in {', '.join(undrawn[:MANY])}{' …' if len(undrawn) > MANY else ''}")
+        more = " …" if len(undrawn) > MOST_NAMES_IN_TITLE else ""
+        force.set_title(f"unique components only, in {', '.join(undrawn[:MOST_NAMES_IN_TITLE])}{more}")
     return _finished(figure, trajectory, [moment], path)
 
 
 def scalar_coordinates(trajectory: Trajectory) -> dict:
     """Every coordinate by name; the parts of a quaternion are named w, x, y, z."""
     return dict(zip(coordinate_units(trajectory.system), trajectory.q.T, strict=True))
+
+
+def _displacements(trajectory: Trajectory) -> dict:
+    """Every coordinate by the name of its rate; of a quaternion the rotation vector, continued over whole turns."""
+    found = []
+    for joint in trajectory.system.joints:
+        k, q = joint.pair.quaternion, trajectory.q[:, joint.q]
+        found.append(q if k is None else np.concatenate([q[:, :k], _turns(q[:, k:])], axis=1))
+    return dict(zip(trajectory.system.coordinates, np.concatenate(found, axis=1).T, strict=True))
+
+
+def _turns(Q: np.ndarray) -> np.ndarray:
+    """Rotation vectors (k, 3) of unit quaternions (k, 4); each is the one that is nearest to the vector before it."""
+    half = np.linalg.norm(Q[:, 1:], axis=1)
+    axes = np.divide(Q[:, 1:], half[:, None], out=np.zeros((len(Q), 3)), where=half[:, None] > 0)
+    angles = 2.0 * np.arctan2(half, Q[:, 0])
+    found = angles[:, None] * axes
+    for k in range(1, len(Q)):
+        before = found[k - 1] @ axes[k]
+        found[k] = (angles[k] + WHOLE * np.round((before - angles[k]) / WHOLE)) * axes[k]
+    return found
 
 
 def _rates(trajectory: Trajectory) -> dict:
@@ -213,21 +240,22 @@ def _finished(figure: Figure, trajectory: Trajectory, lowest, path) -> Figure:
     return saved(figure, path)
 
 
-def _energies(axes, t, found: Energy):
+def _energies(axes, below, trajectory: Trajectory):
+    """Energies, and their balance; of a scene at rest, whose energies are rounding, in the scale of the scene."""
+    found, own = energy(trajectory), unit_sizes(trajectory.system)["J"]
     rows = {"kinetic": found.kinetic, "potential": found.potential - found.potential[0]}
     rows |= {"drives": found.drives, "loads": found.loads, "dissipated": found.dissipated}
     for k, (name, row) in enumerate(rows.items()):
         if row.any():
-            axes.plot(t, row, label=name, **looks(k))
+            axes.plot(trajectory.t, row, label=name, **looks(k))
+    keep_flat(axes, own)
     axes.set_ylabel("energy since the start [J]")
     legend(axes, beside=False)
     axes.grid(alpha=0.3)
-
-
-def _balance(axes, t, found: Energy):
-    axes.semilogy(t[1:], abs(found.balance[1:]) / max(found.scale, FLOOR) + FLOOR, color=INK, linewidth=1.0)
-    axes.set_ylabel("energy balance, relative [1]")
-    axes.grid(alpha=0.3)
+    scale = found.scale if found.scale > FLAT_CHANGE * own else own
+    below.semilogy(trajectory.t[1:], abs(found.balance[1:]) / scale + FLOOR, color=INK, linewidth=1.0)
+    below.set_ylabel("energy balance, relative [1]")
+    below.grid(alpha=0.3)
 
 
 def _remark(axes, text: str):

@@ -10,7 +10,7 @@ FORMATS = (".png", ".svg", ".pdf")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#7F7F7F")  # Okabe and Ito
 LINES = ("-", "--", "-.", ":")
 INK = "#333333"
-NAMED = 12  # more curves than this need no legend: their colours repeat
+NAMED = 12  # more curves than this are not told apart by name
 FLAT_CHANGE = 1e-9  # relative to a unit of the scene: what changes by less is rounding, and is drawn as a flat line
 DPI = 150
 PAGE_DPI = 140  # of figures beside pages of results
@@ -43,9 +43,15 @@ def looks(k: int) -> dict:
 
 
 def curves(axes, t, columns: dict, label: str):
-    """Draw named curves against time, with the label of their axis."""
+    """Draw named curves against time, with the label of their axis; of many, those of one element have one colour."""
+    elements = list(dict.fromkeys(name.partition(".")[0] for name in columns))
+    many = len(columns) > NAMED and len(elements) < len(columns)
+    drawn: dict[str, int] = dict.fromkeys(elements, 0)
     for k, (name, column) in enumerate(columns.items()):
-        axes.plot(t, column, label=name, **looks(k))
+        element = name.partition(".")[0]
+        look = looks(elements.index(element)) | {"linestyle": LINES[drawn[element] % len(LINES)]} if many else looks(k)
+        axes.plot(t, column, label="_" * bool(drawn[element]) + element if many else name, **look)
+        drawn[element] += 1
     axes.set_ylabel(label)
     axes.grid(alpha=0.3)
 

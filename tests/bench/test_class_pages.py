@@ -12,7 +12,7 @@ from gauss.bench.problems import INCONSISTENT, SOLVABLE
 from gauss.bench.publish import publish
 from gauss.bench.report import markdown
 from gauss.bench.table import write_table
-from gauss.view.fronts import ZERO, height
+from gauss.view.backends import ZERO, height
 from tests.support import qp_solvers
 from tests.support.qp_solvers import GOOD
 

@@ -86,6 +86,42 @@ def test_rounding_is_drawn_as_a_flat_line(motions):
     assert np.ptp(motion.coordinate("pin")) <= high - low <= 1.2 * np.ptp(motion.coordinate("pin"))
 
 
+def test_turns_of_a_free_body_go_on_over_whole_turns():
+    scene = gauss.Scene("spinning", gravity=(0, 0, 0))
+    scene.body("disk", 1.0, (0.1, 0.1, 0.2))
+    scene.free("F", "ground", "disk")
+    scene.start("F", rate=(0, 0, 0, 0, 0, 10.0))
+    motion = gauss.simulate(scene, 2.0, times=np.linspace(0, 2, 101))
+    left, right = view.plot_motion(motion).axes[:2]
+    names = [line.get_label() for line in left.lines]
+    assert names == [line.get_label() for line in right.lines] == list(motion.system.coordinates)
+    assert left.lines[-1].get_ydata() == pytest.approx(10.0 * motion.t, abs=1e-6)
+
+
+def test_many_coordinates_have_the_colours_of_their_joints():
+    scene = gauss.Scene("three")
+    for name in "abc":
+        scene.body(name, 1.0, (0.1, 0.1, 0.2))
+        scene.free(f"F{name}", "ground", name)
+    left, right = view.plot_motion(gauss.simulate(scene, 0.1)).axes[:2]
+    assert [text.get_text() for text in right.get_legend().get_texts()] == ["Fa", "Fb", "Fc"]
+    assert len({line.get_color() for line in left.lines}) == 3
+
+
+def test_the_energy_of_a_scene_at_rest_is_drawn_in_the_scale_of_the_scene():
+    scene = gauss.Scene("resting")
+    scene.body("box", 2.0, (0.1, 0.1, 0.1))
+    scene.free("F", "ground", "box")
+    scene.box("cube", "box", (0.2, 0.2, 0.2))
+    scene.half_space("floor", "ground")
+    scene.contact("on", "cube", "floor", friction=0.5)
+    scene.start("F", position=(0, 0, 0.1, 1, 0, 0, 0))
+    motion = gauss.simulate(scene, 0.1, integrator="time_stepping", step=1e-3)
+    energies, balance, _ = view.plot_energy(motion).axes
+    assert np.ptp(energies.get_ylim()) > 1e3 * max(np.ptp(line.get_ydata()) for line in energies.lines)
+    assert max(balance.lines[0].get_ydata()) < FLAT_CHANGE
+
+
 def test_reactions_are_the_sizes_of_forces(motions):
     motion = motions["cart_pole"]
     force = view.plot_reactions(motion, ["pin"]).axes[0].lines[0].get_ydata()

@@ -12,14 +12,14 @@ import rich
 
 import gauss
 from gauss.errors import FileError
+from gauss.system import coordinate_rates
 from gauss.view.skeleton import placed
 from gauss.view.viewer import export_html, page, show
-from gauss.view.viewer.cameras import CAMERAS, placed_camera
 from gauss.view.viewer.forms import forms
-from gauss.view.viewer.framing import FIELD, framing, joined
+from gauss.view.viewer.framing import CAMERAS, FIELD, framing, joined, placed_camera
 from gauss.view.viewer.show import LOOPBACK, _free_port
-from gauss.view.viewer.shown import resampled
-from gauss.view.viewer.stage import own_colour
+from gauss.view.viewer.shown import _slopes, resampled
+from gauss.view.viewer.stage import colour_of
 
 FLOATS = 1e-6  # relative: positions travel in single precision
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -263,8 +263,25 @@ def test_terrain_is_drawn_and_lies_above_the_floor():
     assert len(drawn.faces) == 4
     assert (drawn.face_normals[:, 2] > 0.0).all()
     assert framing(motion).floor[2] < np.array(field.heights).min() + 0.3
-    seen = {own_colour(form) for form in forms(motion.system) if form.role == "contact"}
+    seen = {colour_of(form, ["ball"]) for form in forms(motion.system) if form.role == "contact"}
     assert len(seen) == 2  # the ball is seen against it
+
+
+def test_shapes_of_bodies_beside_each_other_have_colours_of_their_own():
+    scene = gauss.Scene("pair")
+    for name, x in (("left", 0.0), ("right", 1.0)):
+        scene.body(name, 1.0, (0.1, 0.1, 0.1), com=(x, 0, 0))
+        scene.free(f"F {name}", "ground", name)
+        scene.sphere(f"ball {name}", name, 0.1)
+    shapes = [form for form in forms(gauss.dynamics.compile_scene(scene)) if form.role == "contact"]
+    assert len({colour_of(form, ["left", "right"]) for form in shapes}) == len(shapes) == 2
+
+
+def test_slopes_of_all_samples_are_the_rates_of_the_coordinates():
+    for name in ("heavy_top", "cart_pole"):
+        motion = gauss.simulate(gauss.load(name), 0.1)
+        one_by_one = [coordinate_rates(motion.system, q, v) for q, v in zip(motion.q, motion.v, strict=True)]
+        np.testing.assert_allclose(_slopes(motion.system, motion.q, motion.v), one_by_one, rtol=1e-14, atol=1e-14)
 
 
 @pytest.mark.slow

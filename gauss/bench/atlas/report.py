@@ -71,7 +71,7 @@ def _cell(row) -> str:
 
 
 def _map(path: Path, rows, header) -> Path:
-    from gauss.view.atlas import plot_atlas  # the library of figures is optional and takes long to import
+    from gauss.view.backends import plot_atlas  # the library of figures is optional and takes long to import
 
     cases, methods = (list(dict.fromkeys(row[key] for row in rows)) for key in ("case", "method"))
     cells = {(row["case"], row["method"]): row for row in rows}

@@ -6,7 +6,7 @@ import warnings
 from importlib import import_module
 from pathlib import Path
 
-from gauss.cli.docs import generated, notebooks, reference
+from gauss.cli.docs import generated, reference
 from gauss.errors import FileError, extra, writing
 
 HERE = Path(__file__).parent
@@ -66,7 +66,7 @@ def collect(folder: Path, program):
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(source, target)
-    pages, pictures = notebooks.notebook_pages()
+    pages, pictures = generated.notebook_pages()
     for name, text in (generated.texts(program) | reference.pages() | pages).items():
         _write(folder / name, text)
     for name, picture in pictures.items():

@@ -1,6 +1,6 @@
 """Configuration of Sphinx; read by Sphinx, not imported."""
 
-from gauss.cli.docs import gallery, links
+from gauss.cli.docs import gallery, reference
 from gauss.io.catalog import folder
 from gauss.versions import VERSION
 
@@ -63,4 +63,4 @@ sphinx_gallery_conf = {
 
 def setup(app):
     """Resolve references to public names by the objects that they name."""
-    links.setup(app)
+    reference.setup(app)

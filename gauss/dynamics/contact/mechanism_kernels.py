@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import CallingKernel, Kernel, as_number, forward, jacobian, write
-from gauss.dynamics.called_program import called_loads
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
@@ -23,6 +22,7 @@ from gauss.dynamics.load_receiver import LoadReceiver, received
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.loop_joints import LoopJoint
 from gauss.dynamics.mechanism import loop_constraints
+from gauss.dynamics.programs import called_loads
 from gauss.dynamics.state_terms import StateTerms
 from gauss.dynamics.store import cached_on_disk
 from gauss.rotations import cross

@@ -38,13 +38,14 @@ from gauss.dynamics.contact.paradox import (
 from gauss.dynamics.contact.step_modes import StepModes
 from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
 from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.laws.traced_laws import Laws, present_laws
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.scene import JointDryFriction
 from gauss.system import State, System, retract, sides
-from gauss.system.contact_gaps import slips
+from gauss.system.contact_mode import slips
 
 MIDPOINT = 0.5  # share of a step in which coordinates move with the rates before it
 INCONSISTENT_RESPONSE = 1e-6  # relative: responses that violate the constraints by more are round-off
@@ -74,11 +75,13 @@ class MoreauStepper:
         Backend of the free accelerations.
     removal : float
         Least time in which penetration is removed [s]; zero: within a step.
+    laws : Laws
+        Loads of the system without unilateral and set-valued elements.
     """
 
-    def __init__(self, system: System, backend: str | Backend | type = "auto", removal: float = 0.0):
+    def __init__(self, system: System, backend: str | Backend | type, removal: float, laws: Laws):
         scene = system.scene
-        self.system, self.smooth, self.removal = system, smooth_system(system), removal
+        self.system, self.smooth, self.removal, self.loads = system, laws.system, removal, laws
         self.backend, self.kernel = backend, ContactTermsKernel(system)
         self.unit = system.scale.time / contact_scales(system)
         gaps, rough = sides(scene), slips(scene)
@@ -108,7 +111,7 @@ class MoreauStepper:
     @cached_property
     def responses(self) -> ForceResponses:
         """Responses of the system without unilateral and set-valued elements."""
-        return ForceResponses(self.smooth, self.backend)
+        return ForceResponses(self.smooth, self.backend, self.loads)
 
     @cached_property
     def damping(self) -> ImplicitDamping:
@@ -372,7 +375,16 @@ def advance_rates(state: State, acceleration, h, share) -> State:
     return State(state.t, state.q, state.v + (share * h) * acceleration)
 
 
-def moreau_stepper(system: System, backend: str | Backend | type = "auto", removal: float = 0.0) -> MoreauStepper:
-    """Stepper of a system, cached."""
+def moreau_stepper(
+    system: System, backend: str | Backend | type = "auto", removal: float = 0.0, laws: Laws | None = None
+) -> MoreauStepper:
+    """Stepper of a system, cached for its laws as they are now.
+
+    Parameters
+    ----------
+    laws : Laws, optional
+        Loads of the system without unilateral and set-valued elements, where they are known.
+    """
+    laws = present_laws(smooth_system(system)) if laws is None else laws
     key = backend if isinstance(backend, str) else id(backend)  # kept alive by the stepper
-    return cached(system, (MoreauStepper, key, removal), lambda: MoreauStepper(system, backend, removal))
+    return cached(system, (MoreauStepper, key, removal, laws.key), lambda: MoreauStepper(system, backend, removal, laws))

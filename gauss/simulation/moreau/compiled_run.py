@@ -44,7 +44,7 @@ class CompiledMoreauRun(CompiledFixedRun):
     """
 
     def __init__(self, problem: Problem, laws: Laws, dynamics: str = "compiled", removal: float = 0.0):
-        self.whole, self.stepper = problem, moreau_stepper(problem.system, removal=removal)
+        self.whole, self.stepper = problem, moreau_stepper(problem.system, removal=removal, laws=laws)
         self.stepper.refuse_penetration(problem.start, accepted_overlap(problem, bool(removal)))
         self.contacts, self.forces = ContactEvents(self.stepper.modes), self.stepper.lossy.size
         self.codes = self.stepper.modes.codes

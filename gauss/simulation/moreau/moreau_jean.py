@@ -8,6 +8,7 @@ transitions leave errors proportional to the step. Where no solution of Coulomb'
 relaxation is taken, and counted.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple, cast
 
@@ -175,10 +176,10 @@ TIME_STEPPING = FixedStep(
 NONSMOOTH = (TIME_STEPPING,)
 
 
-def step_at(trajectory: Trajectory, index: int, backend: str | Backend | type = "auto") -> MoreauStep:
-    """Step from a sample of a motion by time stepping."""
-    stepper = moreau_stepper(trajectory.system, backend, trajectory.removal)
-    return stepper.step(trajectory.state(index), cast(float, trajectory.step))
+def steps_at(trajectory: Trajectory) -> Callable[[int], MoreauStep]:
+    """Steps from the samples of a motion by time stepping, by the numbers of these."""
+    stepper, step = moreau_stepper(trajectory.system, removal=trajectory.removal), cast(float, trajectory.step)
+    return lambda index: stepper.step(trajectory.state(index), step)
 
 
 def contact_parts(motion: Kinematics, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,12 +5,12 @@ from math import inf, isfinite
 import numpy as np
 
 from gauss.codegen.kernels import Control, LoopStatus
-from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.compiled_step_memory import KEPT_STEPS
 from gauss.dynamics.contact.contact_stepper import lent_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.overlap_resolution import resolved
+from gauss.dynamics.programs import CalledProgram
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point, Rates

@@ -1,6 +1,6 @@
 """Controls of what is seen: layers, cameras, light and dark ground."""
 
-from gauss.view.viewer.cameras import CAMERAS, placed_camera
+from gauss.view.viewer.framing import CAMERAS, placed_camera
 
 LAYERS = {"link": "links", "joint": "joints", "contact": "shapes of contact", "frame": "frames", "path": "paths"}
 

@@ -14,7 +14,7 @@ from gauss.view.style import COLOURS, INK
 from gauss.view.viewer.forms import BodyMesh, forms, size
 from gauss.view.viewer.framing import FIELD, framing
 from gauss.view.viewer.shown import Shown
-from gauss.view.viewer.stage import ARROW, own_colour, rgb
+from gauss.view.viewer.stage import ARROW, colour_of
 from gauss.view.viewer.touches import TouchingPoint, touches
 
 DPI = 100
@@ -85,8 +85,8 @@ class Painter:
     def _painted_mesh(self, form: BodyMesh) -> PaintedMesh:
         mesh = form.mesh if len(form.mesh.faces) <= FINEST else form.mesh.convex_hull
         body = -1 if form.body == GROUND else self.bodies.index(form.body)
-        colour = form.colour or own_colour(form) or rgb(COLOURS[body % len(COLOURS)])
-        return PaintedMesh(body, np.asarray(mesh.vertices)[np.asarray(mesh.faces)], np.array(colour), mesh.is_watertight)
+        colour = np.array(colour_of(form, self.bodies))
+        return PaintedMesh(body, np.asarray(mesh.vertices)[np.asarray(mesh.faces)], colour, mesh.is_watertight)
 
     def _eye(self, aspect: float):
         """Axes of the eye: right, up, towards what is seen."""

@@ -14,7 +14,7 @@ from gauss.analysis import energy
 from gauss.simulation import Trajectory
 from gauss.system import coordinate_units, rate_units
 from gauss.view.style import NAMED, keep_flat, looks, unit_sizes
-from gauss.view.viewer.cameras import CAMERAS, eye
+from gauss.view.viewer.framing import CAMERAS, eye
 from gauss.view.viewer.stage import ViewerStage
 
 WIDTH, HEIGHT = 3.3, 1.5  # of the axes of one quantity [inch]

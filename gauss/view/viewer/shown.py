@@ -9,7 +9,6 @@ from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 from gauss.simulation.motion_records import Stats
-from gauss.system import coordinate_rates
 
 FRAMES = 30  # per second
 MOST_PICTURES = 1800  # pictures of a file; a longer motion has fewer per second
@@ -71,13 +70,25 @@ def resampled(trajectory: Trajectory, count: int) -> Trajectory:
     from scipy.interpolate import CubicHermiteSpline  # takes long to import
 
     system = trajectory.system
-    slopes = np.array([coordinate_rates(system, *pair) for pair in zip(q, v, strict=True)])
-    between = CubicHermiteSpline(t, q, slopes)(times)
+    between = CubicHermiteSpline(t, q, _slopes(system, q, v))(times)
     for places in system.quaternions.values():
         between[:, places] /= np.linalg.norm(between[:, places], axis=1, keepdims=True)
     linear = (np.stack([np.interp(times, t, column) for column in part.T], axis=1) for part in (v, work))
     v, work = (part.reshape(count, width) for part, width in zip(linear, (v.shape[1], work.shape[1]), strict=True))
     return replace(trajectory, t=times, q=between, v=v, work=work)
+
+
+def _slopes(system, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Time derivatives of the coordinates of all samples at once, see :func:`gauss.system.coordinate_rates`."""
+    found = []
+    for joint in system.joints:
+        k, place, rates = joint.pair.quaternion, q[:, joint.q], v[:, joint.v]
+        if k is not None:  # ½ Q ∘ (0, ω)
+            w, axis, omega = place[:, k : k + 1], place[:, k + 1 :], rates[:, k:]
+            turning = w * omega + np.cross(axis, omega)
+            rates = np.concatenate([rates[:, :k], -0.5 * (axis * omega).sum(axis=1, keepdims=True), 0.5 * turning], axis=1)
+        found.append(rates)
+    return np.concatenate(found, axis=1)
 
 
 def _distinct(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """The mechanism on the stage of a viser server: meshes, frames, paths, arrows; one call moves it to a sample."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -8,14 +9,13 @@ from gauss.analysis import reactions
 from gauss.dynamics.kinematics import kinematics
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS
-from gauss.view.viewer.cameras import SIDE_SHARE, shifted
 from gauss.view.viewer.forms import BodyMesh, forms, size
-from gauss.view.viewer.framing import FIELD, framing, joined
-from gauss.view.viewer.ground import ground, sky
+from gauss.view.viewer.framing import FIELD, SIDE_SHARE, framing, joined, shifted
 from gauss.view.viewer.shown import Shown, resampled
 from gauss.view.viewer.touches import touches
 
-STEEL, CONTACT = (0.32, 0.34, 0.38), (0.85, 0.65, 0.3)  # colours of joints and shapes of contact
+STEEL = (0.32, 0.34, 0.38)  # colour of joints
+TINT = 0.35  # of white in the colours of shapes of contact: links are seen against those of their body
 LAND = (0.6, 0.66, 0.58)  # colour of shapes of contact on the ground
 ARROW = 0.35  # longest arrow, of the size of the mechanism
 RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contact forces
@@ -26,9 +26,21 @@ SMOOTHNESS, FINEST_PATH = 6, 6000  # points of a path for each picture, and most
 ROLES = ("link", "joint", "contact", "frame", "path")
 
 
-def own_colour(form: BodyMesh) -> tuple[float, float, float] | None:
-    """Colour of a joint or of a shape of contact; None of a link, which has that of its body."""
-    return LAND if (form.role, form.body) == ("contact", GROUND) else {"joint": STEEL, "contact": CONTACT}.get(form.role)
+def colour_of(form: BodyMesh, bodies: Sequence[str]) -> tuple[float, float, float]:
+    """Colour of a mesh: its own, that of joints or of the ground, or that of its body; shapes of contact are lighter."""
+    if form.colour or form.role == "joint":
+        return form.colour or STEEL
+    if form.body == GROUND:
+        return LAND if form.role == "contact" else STEEL
+    red, green, blue = body_colour(bodies.index(form.body))
+    white = TINT if form.role == "contact" else 0.0
+    return red + white * (1 - red), green + white * (1 - green), blue + white * (1 - blue)
+
+
+def body_colour(number: int) -> tuple[float, float, float]:
+    """Colour of a body by its number, red, green and blue from 0 to 1."""
+    red, green, blue = (int(COLOURS[number % len(COLOURS)][k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return red, green, blue
 
 
 class ViewerStage:
@@ -51,7 +63,6 @@ class ViewerStage:
         self.size = size(trajectory.system)
         self.positions, rotations = trajectory.poses()
         self.turns = _quaternions(rotations)
-        self.colours = {name: rgb(COLOURS[k % len(COLOURS)]) for k, name in enumerate(self.bodies)}
         self.reactions = {joint: reactions(trajectory, joint).force for joint in shown.joints}
         self.largest = max((float(np.linalg.norm(f, axis=1).max()) for f in self.reactions.values()), default=0.0)
         self.root = "" if beside is None else "/beside"
@@ -134,7 +145,7 @@ class ViewerStage:
         self.parts: dict[str, list] = {role: [] for role in ROLES}
         for number, form in enumerate(forms(self.trajectory.system, visuals)):
             parent = f"{self.root}/ground" if form.body == GROUND else f"{bodies}/{_path(form.body)}"
-            colour = form.colour or own_colour(form) or self.colours.get(form.body, STEEL)
+            colour = colour_of(form, self.bodies)
             faces, vertices = np.asarray(form.mesh.faces, np.uint32), np.asarray(form.mesh.vertices, np.float32)
             handle = scene.add_mesh_simple(f"{parent}/{form.role} {number}", vertices, faces, color=colour, side="double")
             self.parts[form.role].append(handle)
@@ -157,13 +168,13 @@ class ViewerStage:
         poses, frames = fine.poses(), self.trajectory.system.frames  # of all bodies by one function
         for name in shown.traces:
             body = frames[name].body
-            carrier, own = self.bodies[body], frames[self.bodies[body]]
+            own = frames[self.bodies[body]]
             arm = own.R.T @ ((0.0 if name in self.bodies else frames[name].p) - own.p)
             points = np.asarray(poses[0][:, body] + poses[1][:, body] @ arm, np.float32)
             segments = np.stack([points[:-1], points[1:]], axis=1)
             look = {"thickness": 0.006 * self.size}
             handle = self.server.scene.add_line_segments(
-                f"{self.root}/paths/{_path(name)}", segments, self.colours[carrier], **look
+                f"{self.root}/paths/{_path(name)}", segments, body_colour(body), **look
             )
             self.parts["path"].append(handle)
 
@@ -211,7 +222,8 @@ class ContactMarks:
         for (ball, arrow), place in zip(self.handles, self.places, strict=True):
             ball.visible = bool(self.visible and place.closed[k])
             arrow.visible = bool(ball.visible and np.linalg.norm(place.forces[k]) > FAINT * self.largest)
-            ball.position = place.points[k]
+            if ball.visible:
+                ball.position = place.points[k]
             if arrow.visible:
                 arrow.points = self._points(place, k)
 
@@ -224,14 +236,35 @@ def _path(name: str) -> str:
     return name.replace("/", "∕")
 
 
-def rgb(colour: str) -> tuple[float, float, float]:
-    """Red, green and blue, from 0 to 1, of a colour such as "#0072B2"."""
-    red, green, blue = (int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
-    return red, green, blue
-
-
 def _quaternions(R: np.ndarray) -> np.ndarray:
     """Unit quaternions (..., 4), w first, of rotations (..., 3, 3)."""
     from scipy.spatial.transform import Rotation  # takes long to import
 
     return Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*R.shape[:-2], 4)
+
+
+class Ground(NamedTuple):
+    """Colours behind and under a mechanism."""
+
+    top: tuple[int, int, int]  # top, bottom: red, green, blue of the sky from 0 to 255, at its top and its bottom
+    bottom: tuple[int, int, int]
+    cell: tuple[int, int, int]  # cell, section: lines of the floor
+    section: tuple[int, int, int]
+    shadow: float  # opacity of shadows on the floor
+    dark: bool  # whether controls are light on dark
+
+
+LIGHT = Ground((168, 184, 204), (222, 227, 233), (198, 205, 214), (164, 174, 188), 0.3, False)  # white bodies are brighter
+DARK = Ground((16, 20, 27), (44, 50, 60), (66, 73, 84), (94, 103, 117), 0.5, True)
+
+
+def ground(dark: bool) -> Ground:
+    """Light or dark ground."""
+    return DARK if dark else LIGHT
+
+
+def sky(colours: Ground) -> np.ndarray:
+    """Background from top to bottom, shape (256, 8, 3)."""
+    share = np.linspace(0.0, 1.0, 256)[:, None, None]
+    shades = (1 - share) * np.array(colours.top) + share * np.array(colours.bottom)
+    return np.broadcast_to(shades, (256, 8, 3)).astype(np.uint8)

@@ -4,10 +4,10 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from gauss.cli.docs import notebooks
+from gauss.cli.docs import generated
 from gauss.io.catalog import folder
 
-BOOKS = notebooks.notebooks()
+BOOKS = generated.notebooks()
 NAMES = ["control", "export", "identification", "optimisation"]
 NEEDED = {"control": "control", "export": "sympy", "optimisation": "casadi", "identification": "clarabel"}
 FIGURES = {"control": 3, "export": 1, "identification": 3, "optimisation": 4}
@@ -40,7 +40,7 @@ def test_pages_show_what_was_run(path):
     cells = [cell for cell in kept.cells if cell.cell_type == "code"]
     assert [cell.execution_count for cell in cells] == list(range(1, len(cells) + 1))
     assert pictures(kept.cells) == FIGURES[path.stem]
-    pages, files = notebooks.notebook_pages()
+    pages, files = generated.notebook_pages()
     text = pages[f"notebooks/{path.stem}.md"]
     own = [name for name in files if name.startswith(f"notebooks/{path.stem}_")]
     assert len(own) == FIGURES[path.stem] and all(f"]({name.removeprefix('notebooks/')})" in text for name in own)

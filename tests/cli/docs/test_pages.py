@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gauss.cli.docs import generated, notebooks
+from gauss.cli.docs import generated
 from gauss.cli.docs.uses import PAGES, snippets
 
 ROOT = Path(__file__).parents[3]
@@ -24,7 +24,7 @@ def _known() -> set[str]:
     examples = generated.folder() / "examples"
     gallery = {f"gallery/{path.relative_to(examples).with_suffix('.rst')}" for path in examples.rglob("*.py")}
     of_package = {"glossary.md", "changelog.md", "formats.md", "models.md", "guides/command_line.md", "reference/laws.rst"}
-    books, _ = notebooks.notebook_pages()
+    books, _ = generated.notebook_pages()
     return files | tables | gallery | of_package | {*books, *MADE, *generated.copies(), "reference/gauss.integrators.rst"}
 
 
