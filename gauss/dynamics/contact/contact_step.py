@@ -125,7 +125,7 @@ class ContactProblem:
 
 
 @contextmanager
-def told_of_step(system: System, state: State, h: float) -> Iterator[None]:
+def errors_of_step(system: System, state: State, h: float) -> Iterator[None]:
     """Let errors of a step of length h [s] name its time, and its length where bodies turn too far in it."""
     try:
         yield
