@@ -5,7 +5,7 @@
 * the problem: :class:`~gauss.backends.compulsion.Compulsion` (A, B, C, D, Φ, a_free, P, G, h) with its ``structure``; the
   forms F2 and F2s of it that methods prefer (``forms``; F1 and F3 as matrices for QP solvers in ``programme``);
 * the result: :class:`~gauss.backends.solution.Solution`, accelerations and multipliers with their certificate;
-* the methods: their table in ``backend``, the rule of choice in ``registry``, the order of rescue in ``solve``;
+* the methods: one a file, their table in ``backend``, the rule of choice in ``registry``, the order of rescue in ``solve``;
 * the path: ``solve`` → ``registry`` (backend) → ``answering`` (its answer) → ``certificate`` (the solution).
 """
 

@@ -6,18 +6,18 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.solution import Answer
 
-# Methods of our own, for equality rows: name, file and class. Files are imported when their method is first asked for:
-# scipy takes long. QP solvers join by name in :func:`gauss.backends.registry.make`.
+# Methods of our own, for equality rows: name, which is also that of the file, and class. Files are imported when their
+# method is first asked for: scipy takes long. QP solvers join by name in :func:`gauss.backends.registry.make`.
 BACKENDS = {
-    "recursion": ("closure", "Recursion"),
-    "kkt": ("dense_methods", "KKT"),
-    "schur": ("dense_methods", "Schur"),
-    "nullspace": ("dense_methods", "NullSpace"),
-    "pinv": ("dense_methods", "Pinv"),
-    "sparse": ("sparse_methods", "Sparse"),
-    "gradient": ("sparse_methods", "Gradient"),
-    "proximal": ("dense_methods", "Proximal"),
-    "svd": ("full_factor", "SVD"),
+    "recursion": "Recursion",
+    "kkt": "KKT",
+    "schur": "Schur",
+    "nullspace": "NullSpace",
+    "pinv": "Pinv",
+    "sparse": "Sparse",
+    "gradient": "Gradient",
+    "proximal": "Proximal",
+    "svd": "SVD",
 }
 
 

@@ -15,7 +15,6 @@ import numpy as np
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK, numerical_rank
-from gauss.backends.solution import Answer
 from gauss.backends.structure import Structure
 from gauss.backends.tree_factor import TreeFactor
 
@@ -170,17 +169,3 @@ def half_factors(tree, short, width: int) -> np.ndarray:
         for step, u in zip(tree.steps, short, strict=True)
     ]
     return np.concatenate([np.zeros((0, width)), *parts])
-
-
-class Recursion:
-    """The recursion, refined; equality rows only. The iterations count refinement steps."""
-
-    name = "recursion"
-
-    def __call__(self, compulsion: Compulsion) -> Answer:
-        """Solve."""
-        return Factor(compulsion).refined()[0]
-
-    def solve_with(self, factor: KKTFactor) -> tuple[Answer, Correction]:
-        """Answer by a given factorisation, and its last correction."""
-        return factor.refined()

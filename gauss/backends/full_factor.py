@@ -11,7 +11,6 @@ import numpy as np
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.rank import KKT_RANK, numerical_rank
-from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
 UNDETERMINED_MOTION = 1e-6  # accelerations in a null vector of length 1 that are more than round-off
@@ -82,13 +81,3 @@ def equilibrate(K: np.ndarray, sweeps: int = 3) -> np.ndarray:
         largest = np.abs(scale[:, None] * K * scale).max(axis=1)
         scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
     return scale
-
-
-class SVD:
-    """Full KKT matrix by singular values, refined; equality rows only. The iterations count refinement steps."""
-
-    name = "svd"
-
-    def __call__(self, compulsion: Compulsion) -> Answer:
-        """Solve."""
-        return FullFactor(compulsion).refined()[0]

@@ -108,8 +108,7 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
         if settings or form not in (None, "F2s"):
             settings = settings or {"form": form}
             raise BackendError(f"backend {backend!r} takes no settings, got {', '.join(settings)}.")
-        file, method = BACKENDS[backend]
-        return getattr(import_module(f"gauss.backends.{file}"), method)()
+        return getattr(import_module(f"gauss.backends.{backend}"), BACKENDS[backend])()
     programmed = import_module("gauss.backends.programmed").Programmed
     solver = backend.removeprefix("qpsolvers:")
     if not (is_installed(solver) if backend in DIRECT else solver in installed_solvers()):

@@ -27,8 +27,6 @@ class Column:
         Of breaks: whether values may jump where a number passes one of them; else only slopes do.
     """
 
-    __slots__ = ("__dict__", "digest", "jumps", "numbers")
-
     def __init__(self, numbers, jumps: bool = False):
         self.numbers, self.jumps = np.array(numbers, dtype=float), jumps
         self.numbers.setflags(write=False)

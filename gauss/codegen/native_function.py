@@ -51,8 +51,8 @@ class NativeFunction:
         return graph_of(given).call(self, given)
 
     def operations(self) -> dict[str, int]:
-        """Approximate number of operations of each kind."""
-        raise NotImplementedError
+        """Approximate number of operations of each kind; none by default, beside those of the functions that it calls."""
+        return {}
 
     def write(self, writer: "Writer", width: int) -> ir.Function:
         """Emit ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` for one vector width.

@@ -21,9 +21,8 @@ from gauss.codegen.schedule import Schedule
 from gauss.codegen.straight_line import Results, calling, passed_on, straight_line
 
 LONGEST_UNCUT = 2_000  # operations above which a function is outlined into pieces
-PIECE_LENGTH = (
-    800  # operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones
-)
+# operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones
+PIECE_LENGTH = 800
 # the same two on a GPU, whose threads have 255 registers of 32 bits: in the RK4 step of a biped with loops, loads and stores
 # of its frame and of spilled registers fall from 35 to 14 thousand, and the time of the assembler to a half
 DEVICE_LENGTHS = 1_000, 400

@@ -65,10 +65,6 @@ class PythonCallback(NativeFunction):
         """Numbers of inputs and of outputs."""
         return self.n_in, self.n_out
 
-    def operations(self) -> dict[str, int]:
-        """None are counted: what Python does is not known."""
-        return {}
-
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code, for one state at a time, whose inputs and outputs are contiguous."""
         body = self.begin_scalar(writer.module, width)

@@ -261,12 +261,7 @@ def as_doubles(given) -> np.ndarray | None:
     try:
         array = np.asarray(_as_array(given))
         return array.astype(float, copy=False) if array.dtype.kind in CONVERTIBLE_KINDS else None
-    except (
-        OverflowError,
-        TypeError,
-        ValueError,
-        RuntimeError,
-    ):  # the last of torch: gradients, a negative view
+    except (OverflowError, TypeError, ValueError, RuntimeError):  # the last of torch: gradients, a negative view
         return None
 
 

@@ -64,11 +64,4 @@ def _extreme(graph: "Graph", x: "Expression", y: "Expression") -> "Expression | 
 
 SIMPLIFIED = frozenset({"constant", "neg"})  # operands at which the rules look, beside two that are the same
 # rule of each operation: the simpler expression, or None
-SIMPLER: dict[str, Callable] = {
-    "add": _add,
-    "sub": _sub,
-    "mul": _mul,
-    "div": _div,
-    "min": _extreme,
-    "max": _extreme,
-}
+SIMPLER: dict[str, Callable] = {"add": _add, "sub": _sub, "mul": _mul, "div": _div, "min": _extreme, "max": _extreme}

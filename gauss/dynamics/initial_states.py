@@ -32,7 +32,7 @@ def scene_start(system: System) -> State:
         found.append(find() if start is None else start)
         return found[0], start is not None, system.rigid_joints
 
-    state, is_met, rigid_joints = cached_on_disk(system, (scene_start, given_starts(system)), make)
+    state, is_met, rigid_joints = cached_on_disk(system, (scene_start, system.starts), make)
     vars(system).setdefault("rigid_joints", rigid_joints)  # its own property, which would reduce the system to find them
     if not (found or is_met):
         return find()
@@ -51,12 +51,7 @@ def met_start(system: System) -> State | None:
         is_met = not (violations(system, start) or changed_starts(system, within_limits(system, given), start, names))
         return start if is_met else None
 
-    return cached(system, (met_start, given_starts(system)), make)
-
-
-def given_starts(system: System) -> tuple:
-    """Starts of a scene as a cache key: systems whose scenes differ in nothing else share their cache."""
-    return tuple(system.scene.starts.values())
+    return cached(system, (met_start, system.starts), make)
 
 
 def projected(system: System, state: State) -> State:

@@ -8,7 +8,6 @@ from gauss.backends.closure import Factor
 from gauss.backends.motions import Allowed, allowed
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.consistent_states import consistent
-from gauss.dynamics.initial_states import given_starts
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.store import cached
@@ -115,7 +114,7 @@ def mobility(system: System, state: State | None = None) -> Mobility:
 
 def mobility_at_start(system: System) -> Mobility:
     """Freedoms and redundant constraints at the start of the scene, found once."""
-    return cached(system, (mobility, given_starts(system)), lambda: mobility(system))
+    return cached(system, (mobility, system.starts), lambda: mobility(system))
 
 
 def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:

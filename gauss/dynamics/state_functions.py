@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
+from gauss.arguments import name_list
 from gauss.codegen import Function, Interface, PythonWrapper, batch_code, entry_code, fastcall, write
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.constrained_terms import ConstrainedTerms
@@ -155,7 +156,7 @@ def _request(system: System, name: str, reference: str) -> Request:
 
 def _columns(system: System, independent) -> tuple[int, ...]:
     """Places of independent coordinates in v."""
-    names = (independent,) if isinstance(independent, str) else tuple(independent)
+    names = name_list(independent, "independent", "names of joints or rates")
     columns = fixed_columns(system, names)
     freedoms = mobility_at_start(system).nearby
     if len(columns) != freedoms or len(set(columns)) != freedoms:

@@ -51,6 +51,7 @@ class MethodOnSystem(NamedTuple):
     budget: int  # steps of one call of the loop
     every: int  # steps between two checks of the accelerations
     order: float  # order of the method
+    checks_bodies: bool  # whether accelerations are checked body by body, which joints that close loops do not allow
 
 
 class CompiledRun:
@@ -93,11 +94,6 @@ class CompiledRun:
         make = lambda: kind(self.system, laws, self.drift, layout.memory, inputs=self.held is not None)  # noqa: E731
         return self._on_demand((Program, layout.memory), make)
 
-    @property
-    def checks_bodies(self) -> bool:
-        """Whether accelerations are checked body by body, which joints that close loops do not allow."""
-        return not self.system.has_closures and program_of(self.dynamics).checks_bodies
-
     def run(self):
         """Run until the end, or a status of :data:`UNTRUSTED`."""
         raise NotImplementedError
@@ -108,7 +104,8 @@ class CompiledRun:
         method_state, size = self._initial_method_state()
         layout = PointLayout(system.n_q, system.n_v, size, () if self.held is None else tuple(system.scene.inputs))
         budget = max(1, int(BUDGET * min(1.0, BUDGET_WORK / (max(1, system.n_v) ** 2 * method.evaluations))))
-        return MethodOnSystem(layout, method_state, budget, steps_per_check(method.evaluations), method.order)
+        checks_bodies = not system.has_closures and program_of(self.dynamics).checks_bodies
+        return MethodOnSystem(layout, method_state, budget, steps_per_check(method.evaluations), method.order, checks_bodies)
 
     def _initial_method_state(self) -> tuple[np.ndarray | None, int]:
         """Initial method state, the accelerations where None, and its size."""
@@ -236,7 +233,7 @@ class CompiledRun:
         this machine code, which is noted on disk, and later where the check fails. Other systems are checked body by body in
         machine code, at their last point, too.
         """
-        if self.checks_bodies:
+        if self.common.checks_bodies:
             return True
         packed = self.point
         checked: Sequence | np.ndarray = (self.control.constraint_residual,)  # the error by which the loop decides
@@ -266,7 +263,7 @@ class CompiledRun:
 
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
-        known = self.checks_bodies or self._is_certified()
+        known = self.common.checks_bodies or self._is_certified()
         return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECK_ERRORS])
 
     def _is_certified(self) -> bool:

@@ -15,7 +15,7 @@ from gauss.arguments import name_list, real_numbers
 from gauss.backends.structure import Structure
 from gauss.codegen import IS_CONTENT, Scalar
 from gauss.errors import StateError, require
-from gauss.scene import Scene
+from gauss.scene import Scene, Start
 from gauss.shapes import Shaped
 from gauss.system.contact_mode import sides, slips
 from gauss.system.dynamics_protocol import Dynamics
@@ -108,6 +108,11 @@ class System(NamedPlaces, StateFunctions):
     def n_v(self) -> int:
         """Number of rates, p."""
         return self.joints[-1].v.stop
+
+    @cached_property
+    def starts(self) -> tuple[Start, ...]:
+        """Starts of the joints: in the key of what depends on them, for systems that differ in them alone share a cache."""
+        return tuple(self.scene.starts.values())
 
     @cached_property
     def losses(self) -> tuple[str, ...]:

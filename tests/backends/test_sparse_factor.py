@@ -5,8 +5,9 @@ import pytest
 
 import gauss
 from gauss.backends.certificate import TOLERANCE, certify
-from gauss.backends.closure import Factor, Recursion
+from gauss.backends.closure import Factor
 from gauss.backends.factorisation import SPARSE_FROM_ROWS, factors
+from gauss.backends.recursion import Recursion
 from gauss.backends.sparse_factor import SparseFactor
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.dynamics.kinematics import kinematics
-from gauss.errors import SimulationError, StateError
+from gauss.errors import ArgumentError, SimulationError, StateError
 from gauss.system import State, random_state, retract
 from tests.support import mechanisms
 from tests.support.state_functions import names, relative
@@ -272,6 +272,8 @@ def test_coordinates_that_determine_nothing_are_refused():
         system.null_space(start.q, independent="guide")
     with pytest.raises(StateError, match="q does not meet the constraints, by "):
         system.null_space(start.q + 0.1, independent="A")
+    with pytest.raises(ArgumentError, match="independent"):
+        system.mass_matrix(start.q, independent=3)
 
 
 def test_derivatives_of_a_joint_that_moves_no_inertia_are_refused():

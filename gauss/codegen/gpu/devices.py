@@ -117,15 +117,10 @@ def is_single(name: str) -> bool:
 
 
 def double_precision(given) -> str:
-    """Name of devices that move motions, which are checked to more digits than single precision has.
+    """Name, as of :func:`device_name`, of devices that move motions; single precision is too little for their checks.
 
     ArgumentError if it is no such name.
     DeviceError if it asks for single precision.
-
-    Parameters
-    ----------
-    given : str or sequence of str
-        As of :func:`device_name`.
     """
     name = device_name(given)
     if is_single(name):
@@ -134,16 +129,11 @@ def double_precision(given) -> str:
 
 
 def devices(name: str) -> tuple[Device, ...]:
-    """Devices of a name.
+    """Devices of a name as of :func:`device_name`.
 
     ArgumentError if it is no such name.
     MissingPackageError if cuda-bindings is not installed.
     DeviceError if there is no driver, or no such device.
-
-    Parameters
-    ----------
-    name : str
-        As of :func:`device_name`.
     """
     own = device_name(name).removesuffix(f" {SINGLE}").replace(f" {SINGLE},", ",").split(",")
     return tuple(_device(None if one == "lanes" else int(one.partition(":")[2])) for one in own)

@@ -41,65 +41,50 @@ class OnDevice:
         self.program(device)(threads, arguments, device.stream)
 
     def in_parts(self, count: int, bytes_of_one: int, work: Callable[[Device, slice], None], what: str):
-        """Work on parts of a batch, as :func:`gauss.codegen.gpu.on_device.in_parts`, beside the frames of the threads."""
-        free_bytes = lambda device: device.free_bytes() - self.program(device).memory_bytes  # noqa: E731
-        in_parts(self.devices, free_bytes, count, bytes_of_one, work, what)
+        """Work on all parts of a batch; devices take the parts that are left, one after the other, until one fails.
 
+        DeviceError if one member alone does not fit beside the frames of the threads.
 
-def in_parts(
-    devices: Sequence[Device],
-    free_bytes: Callable[[Device], int],
-    count: int,
-    bytes_of_one: int,
-    work: Callable[[Device, slice], None],
-    what: str,
-):
-    """Work on all parts of a batch; devices take the parts that are left, one after the other, until one fails.
+        Parameters
+        ----------
+        count : int
+            Length of the batch.
+        bytes_of_one : int
+            Memory of one member [bytes].
+        work : callable
+            ``work(device, part)``.
+        what : str
+            What one member is, and what makes it smaller, for the message.
+        """
+        own, lock, begun = self.devices, Lock(), 0
 
-    DeviceError if one member alone does not fit.
+        def part_for(device: Device) -> slice:
+            nonlocal begun
+            free = SHARE_OF_MEMORY * (device.free_bytes() - self.program(device).memory_bytes)
+            fits = int(free / max(bytes_of_one, 1))
+            if fits < 1:
+                raise DeviceError(
+                    f"device {device.name!r}: {what} ({bytes_of_one / 1e6:.4g} MB; {max(free, 0) / 1e6:.4g} MB are there)."
+                )
+            with lock:
+                first = begun
+                begun = min(begun + min(fits, -(-count // len(own))), count)
+                return slice(first, begun)
 
-    Parameters
-    ----------
-    free_bytes : callable
-        Memory of a device that a batch may take [bytes].
-    count : int
-        Length of the batch.
-    bytes_of_one : int
-        Memory of one member [bytes].
-    work : callable
-        ``work(device, part)``.
-    what : str
-        What one member is, and what makes it smaller, for the message.
-    """
-    lock, begun = Lock(), 0
+        def run(device: Device):
+            nonlocal begun
+            try:
+                while begun < count:
+                    part = part_for(device)
+                    if part.stop > part.start:
+                        work(device, part)
+            except BaseException:
+                begun = count
+                raise
 
-    def part_for(device: Device) -> slice:
-        nonlocal begun
-        free = SHARE_OF_MEMORY * free_bytes(device)
-        fits = int(free / max(bytes_of_one, 1))
-        if fits < 1:
-            raise DeviceError(
-                f"device {device.name!r}: {what} ({bytes_of_one / 1e6:.4g} MB; {max(free, 0) / 1e6:.4g} MB are there)."
-            )
-        with lock:
-            first = begun
-            begun = min(begun + min(fits, -(-count // len(devices))), count)
-            return slice(first, begun)
-
-    def run(device: Device):
-        nonlocal begun
-        try:
-            while begun < count:
-                part = part_for(device)
-                if part.stop > part.start:
-                    work(device, part)
-        except BaseException:
-            begun = count
-            raise
-
-    if len(devices) == 1:
-        run(devices[0])
-        return
-    with ThreadPoolExecutor(len(devices)) as pool:
-        for done in [pool.submit(run, device) for device in devices]:
-            done.result()
+        if len(own) == 1:
+            run(own[0])
+            return
+        with ThreadPoolExecutor(len(own)) as pool:
+            for done in [pool.submit(run, device) for device in own]:
+                done.result()

@@ -8,7 +8,7 @@ others.
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, Writer, intrinsic, processor
+from gauss.codegen import INTEGER, Writer, processor
 from gauss.codegen.kernels.adaptive import LAST_STEP_SHARE, PROJECTION_FAILED_FACTOR, TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
 from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD
@@ -16,16 +16,8 @@ from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import LoopStatus, Numbers, numbers
 
 NAME, POINTERS = "adaptive_batch", ("control", "lanes", "motions", "grid", "out")
-MOTION_RECORD = (
-    "h",
-    "refused",
-    "sample",
-    "due",
-    "steps",
-    "rejected",
-    "worst",
-    *ENERGY_RECORD,
-)  # record of a motion, behind its point
+# record of a motion, behind its point
+MOTION_RECORD = ("h", "refused", "sample", "due", "steps", "rejected", "worst", *ENERGY_RECORD)
 
 
 @numbers
@@ -243,8 +235,7 @@ class _AdaptiveBatchWriter:
         code.add("turns")
         with b.if_then(b.and_(code.is_multiple("turns", "every"), self.lanes.any_lane(reached))):
             code.call(self.method.check, self.projected, self.error)
-            larger = intrinsic(code.writer.module, "llvm.maximum", self.lanes.kind, 2)  # propagates NaN
-            found = b.call(larger, [self._take("worst"), code.take(self.error, 0)])
+            found = code.larger(self._take("worst"), code.take(self.error, 0))
             self._put(b.select(reached, found, self._take("worst")), "worst")
             record = [self._take(name) for name in ENERGY_RECORD]
             following = code.energies_after(record, self.projected, self.error)

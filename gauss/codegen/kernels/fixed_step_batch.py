@@ -6,7 +6,7 @@ begins, so that it stays in the first-level cache; a motion does not depend on t
 
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, Function, Writer, intrinsic, processor
+from gauss.codegen import INTEGER, Function, Writer, processor
 from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record
 from gauss.codegen.kernels.fixed_step import Fixed
@@ -135,13 +135,13 @@ def write_fixed_step_batch(
             _raise(code, worst, 1, code.take(reached, size))
             _raise(code, worst, 2, code.take(reached, size + 4))
             _raise(code, worst, 3, code.take(reached, size + 3))
-            due = b.or_(_is_multiple(code, done, "every"), b.icmp_signed("==", done, last))
+            due = b.or_(code.is_multiple(done, "every"), b.icmp_signed("==", done, last))
             with b.if_then(due):
                 code.call(method.check, reached, error)
                 _raise(code, worst, 0, code.take(error, 0))
                 record = [code.take(worst, WORST_RECORD.index(name)) for name in ENERGY_RECORD]
                 _keep(code, worst, code.energies_after(record, reached, error))
-            with b.if_then(_is_multiple(code, done, "keep")):
+            with b.if_then(code.is_multiple(done, "keep")):
                 _write_rows(code, reached, written, column, b.sdiv(done, code.index("keep")))
         _scatter(code, points, given, columns, size)
         _scatter(code, worsts, worst, columns, len(WORST_RECORD))
@@ -189,15 +189,10 @@ def _write_rows(code: LoopCode, room, written: slice, column, row):
 
 def _raise(code: LoopCode, room, k: int, value):
     """Raise an entry to a larger value; NaN propagates."""
-    larger = intrinsic(code.writer.module, "llvm.maximum", code.lanes.kind, 2)
-    code.put(code.b.call(larger, [code.take(room, k), value]), room, k)
+    code.put(code.larger(code.take(room, k), value), room, k)
 
 
 def _keep(code: LoopCode, room, record):
     """Store an energy record."""
     for name, value in zip(ENERGY_RECORD, record, strict=True):
         code.put(code.lanes.constant(value) if isinstance(value, float) else value, room, WORST_RECORD.index(name))
-
-
-def _is_multiple(code: LoopCode, count, of: str):
-    return code.b.icmp_signed("==", code.b.srem(count, code.index(of)), INTEGER(0))

@@ -17,6 +17,7 @@ from gauss.codegen import (
     copy,
     counted_loop,
     endless_loop,
+    intrinsic,
 )
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, update
 from gauss.codegen.kernels.loop_control import Control, Numbers
@@ -77,9 +78,14 @@ class LoopCode:
         amount = self.number(amount) if isinstance(amount, int | float) else amount
         self.set(name, self.b.fadd(self.get(name), amount))
 
-    def is_multiple(self, counter: str, of: str):
-        """Whether a counter is a multiple of another number."""
-        return self.b.icmp_signed("==", self.b.srem(self.index(counter), self.index(of)), INTEGER(0))
+    def is_multiple(self, counter, of: str):
+        """Whether a counter, by its name, or another integer is a multiple of a number of the control."""
+        k = self.index(counter) if isinstance(counter, str) else counter
+        return self.b.icmp_signed("==", self.b.srem(k, self.index(of)), INTEGER(0))
+
+    def larger(self, x, y):
+        """Larger of two numbers in each lane, NaN if one is."""
+        return self.b.call(intrinsic(self.writer.module, "llvm.maximum", self.lanes.kind, 2), [x, y])
 
     def index(self, name: str):
         """Load a counter as an integer."""

@@ -141,10 +141,6 @@ class RowFunction(NativeFunction):
         """Numbers of inputs and of outputs."""
         return self.n_in, self.n_out
 
-    def operations(self) -> dict[str, int]:
-        """None are counted: loops over entries are little beside the functions that they call."""
-        return {}
-
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code for one motion, or for one per SIMD lane."""
         code = RowCode(writer, self.begin(writer.module), width)

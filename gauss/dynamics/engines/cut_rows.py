@@ -22,7 +22,7 @@ from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine, rates_of
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
-from gauss.dynamics.engines.held_joints import HeldJoint
+from gauss.dynamics.engines.held_joints import HeldJoint, held_rows
 from gauss.dynamics.engines.tiering import tiered_kernels
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan
@@ -62,7 +62,7 @@ def cut_rows(
     """Rows of a phase to be cut: links with losses, with the directions of power flow of its mode, and held joints."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if mode.power_flow.get(name) and name in places}
-    names, rows = (*links, *(joint.name for joint in held)), [{joint.v: joint.sign} for joint in held]
+    names, rows = (*links, *(joint.name for joint in held)), held_rows(held)
     R = _matrix(system, [_places(system, link.acts_on) for link in links.values()] + rows)
     W = _matrix(system, [_places(system, joint_factors(link, mode.power_flow[name])) for name, link in links.items()] + rows)
     columns = [*(system.column(link.driven) for link in links.values()), *(joint.v for joint in held)]

@@ -150,8 +150,8 @@ class SwitchingFunctions:
         nodes, parts = enclosed_parts(self.system, begin, first, end, last)
         ends = [list(self._values(node)) for node in nodes]
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
-        ends_of_all = (self._enclosures(np.ravel(part)).reshape(-1, 2) for part in parts)
-        enclosed = [_divided(starmap(Interval, own), *self._counts) for own in ends_of_all]
+        of_part = lambda part: starmap(Interval, self._enclosures(np.ravel(part)).reshape(-1, 2))  # noqa: E731
+        enclosed = [_divided(of_part(part), *self._counts) for part in parts]
         tops = [
             upper_bounds(values[conditions:], rates[conditions:], (ends[j][conditions:], ends[j + 1][conditions:]), tau)
             for j, (values, rates, _, _) in enumerate(enclosed)
