@@ -161,3 +161,17 @@ def test_steps_in_which_a_body_turns_too_far_add_no_speed(plan, step):
     except SimulationError:
         return
     assert np.abs(motion.v).max() < FASTER * np.abs(spin).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plan", [KERNELS, WRITTEN_OUT], ids=str)
+def test_steps_that_fail_because_a_body_turns_too_far_are_named(plan):
+    scene, step = floor("spinning box"), 0.01
+    scene.body("box", 1.0, (0.01, 0.02, 0.03))
+    scene.free("floats", "ground", "box")
+    scene.box("cuboid", "box", size=(0.2, 0.3, 0.4))
+    scene.contacts_all(friction=0.3)
+    spin = 3.0 / step  # rad a step
+    scene.start("floats", position=(0, 0, 0.6, 1, 0, 0, 0), rate=(0, 0, 0, 0.3 * spin, spin, 0.2 * spin))
+    with np.errstate(all="ignore"), pytest.raises(SimulationError, match=f"^t = .*{step} s: "):
+        gauss.simulate(scene, 0.5, integrator="time_stepping", step=step, plan=plan, progress=False)

@@ -13,8 +13,11 @@ minimum of a function, and may have no solution. Then the convex relaxation (Ani
 ½ fᵀ W f + bᵀ f over the friction cones: it always exists, but its contacts open a little while they slide.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
+from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +27,7 @@ from gauss.codegen import Function, from_disk, jacobian, write
 from gauss.codegen.kernels import CompiledContactSolver, ContactSolver, Round
 from gauss.dynamics.contact.convex_relaxation import CONVEX_ERROR, CONVEX_STEPS, least_over_cones, on_cones
 from gauss.errors import SimulationError
+from gauss.system import State, System
 
 LAW_TOLERANCE = 1e-10  # error of the laws that ends Newton's method, in units of the scene times 1 + the largest rate
 ACCEPTED_LAW_ERROR = 1e-7  # the same: accepted error where many contacts of one body share its forces
@@ -37,6 +41,9 @@ ROUNDS_OF_DENSE = (
     Round(0, 1e-7, 10),
     Round(30, 0.0, 15),
     Round(300, 0.0, 15),
+)
+MOST_TURNED = (
+    1.0  # rad, and lengths of the scene, by which coordinates move in a step: longer ones are named where steps fail
 )
 LEAST_DIAGONAL = 1e-14  # relative to the largest diagonal entry of W: smaller rows are empty
 
@@ -115,6 +122,20 @@ class ContactProblem:
         f[laws.under], f[laws.across] = on_cones(f[laws.under], f[laws.across], laws.friction)
         f[laws.set_valued] = np.clip(f[laws.set_valued], -laws.limit, laws.limit)
         return f
+
+
+@contextmanager
+def errors_of_step(system: System, state: State, h: float) -> Iterator[None]:
+    """Let errors of a step of length h [s] name its time, and its length where bodies turn too far in it."""
+    try:
+        yield
+    except SimulationError as error:
+        text, moved = str(error), h * system.scale.fastest(state.v)
+        text = text if text.startswith("t = ") else f"t = {state.t:.6g} s: {text}"
+        if not moved <= MOST_TURNED:
+            far = f"coordinates move by {moved:.2g} rad or lengths of the scene in a step of {h:.3g} s: give a shorter one."
+            text = f"t = {state.t:.6g} s: {far}" + (f" {text}" if isfinite(moved) else "")  # else nothing is to be trusted
+        raise SimulationError(text) from error
 
 
 def unilateral(f):

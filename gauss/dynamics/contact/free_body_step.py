@@ -15,7 +15,7 @@ from gauss.codegen.kernels import BlockContactSolver, ContactGraph, NearPairs
 from gauss.dynamics.contact.compiled_free_body_step import FreeBodyMemory, KnownContacts, compiled_free_body_step
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
-from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem
+from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem, errors_of_step
 from gauss.dynamics.contact.convex_relaxation import CONVEX_ERROR, relaxed_impulses
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
@@ -155,7 +155,8 @@ class FreeBodyStepper:
             if share == self.shares[-1] or not self._impacts(near, begun, known, h, share).any():
                 break
         for _ in range(ATTEMPTS):
-            force, added, error = self._solve(near, begun, known, h, share)
+            with errors_of_step(self.system, state, h):
+                force, added, error = self._solve(near, begun, known, h, share)
             after = begun.both[..., 1].copy()
             after[: self.n, :6] += added
             reached = self.speed(after)

@@ -16,7 +16,7 @@ from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.contact.compiled_mechanism_step import KnownForces, MechanismMemory, compiled_mechanism_step
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord
-from gauss.dynamics.contact.contact_step import ContactProblem
+from gauss.dynamics.contact.contact_step import ContactProblem, errors_of_step
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.free_body_step import ATTEMPTS, REACH_MARGIN
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
@@ -204,7 +204,8 @@ class MechanismStepper:
         rest = self.rest(state.v)
         share, begun, near, rows, speed = self._open(state, h, rest)
         for _ in range(ATTEMPTS):
-            force, added, error = self._solve(state, rows, begun, near, h, rest, share)
+            with errors_of_step(self.system, state, h):
+                force, added, error = self._solve(state, rows, begun, near, h, rest, share)
             acceleration = begun.acceleration + added
             reached = self._speed(begun, state.v + h * acceleration)
             if reached <= REACH_MARGIN * speed:

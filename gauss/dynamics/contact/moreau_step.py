@@ -20,7 +20,7 @@ from gauss.codegen import Expression, Scalar, write
 from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import contact_scales, gap_scales
-from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, laws_of
+from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, errors_of_step, laws_of
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
@@ -127,10 +127,11 @@ class MoreauStepper:
 
         SimulationError if shapes overlap unseen by their gap functions, or no forces are found.
         """
-        if start is not None:
-            return self._step(state, h, start, last, before)
-        found = self._step(state, h, np.zeros(self.unit.size), last, 0.0)
-        return self._step(state, h, found.force, last, found.share) if found.share else found
+        with errors_of_step(self.system, state, h):
+            if start is not None:
+                return self._step(state, h, start, last, before)
+            found = self._step(state, h, np.zeros(self.unit.size), last, 0.0)
+            return self._step(state, h, found.force, last, found.share) if found.share else found
 
     def _step(self, state: State, h: float, start: np.ndarray, last: bool, before: float) -> MoreauStep:
         rest, force = self.rest(state.v), start / self.unit
