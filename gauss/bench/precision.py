@@ -19,7 +19,7 @@ from gauss.backends import available
 from gauss.bench.contest import with_time
 from gauss.bench.extrapolation import extrapolated
 from gauss.bench.levels import AUTO
-from gauss.bench.measurement import chosen
+from gauss.bench.table import chosen
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import position_residual
 from gauss.errors import BalanceWarning, GaussError, SimulationError, did_you_mean
