@@ -68,7 +68,7 @@ def _beginnings(chain: str) -> Iterator[str]:
 @cache
 def _by_alias() -> dict[str, str]:
     """Public names by their full names in the packages that one types."""
-    found = {}
+    found: dict[str, str] = {}
     for name in (name for group in GROUPS for name in group.names):
         module, _, last = name.rpartition(".")
         thing = getattr(import_module(module), last)
