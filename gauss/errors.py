@@ -207,13 +207,7 @@ def extra(name: str = ""):
 
 @contextmanager
 def writing(path):
-    """Writing of a file or folder, for a ``with`` statement.
-
-    Raises
-    ------
-    FileError
-        If it cannot be written; the message says why.
-    """
+    """Writing of a file or folder, for a ``with`` statement; FileError with the reason if it cannot be written."""
     try:
         yield
     except OSError as error:
@@ -255,10 +249,7 @@ def user_level() -> int:
 def require(value, kinds: tuple[type, ...], function: str):
     """Refuse an argument of a wrong type.
 
-    Raises
-    ------
-    ArgumentError
-        If it is none of these types; the message names the argument and the source of a right one.
+    ArgumentError if it is none of these types; the message names the argument and the source of a right one.
     """
     if isinstance(value, kinds):
         return

@@ -6,14 +6,9 @@ import numpy as np
 
 
 class LinkedGroups:
-    """Groups of numbered things, which links join.
+    """Groups of numbered things, each alone at first, which links join.
 
     Paths are halved as they are walked: Tarjan and van Leeuwen, J. ACM 31 (1984), 245–281.
-
-    Parameters
-    ----------
-    count : int
-        Number of things; at first, each is a group of its own.
     """
 
     def __init__(self, count: int):
@@ -37,15 +32,7 @@ class LinkedGroups:
 
 
 def linked_groups(count: int, links: Iterable[tuple[int, int]]) -> np.ndarray:
-    """Group (count,) of each thing: the smallest number in it.
-
-    Parameters
-    ----------
-    count : int
-        Number of things.
-    links : iterable of (int, int)
-        Pairs that belong together.
-    """
+    """Group (count,) of each thing, the smallest number in it, by pairs that belong together."""
     groups = LinkedGroups(count)
     for one, other in links:
         groups.join(one, other)

@@ -37,33 +37,16 @@ def absent_packages(extra: str) -> list[str]:
 def warn_of_former_name(former: str, current: str, stacklevel: int = 2) -> None:
     """Say what a former name is called now, and when it goes, by a DeprecationWarning.
 
-    Parameters
-    ----------
-    former, current : str
-        The name that was used, and the one of today.
-    stacklevel : int
-        As of ``warnings.warn``, counted from the caller.
+    ``stacklevel``: as of ``warnings.warn``, counted from the caller.
     """
     text = f"{former} is called {current} now; the former name goes in version {REMOVAL}."
     warn(text, DeprecationWarning, stacklevel=stacklevel + 1)
 
 
 def current_name(module: str, renamed: dict[str, str], name: str) -> str:
-    """Today's name of what is asked for by a former one, with a DeprecationWarning.
+    """Today's name of what a module is asked for by a former one, with a DeprecationWarning.
 
-    Parameters
-    ----------
-    module : str
-        Full name of the module that is asked.
-    renamed : dict
-        Former names, and those of today.
-    name : str
-        The name.
-
-    Raises
-    ------
-    AttributeError
-        If it is no former name.
+    AttributeError if it is no former name.
     """
     if name not in renamed:
         raise AttributeError(f"module {module!r} has no attribute {name!r}")
@@ -72,13 +55,7 @@ def current_name(module: str, renamed: dict[str, str], name: str) -> str:
 
 
 class FormerAttribute:
-    """Former name of an attribute: its value, with a DeprecationWarning.
-
-    Parameters
-    ----------
-    current : str
-        Name of the attribute today.
-    """
+    """Former name of an attribute: its value, by its name of today, with a DeprecationWarning."""
 
     def __init__(self, current: str):
         self.current = current

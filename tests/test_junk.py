@@ -6,6 +6,7 @@ import pytest
 import gauss
 from gauss import export, rotors, servo
 from gauss.errors import GaussError
+from gauss.scene.actuators import pi_controller
 
 JUNK = {
     "text": "x",
@@ -43,6 +44,11 @@ def _network():
     network = rotors.Network("one")
     network.shaft("A", 1.0)
     return network
+
+
+def _held(**options):
+    lean = servo.ServoRelation("lean", lambda t, motion: motion.coordinate("pin"))
+    return servo.Servo(gauss.load("cart_pole"), [lean], [servo.Motor("motor", "rail")], **options)
 
 
 def _driven(law):
@@ -103,6 +109,28 @@ CALLS = {
     "body: com": lambda junk: gauss.Scene("s").body("b", 1.0, com=junk),
     "drive: law": lambda junk: gauss.simulate(_driven(lambda t: junk), 0.1),
     "servo.simulate": lambda junk: servo.simulate(junk, 0.1),
+    "servo.solve": lambda junk: servo.solve(junk, SYSTEM.initial_state()),
+    "servo.realisable": lambda junk: servo.realisable(junk),
+    "servo.equilibrium": lambda junk: servo.equilibrium(junk),
+    "servo.explain": lambda junk: servo.explain(junk),
+    "servo.initial_state": lambda junk: servo.initial_state(junk),
+    "servo.lagrange": lambda junk: servo.lagrange(junk, SYSTEM.initial_state()),
+    "servo.energy": lambda junk: servo.energy(junk),
+    "servo: weights": lambda junk: _held(weights=junk),
+    "crossings: trajectory": lambda junk: gauss.crossings(junk, lambda at: 1.0),
+    "friction_problem: step": lambda junk: gauss.friction_problem(SYSTEM, step=junk),
+    "rollout: integrator": lambda junk: gauss.rollout(SYSTEM, [[0.0]], [[0.0]], steps=2, step=0.1, integrator=junk),
+    "SimulatorBatch: integrator": lambda junk: gauss.SimulatorBatch(SYSTEM, 0.1, 2, junk),
+    "sweep: measure": lambda junk: gauss.sweep(PENDULUM, {"gravity.y": [-9.0]}, 0.1, measure=junk),
+    "output": lambda junk: gauss.Trajectory.from_coordinates(SYSTEM, TIMES, ROWS).output(junk),
+    "start: position": lambda junk: gauss.load("pendulum").start("A", junk),
+    "drive: joint": lambda junk: gauss.load("pendulum").drive(junk, torque=1.0),
+    "drive: breaks": lambda junk: gauss.load("pendulum").drive("A", torque=lambda t: 0.0, breaks=junk),
+    "guide: along": lambda junk: gauss.load("pendulum").guide("g", "rod", (0.0, 0.0, 0.0), along=junk),
+    "linear_coupling": lambda junk: gauss.load("pendulum").linear_coupling("c", junk),
+    "contacts_all: exclude": lambda junk: gauss.load("pendulum").contacts_all(exclude=junk),
+    "mesh: faces": lambda junk: gauss.Scene("s").mesh("m", "ground", np.eye(4, 3), faces=junk),
+    "pi_controller": lambda junk: pi_controller(gauss.load("pendulum"), "c", "A", 0.5, proportional=junk, integral=1.0),
 }
 
 

@@ -21,7 +21,7 @@ from gauss.dynamics.loads import Applied
 from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, did_you_mean, require
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.simulation.moreau.moreau_jean import contact_parts, step_at
+from gauss.simulation.moreau.moreau_jean import contact_parts, steps_at
 from gauss.system import sides
 
 NOT_UNIQUE = (
@@ -234,9 +234,10 @@ def _parts(trajectory: Trajectory, samples: Iterable[int]):
             for index in samples:
                 yield stepper.forces_over(trajectory.state(index), trajectory.step)
         return
+    step_at = steps_at(trajectory)
     for index in samples:
         motion = kinematics(trajectory.system, trajectory.state(index))
-        yield contact_parts(motion, step_at(trajectory, index).force)
+        yield contact_parts(motion, step_at(index).force)
 
 
 def _least(forces: np.ndarray, free: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from gauss.errors import NonUniqueReactionWarning, StateError, require
 from gauss.scene import Contact
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
+from gauss.simulation.trajectory import is_index
 
 NEAR = 1e-3  # of the scene's length: what touches is nearer, and what a step of time stepping may close
 
@@ -109,9 +110,8 @@ def contact_points(trajectory: Trajectory, sample: int = -1, backend: str | Back
     ContactPoints(4 points of 1 contacts at 0.05 s)
     """
     require(trajectory, (Trajectory,), "contact_points")
-    require(sample, (int, np.integer), "contact_points: sample")
-    if not -len(trajectory) <= sample < len(trajectory):
-        raise StateError(f"contact_points: expected a sample from 0 to {len(trajectory) - 1}, got {sample}.")
+    if not is_index(sample, len(trajectory)):
+        raise StateError(f"contact_points: expected a sample from 0 to {len(trajectory) - 1}, got {sample!r:.80}.")
     index = range(len(trajectory))[sample]
     rows = _of_step(trajectory, index) if by_pair_kernels(trajectory) else _of_gaps(trajectory, index, backend)
     system, shapes = trajectory.system, trajectory.system.scene.shapes

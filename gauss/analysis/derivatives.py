@@ -13,7 +13,7 @@ from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.constraint_leak import LARGEST_LEAK, constraint_leak, may_leak
 from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, on_boundary
-from gauss.dynamics.laws.law_kinks import kinked_laws
+from gauss.dynamics.laws.load_jumps import kinked_laws
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.null_space_dynamics import NullSpaceDynamics
 from gauss.dynamics.plan import DERIVATIVES

@@ -18,8 +18,7 @@ from gauss.analysis.sensitivity.timed_steps import timed_steps
 from gauss.arguments import name_list, real_array, table
 from gauss.dynamics import compile_scene
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.parameters import numbers
-from gauss.dynamics.parametrised_system import parametrised
+from gauss.dynamics.parameters import numbers, parametrised
 from gauss.errors import ArgumentError, GaussError, SceneError, StateError, did_you_mean
 from gauss.scene import Scene
 from gauss.scene.named_numbers import POSITIVE, scene_of, value_of

@@ -18,7 +18,7 @@ from gauss.errors import NonUniqueReactionWarning, StateError, did_you_mean, req
 from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.simulation.moreau.moreau_jean import step_at
+from gauss.simulation.moreau.moreau_jean import steps_at
 from gauss.system import System
 
 
@@ -218,7 +218,7 @@ def set_valued_forces(trajectory: Trajectory, name: str, backend: str | Backend 
         raise StateError(f"nothing of the name {name!r} holds up to a limit or loses power. {did_you_mean(name, elements)}")
     if trajectory.step is not None:
         which = list(scene.set_valued).index(name) - len(scene.set_valued)
-        return np.array([step_at(trajectory, i).force[which] for i in range(len(trajectory))])
+        return np.array([step.force[which] for step in map(steps_at(trajectory), range(len(trajectory)))])
     return np.array([forces[name] for forces in _mode_forces(trajectory, backend)])
 
 

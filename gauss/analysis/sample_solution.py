@@ -11,7 +11,7 @@ from gauss.codegen import Scalar
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.contact.mode_selection import active_mode
 from gauss.errors import SimulationError
-from gauss.simulation.moreau.moreau_jean import step_at, with_forces
+from gauss.simulation.moreau.moreau_jean import steps_at, with_forces
 from gauss.simulation.trajectory import Trajectory
 
 
@@ -24,7 +24,7 @@ def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
     """
     system, state = trajectory.system, trajectory.state(index)
     if trajectory.step is not None:
-        return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
+        return with_forces(trajectory.motions[index], steps_at(trajectory)(index).force, backend)
     if system.set_valued.placed or system.losses:
         return active_mode(system, state, backend=backend).solution
     solution = solve(assemble(system, state), backend)

@@ -156,7 +156,7 @@ def _report_servo(tracking):
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
     servo = tracking.servo
-    units = import_module("gauss.servo.effort_units").effort_units(servo)
+    units = servo.effort_units
     for name, unit, u, work in zip(servo.efforts, units, tracking.efforts.T, tracking.work.T, strict=True):
         typer.echo(f"  effort {name!r}: {u.min():.6g} … {u.max():.6g} {unit}, work {work[-1]:.6g} J")
 

@@ -3,23 +3,21 @@ from gauss.codegen.branches import branches
 from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
-from gauss.codegen.device_module import DeviceModule, vector_width
 from gauss.codegen.disk_cache import from_disk, is_noted, note
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Entry, Expression, Scalar, as_number, graph_of, reachable
 from gauss.codegen.fastcall import EntryCode, entry_code, fastcall, made_from
-from gauss.codegen.function import Function, count, write
+from gauss.codegen.function import Function, count, fresh_symbols, outlined, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.graph import Graph
-from gauss.codegen.intrinsics import copy, external, intrinsic
 from gauss.codegen.ir_blocks import BODY, POINTER, Buffers, constant_array, counted_loop, endless_loop
+from gauss.codegen.ir_module import DOUBLE, INTEGER, DeviceModule, copy, external, intrinsic, vector_width
 from gauss.codegen.kernel import CallingKernel, Kernel, trace
-from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
+from gauss.codegen.lanes import FLAGS, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
 from gauss.codegen.lookup import LOOKUPS, Column, looked_up
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.optimiser import one_tier
-from gauss.codegen.outlining import fresh_symbols, outlined
 from gauss.codegen.python_callback import PythonCallback, Receiver, callbacks_are_available
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series

@@ -14,11 +14,11 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import machine, processor
-from gauss.codegen.blocks import SHORTEST_OF_ROWS, STATES, StateBlocks, has_blocks, vectors_of
-from gauss.codegen.emit import Writer
+from gauss.codegen.emit import SHORTEST_OF_ROWS, STATES_PER_BLOCK, StateBlocks, Writer, has_blocks, vectors_of
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER, Buffers, counted_loop
-from gauss.codegen.lanes import DOUBLE, INTEGER, LANE, kind, lane_indices
+from gauss.codegen.ir_module import DOUBLE, INTEGER, LANE, joined_numbers, lane_indices
+from gauss.codegen.lanes import kind
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface
 
@@ -26,13 +26,7 @@ SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p)
 
 
 class BatchCode(NamedTuple):
-    """Machine code of a function over rows.
-
-    Attributes
-    ----------
-    code : MachineCode
-        The code.
-    """
+    """Machine code of a function over rows."""
 
     code: machine.MachineCode
 
@@ -65,15 +59,7 @@ class BatchEntry:
 
 
 def batch_code(function: Function | NativeFunction, interface: Interface) -> BatchCode:
-    """Machine code of a function over rows.
-
-    Parameters
-    ----------
-    function : Function or NativeFunction
-        Its inputs are the vectors and the number, concatenated; its outputs are the results and the limited quantities.
-    interface : Interface
-        Arguments, results and limits.
-    """
+    """Machine code over rows of a function as of :func:`gauss.codegen.entry_code`."""
     writer, width = Writer(), processor.width()
     try:
         called = writer.block(function, width) if has_blocks(function, SHORTEST_OF_ROWS) else writer.body(function, width)
@@ -89,7 +75,7 @@ class _BatchWriter:
 
     def __init__(self, writer: Writer, called: ir.Function | StateBlocks, width: int):
         self.width, self.called = width, called
-        self.states = STATES if isinstance(called, StateBlocks) else width  # side by side in a buffer
+        self.states = STATES_PER_BLOCK if isinstance(called, StateBlocks) else width  # side by side in a buffer
         self.function = ir.Function(writer.module, ir.FunctionType(ir.VoidType(), [INTEGER, INTEGER.as_pointer()]), "batch")
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
         self.read = 0  # entries of the table that were read
@@ -166,7 +152,7 @@ class _BatchWriter:
         with counted_loop(b, INTEGER(0), INTEGER(size)) as k:
             offset = b.mul(k, stride)
             values = [b.load(b.gep(row, [offset])) for row in rows]
-            self._store(self._vector(values), target, self._offset(k, place))
+            self._store(joined_numbers(b, values), target, self._offset(k, place))
 
     def _scatter(self, rows, size: int, source, place: int):
         """Vectors of lanes, to entries of the rows: blocks are transposed in registers."""
@@ -206,14 +192,6 @@ class _BatchWriter:
                 found[i], found[i + step] = (self.b.shuffle_vector(one, other, lane_indices(order)) for order in (low, high))
             block, step = found, 2 * step
         return block
-
-    def _vector(self, values):
-        if self.width == 1:
-            return values[0]
-        vector = ir.Constant(kind(self.width), ir.Undefined)
-        for lane, value in enumerate(values):
-            vector = self.b.insert_element(vector, value, LANE(lane))
-        return vector
 
     def _load(self, pointer, offset):
         place = self.b.gep(pointer, [offset])

@@ -1,14 +1,13 @@
 """Functions with `if` over expressions: every path is traced, and the outputs of all paths are joined by selections.
 
 A path is the sequence of truth values of the comparisons met. The function is called once for each path, first with all
-true,
-then with the last free one set to false (depth first; King, Symbolic execution and program testing, Comm. ACM 19, 1976).
+true, then with the last free one set to false (depth first; King, Symbolic execution and program testing, Comm. ACM 19,
+1976).
 """
 
 import numpy as np
 
-from gauss.codegen import expression
-from gauss.codegen.expression import Expression
+from gauss.codegen.expression import Expression, decided_by
 from gauss.codegen.graph import COMPARISONS
 
 MOST_PATHS, LONGEST_PATH = 64, 64  # calls of a function, and comparisons in one call: a loop over time has no end
@@ -79,11 +78,8 @@ def branches(function):
         if calls > MOST_PATHS:
             raise TooManyBranches(f"it has more than {MOST_PATHS} paths")
         path = _Path(answers)
-        expression._paths.append(path)
-        try:
+        with decided_by(path):
             found = np.asarray(function(), dtype=object)
-        finally:
-            expression._paths.pop()
         for place in reversed(range(len(answers), len(path.conditions))):
             other = along([*answers, *[True] * (place - len(answers)), False])
             found = _joined(path.conditions[place], found, other)

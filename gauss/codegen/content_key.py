@@ -31,14 +31,9 @@ class IdentityKey:
 
 
 def content_key(thing, enclosing: tuple[int, ...] = ()) -> Hashable:
-    """Key of an object by its content.
+    """Key of an object (record, function, number, array, or a collection of these) by its content.
 
-    Parameters
-    ----------
-    thing : object
-        Record, function, number, array, or a collection of these.
-    enclosing : tuple of int
-        Addresses of the objects that contain it: a function may refer to itself.
+    ``enclosing`` are the addresses of the objects that contain it: a function may refer to itself.
     """
     kind = type(thing)
     if thing is None or kind in (str, bytes, bool, int, complex, np.bool_):

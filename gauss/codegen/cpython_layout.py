@@ -13,23 +13,18 @@ from functools import cache
 
 import numpy as np
 
-TABLE_ENTRIES = (
-    "ndarray",
-    "float",
-    "none",
-    "out",
-    "fallback",
-    "over_limit",
-    "vectorcall",
-    "tuple_size",
-    "tuple_item",
-    "float_value",
-    "incref",
-    "new_float",
-    "new_tuple",
-    "set_item",
-    "new_array",
-)  # names of the entries of the address table
+PINNED = "ndarray", "float", "none", "out", "fallback", "over_limit"  # objects in the address table
+FUNCTIONS = {
+    "vectorcall": "PyObject_Vectorcall",
+    "tuple_size": "PyTuple_Size",
+    "tuple_item": "PyTuple_GetItem",
+    "float_value": "PyFloat_AsDouble",
+    "incref": "Py_IncRef",
+    "new_float": "PyFloat_FromDouble",
+    "new_tuple": "PyTuple_New",
+    "set_item": "PyTuple_SetItem",
+}  # functions of Python there
+TABLE_ENTRIES = (*PINNED, *FUNCTIONS, "new_array")  # names of the entries of the address table
 TYPE_OFFSET = 8  # offset of ob_type in PyObject
 ARRAY_OFFSETS = {"data": 16, "nd": 24, "dimensions": 32, "descr": 56, "flags": 64}  # offsets of the fields of PyArrayObject
 CONTIGUOUS, ALIGNED, CAN_BE_WRITTEN, WARNS = 0x0001, 0x0100, 0x0400, 1 << 31  # numpy's flags of an array
@@ -53,26 +48,13 @@ class PinnedObjects:
     """
 
     def __init__(self, fallback, over_limit):
-        self.pinned: dict[str, object] = {"ndarray": np.ndarray, "float": float, "none": None}
-        self.pinned |= {"out": sys.intern("out"), "fallback": fallback, "over_limit": over_limit}
+        self.pinned = np.ndarray, float, None, sys.intern("out"), fallback, over_limit
 
     def addresses(self) -> ctypes.Array:
         """Address table, in the order of ``TABLE_ENTRIES``."""
-        functions = {
-            "vectorcall": "PyObject_Vectorcall",
-            "tuple_size": "PyTuple_Size",
-            "tuple_item": "PyTuple_GetItem",
-            "float_value": "PyFloat_AsDouble",
-            "incref": "Py_IncRef",
-            "new_float": "PyFloat_FromDouble",
-            "new_tuple": "PyTuple_New",
-            "set_item": "PyTuple_SetItem",
-        }
-        found = {name: id(pinned) for name, pinned in self.pinned.items()}
-        for name, function in functions.items():
-            found[name] = _address_of(getattr(ctypes.pythonapi, function))
-        found["new_array"] = _numpy_table()[PYARRAY_NEW]
-        return (ctypes.c_int64 * len(TABLE_ENTRIES))(*(found[name] for name in TABLE_ENTRIES))
+        functions = (_address_of(getattr(ctypes.pythonapi, name)) for name in FUNCTIONS.values())
+        found = *map(id, self.pinned), *functions, _numpy_table()[PYARRAY_NEW]
+        return (ctypes.c_int64 * len(TABLE_ENTRIES))(*found)
 
 
 @cache

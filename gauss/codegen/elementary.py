@@ -8,9 +8,8 @@ from collections.abc import Callable
 
 from llvmlite import ir
 
-from gauss.codegen.intrinsics import intrinsic
+from gauss.codegen.ir_module import DOUBLE, INTEGER, intrinsic
 
-DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
 LN2 = 6.93147180369123816490e-01, 1.90821492927058770002e-10  # ln 2 as the sum of 33 bits and the rest
 LOG2_E = 1.44269504088896338700
 LARGEST_EXPONENT = 7.09782712893383973096e02  # of a finite eˣ

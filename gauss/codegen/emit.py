@@ -3,11 +3,16 @@
 A function becomes, for each vector width, ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
 structures of arrays; it calls other functions with its own width. A long function is outlined into pieces
 (:mod:`gauss.codegen.outlined_pieces`), so that the time to compile it is proportional to its length.
+
+Of many states, a long function runs over blocks: each piece for all vectors of a block before the next one begins. The code
+of a piece stays in the nearest cache of instructions, and the vectors of a block do not depend on each other, so that
+operations of one fill the waiting times of another. Values that cross pieces stay in the nearest cache of data.
 """
+
+from typing import NamedTuple, TypeGuard
 
 from llvmlite import ir
 
-from gauss.codegen.blocks import STATES, StateBlocks, has_blocks, vectors_of, write_block
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import (
     BODY,
@@ -20,24 +25,64 @@ from gauss.codegen.ir_blocks import (
     strides,
     strip_mined_loop,
 )
-from gauss.codegen.lanes import INTEGER
+from gauss.codegen.ir_module import DOUBLE, INTEGER
 from gauss.codegen.native_function import NativeFunction
-from gauss.codegen.outlined_pieces import lengths, write_pieces
+from gauss.codegen.outlined_pieces import lengths, pieces_of, write_pieces
 from gauss.codegen.schedule import Schedule, part, schedule
 from gauss.codegen.straight_line import calling, result_rooms, straight_line
 from gauss.codegen.terminal_line import function_written
 
+STATES_PER_BLOCK = 16  # of a block: of those of a robot arm 150 values cross pieces, in 19 kB of a nearest cache of 32
+BLOCK_PIECE_LENGTH = 150  # operations of a piece: those of two vectors wait for their operands together
+SHORTEST_IN_BLOCKS = 200  # operations of a function that has blocks
+SHORTEST_OF_ROWS = 2_000  # the same where rows are transposed: their buffers, too, are in the nearest cache of data
 MOST_OPERATIONS = 6  # for each input: so few are made twice
 
 
-class Writer:
-    """Writer of one module of functions and of the loops that call them.
+class StateBlocks(NamedTuple):
+    """Code of a function for vectors of states side by side."""
 
-    Parameters
-    ----------
-    module : llvmlite.ir.Module, optional
-        The module; one for this CPU by default.
-    """
+    # ``void name(double* in, i64 in_stride, double* out, i64 out_stride, double* frame, i64 vectors)``: input j of state i
+    # is ``in[j * in_stride + i]``; at most :data:`STATES_PER_BLOCK` states
+    code: ir.Function
+    slots: int  # numbers of a state in its frame
+
+    def frame(self, buffers: Buffers) -> ir.Value:
+        """Frame of a block, in a function that calls it."""
+        return buffers.b.bitcast(buffers.room(DOUBLE, self.slots * STATES_PER_BLOCK, align=64), POINTER)
+
+
+def has_blocks(function: Function | NativeFunction, shortest: int = SHORTEST_IN_BLOCKS) -> TypeGuard[Function]:
+    """Whether a function is long, and has no functions within it."""
+    if isinstance(function, NativeFunction):
+        return False
+    return len(function.nodes) >= shortest and all(node.op != "call" for node in function.nodes)
+
+
+def vectors_of(b: ir.IRBuilder, states: ir.Value, width: int) -> ir.Value:
+    """Vectors of the next block of so many states; the last one need not be full."""
+    fewer = b.select(b.icmp_signed("<", states, INTEGER(STATES_PER_BLOCK)), states, INTEGER(STATES_PER_BLOCK))
+    return b.sdiv(b.add(fewer, INTEGER(width - 1)), INTEGER(width))
+
+
+def write_block(module: ir.Module, name: str, whole: Schedule, width: int) -> StateBlocks:
+    """Code of a function for blocks of states, in vectors of so many states."""
+    pieces = pieces_of(module, name, whole, {}, width, True, BLOCK_PIECE_LENGTH)
+    code = ir.Function(module, ir.FunctionType(ir.VoidType(), [*BODY.args, POINTER, INTEGER]), name)
+    code.linkage = "internal"
+    source, in_stride, target, out_stride, frame, vectors = code.args
+    slots, b = INTEGER(pieces.slots), ir.IRBuilder(code.append_basic_block("entry"))
+    for piece in pieces.codes:
+        with counted_loop(b, INTEGER(0), vectors) as k:
+            first = b.mul(k, INTEGER(width))
+            given, found, values = b.gep(source, [first]), b.gep(target, [first]), b.gep(frame, [b.mul(first, slots)])
+            b.call(piece, [given, in_stride, found, out_stride, values])
+    b.ret_void()
+    return StateBlocks(code, pieces.slots)
+
+
+class Writer:
+    """Writer of one module, for this CPU by default: of functions, and of the loops that call them."""
 
     def __init__(self, module: ir.Module | None = None):
         self.module = ir.Module(name="gauss") if module is None else module
@@ -87,7 +132,7 @@ class Writer:
         count, source, in_stride, target, out_stride = arguments
         buffers, block = Buffers(b), self.block(function, width)
         frame, end = block.frame(buffers), b.sub(count, b.srem(count, INTEGER(width)))
-        with counted_loop(b, INTEGER(0), end, STATES) as first:
+        with counted_loop(b, INTEGER(0), end, STATES_PER_BLOCK) as first:
             vectors = vectors_of(b, b.sub(end, first), width)
             given, found = b.gep(source, [first]), b.gep(target, [first])
             b.call(block.code, [given, in_stride, found, out_stride, frame, vectors])

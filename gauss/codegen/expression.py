@@ -5,9 +5,11 @@ Derivatives, 2nd ed., ch. 6). Nodes belong to a :class:`gauss.codegen.Graph`.
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from itertools import chain
 from numbers import Real
 from operator import attrgetter
+from threading import get_ident
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,6 +42,11 @@ def _operation(op: str, swapped: bool = False) -> Callable:
     return operate
 
 
+def _function(op: str) -> Callable:
+    """Method for a function of one operand."""
+    return lambda x: x.graph.unary(op, x)
+
+
 def _lifted(operate: Callable, x: "Expression", other):
     """Result of an operation whose operands are brought to one graph first."""
     if not isinstance(other, OPERANDS):
@@ -69,12 +76,13 @@ class Expression:
         return f"{self.op}({', '.join(f'%{operand.index}' for operand in self.operands)})"
 
     def __bool__(self):
-        if not _paths:
+        tracer = _tracers.get(get_ident())
+        if tracer is None:
             raise TypeError(
                 "the value of a traced expression is not known while it is traced, so it cannot decide an `if`; "
                 "use gauss.math.where, gauss.math.minimum or gauss.math.maximum."
             )
-        return _paths[-1].decide(self)
+        return tracer.decide(self)
 
     def __and__(self, other):
         """Conjunction of two conditions: decided like an `if`, one after the other."""
@@ -97,17 +105,17 @@ class Expression:
 
     def __eq__(self, other):
         """Identity of nodes; while branches are traced, equality of values."""
-        if self is other or not _paths:
+        if self is other or not _tracers or get_ident() not in _tracers:
             return self is other
         return (self <= other) & (self >= other) if isinstance(other, OPERANDS) else NotImplemented
 
     def __hash__(self):
-        if _paths and not self.graph.shared:  # a dict of a law would never find it, whatever its value
+        if _tracers and not self.graph.shared and get_ident() in _tracers:
+            # a dict of a law would never find it, whatever its value
             raise TypeError("a traced expression is no key of a dict and no member of a set")
         return id(self)
 
-    def __neg__(self):
-        return self.graph.unary("neg", self)
+    __neg__, __floor__ = _function("neg"), _function("floor")
 
     def __pos__(self):
         return self
@@ -127,9 +135,6 @@ class Expression:
             square, n = square * square, n // 2
         return power if whole >= 0 else 1.0 / power
 
-    def __floor__(self):
-        return self.graph.unary("floor", self)
-
     def __mod__(self, divisor):
         return self - divisor * (self / divisor).__floor__()
 
@@ -138,29 +143,11 @@ class Expression:
 
     # numpy calls these methods on the entries of object arrays: np.sin(array) → array of x.sin()
 
-    def sqrt(self):
-        """Square root."""
-        return self.graph.unary("sqrt", self)
-
-    def sin(self):
-        """Sine."""
-        return self.graph.unary("sin", self)
-
-    def cos(self):
-        """Cosine."""
-        return self.graph.unary("cos", self)
+    sqrt, sin, cos, exp, log = map(_function, ("sqrt", "sin", "cos", "exp", "log"))
 
     def tan(self):
         """Tangent."""
         return self.sin() / self.cos()
-
-    def exp(self):
-        """Exponential."""
-        return self.graph.unary("exp", self)
-
-    def log(self):
-        """Natural logarithm."""
-        return self.graph.unary("log", self)
 
     def arctan2(self, other):
         """Angle of the point (other, self)."""
@@ -168,13 +155,28 @@ class Expression:
 
 
 _arctan2 = _operation("atan2")
-_paths: list = []  # tracers of `if` over expressions, innermost last; see gauss.codegen.branches
+_tracers: dict[int, Any] = {}  # what decides an `if` over expressions in each thread; see gauss.codegen.branches
 OPERANDS = (*NUMBERS, Expression)
 Scalar = float | Expression  # numbers over which the mechanics is written
 if TYPE_CHECKING:
     Entry = Any  # a Scalar in a record: which of both is as open to the type checker as the elements of an array are
 else:
     Entry = Scalar
+
+
+@contextmanager
+def decided_by(tracer) -> Iterator[None]:
+    """Let ``tracer.decide(condition)`` decide every `if` over expressions of this thread."""
+    thread = get_ident()
+    outer = _tracers.get(thread)
+    _tracers[thread] = tracer
+    try:
+        yield
+    finally:
+        if outer is None:
+            del _tracers[thread]
+        else:
+            _tracers[thread] = outer
 
 
 def graph_of(values) -> "Graph":

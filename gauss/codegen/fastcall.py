@@ -68,18 +68,10 @@ def made_from(function, make: Callable, *arguments):
 
 
 class EntryCode(NamedTuple):
-    """Machine code of a function and of its entry from Python.
-
-    Attributes
-    ----------
-    code : MachineCode
-        The code.
-    outputs : int
-        Number of results and limited quantities.
-    """
+    """Machine code of a function and of its entry from Python."""
 
     code: machine.MachineCode
-    outputs: int
+    outputs: int  # number of results and limited quantities
 
 
 def entry_code(function: Function | NativeFunction, interface: Interface) -> EntryCode:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from threading import Lock
 
 GC_THRESHOLD = 200_000  # allocations between collections: a few thousand traced operations
-MANY = 5_000  # allocations that a collection takes a millisecond for
+LEAST_FROZEN = 5_000  # young objects that are not looked at once: a collection of so many takes a millisecond
 
 _lock = Lock()
 _before: list[tuple[int, ...]] = []  # threshold at each entry; the first one is restored at the end
@@ -41,7 +41,7 @@ def _clear_youngest():
     Frozen objects of the caller would thaw: where there are any, all are collected.
     """
     count = gc.get_count()[0]
-    if count < MANY or _large or gc.get_freeze_count():
+    if count < LEAST_FROZEN or _large or gc.get_freeze_count():
         gc.collect(0)
         return
     _large.append(count)

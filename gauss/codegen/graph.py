@@ -60,13 +60,6 @@ class Graph:
     shared : bool
         Whether its symbols are parameters: its expressions may enter any other graph, where a symbol becomes the value set
         by :meth:`bind`, or a further input.
-
-    Attributes
-    ----------
-    constants : dict
-        Node of each number so far.
-    zero : Expression or None
-        Node of zero, once there is one.
     """
 
     def __init__(self, early: "Graph | None" = None, shared: bool = False):
@@ -76,7 +69,7 @@ class Graph:
         self._entered: dict[Expression, Expression] = {}
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
-        self.constants: dict[float | Real, Expression] = {}
+        self.constants: dict[float | Real, Expression] = {}  # node of each number so far
         self.zero: Expression | None = None  # the constant, once it is made
 
     def symbol(self, name: str) -> Expression:
@@ -92,7 +85,8 @@ class Graph:
         node = self.constants.get(value)
         if node is None:
             value = float(value) + 0.0  # −0 and 0 are one
-            node = self.constants[value] = self._new("constant", (), value)
+            node = self.constants[value] = Expression(self, "constant", (), value, len(self.nodes))
+            self.nodes.append(node)
             if value == 0.0:
                 self.zero = node
         return node
@@ -186,16 +180,9 @@ class Graph:
     def call(self, function, arguments) -> np.ndarray:
         """Outputs of a :class:`gauss.codegen.Function` for these arguments, an object array; constant ones are numbers."""
         call = self._make("call", _passed([self.lift(argument) for argument in arguments]), function)
-        outputs = [self.result(call, k) for k in range(len(function.outputs))]
-        for k, output in enumerate(function.outputs):
-            number = as_number(output)
-            if number is not None:
-                outputs[k] = self.constant(number)
+        numbers = map(as_number, function.outputs)
+        outputs = [self._make("item", (call,), k) if x is None else self.constant(x) for k, x in enumerate(numbers)]
         return np.array([*outputs, None], dtype=object)[:-1]
-
-    def result(self, call: Expression, k: int) -> Expression:
-        """Return result k of a call."""
-        return self._make("item", (call,), k)
 
     def copy(self, node: Expression, operands) -> Expression:
         """Node of another graph, with operands of this one, folded."""
@@ -236,11 +223,6 @@ class Graph:
             node.index = len(nodes)
             node.is_constant = False
             nodes.append(node)
-        return node
-
-    def _new(self, op: str, operands: tuple, value) -> Expression:
-        node = Expression(self, op, operands, value, len(self.nodes))
-        self.nodes.append(node)
         return node
 
 

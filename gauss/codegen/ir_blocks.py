@@ -7,9 +7,8 @@ from functools import lru_cache
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen.device_module import SingleDeviceModule
-from gauss.codegen.intrinsics import BYTES, external
-from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes
+from gauss.codegen.ir_module import BYTES, DOUBLE, INTEGER, SingleDeviceModule, external
+from gauss.codegen.lanes import Lanes
 from gauss.codegen.recurrences import LINE
 from gauss.codegen.single_lanes import SingleLanes
 from gauss.codegen.text_builder import TextBuilder
@@ -45,23 +44,15 @@ def _at_a_page(b: ir.IRBuilder):
 
 
 class Buffers:
-    """Buffers of a function: on its stack, large ones on the heap.
+    """Buffers of a function: on its stack, large ones on the heap."""
 
-    Parameters
-    ----------
-    b : llvmlite.ir.IRBuilder
-        Builder of the function.
-    width : int
-        Numbers in an entry of a buffer.
-    """
-
-    def __init__(self, b: ir.IRBuilder, width: int = 1):
-        self.b, self.width, self._on_heap = b, width, list[ir.Value]()
+    def __init__(self, b: ir.IRBuilder):
+        self.b, self._on_heap = b, list[ir.Value]()
 
     def room(self, kind: ir.Type, size: int, align: int | None = None) -> ir.Value:
         """Buffer of ``size`` values of a kind, numbers or vectors, allocated in the entry block."""
         with self.b.goto_entry_block():
-            if size > LARGEST_ON_STACK * self.width:
+            if size > LARGEST_ON_STACK:
                 return self._heap_room(kind, size)
             room = self.b.alloca(kind, max(size, 1))
         room.align = room.align if align is None else align

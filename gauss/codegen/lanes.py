@@ -2,41 +2,40 @@
 
 from llvmlite import ir
 
-from gauss.codegen.device_module import DeviceModule, vector_width
 from gauss.codegen.elementary import elementary
 from gauss.codegen.expression import Expression
-from gauss.codegen.intrinsics import external, intrinsic
+from gauss.codegen.ir_module import (
+    BIT,
+    DOUBLE,
+    LANE,
+    DeviceModule,
+    broadcast,
+    external,
+    intrinsic,
+    joined_numbers,
+    lane_by_lane,
+    lane_indices,
+    vector_of,
+    vector_width,
+)
 from gauss.codegen.lookup import LOOKUPS
 from gauss.codegen.lookup_code import lookup_code
-from gauss.codegen.multiply_add import FUSED
+from gauss.codegen.schedule import FUSED
 from gauss.codegen.sincos import SinCos
-from gauss.codegen.text_builder import BIT, TextValue, written
+from gauss.codegen.text_builder import TextValue, written
 
-DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
-LANE = ir.IntType(32)  # index of a lane
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
 PREDICATES = {"less": "<", "less_equal": "<="}
 # full vectors whose sines and cosines one call computes: the operations of one depend on each other for a hundred cycles,
 # and the scheduler of a processor does not reach the next call; two take a quarter less
 SIDE_BY_SIDE = 2
-# fast-math flags of loops written for one state only: LLVM may fuse multiply–adds; gauss.codegen.multiply_add decides
-# elsewhere
+# fast-math flags of loops written for one state only: LLVM may fuse multiply–adds; gauss.codegen.schedule decides elsewhere
 FLAGS = ("contract",)
 
 
 class Lanes:
-    """Emitter of operations for one vector width.
-
-    Parameters
-    ----------
-    module : llvmlite.ir.Module
-        Module of the declarations.
-    width : int
-        Number of lanes: states at a time.
-    builder : llvmlite.ir.IRBuilder
-        Insertion point.
-    """
+    """Emitter of operations for one vector width: so many states at a time."""
 
     def __init__(self, module: ir.Module, width: int, builder: ir.IRBuilder):
         self.module, self.width, self.b = module, width, builder
@@ -58,11 +57,7 @@ class Lanes:
 
     def broadcast(self, value):
         """Broadcast one number to every lane."""
-        if self.width == 1:
-            return value
-        places = lane_indices([0] * self.width)
-        single = self.b.insert_element(ir.Constant(self.kind, ir.Undefined), value, LANE(0))
-        return self.b.shuffle_vector(single, ir.Constant(self.kind, ir.Undefined), places)
+        return broadcast(self.b, value, self.width)
 
     def any_lane(self, mask):
         """Whether a condition holds in any lane."""
@@ -161,7 +156,8 @@ class Lanes:
         if op in ("exp", "log", "atan2") and isinstance(self.module, DeviceModule):
             return b.call(elementary(self.module, op), x)
         if op == "atan2":
-            return self._each_lane("atan2", x)
+            code = external(self.module, op, DOUBLE, [DOUBLE] * 2)
+            return lane_by_lane(b, self.width, lambda *numbers: b.call(code, numbers), *x)
         return b.call(self._intrinsic(INTRINSICS[op], len(x)), x)
 
     def _extreme(self, op: str, x, y):
@@ -194,10 +190,7 @@ class Lanes:
         count = 1 << (len(values) - 1).bit_length()
         values, width = [*values, *values[-1:] * (count - len(values))], self.width
         if width == 1:
-            vector = ir.Constant(kind(count), ir.Undefined)
-            for lane, value in enumerate(values):
-                vector = self.b.insert_element(vector, value, LANE(lane))
-            return vector
+            return joined_numbers(self.b, values)
         while len(values) > 1:
             width *= 2
             pairs = zip(values[::2], values[1::2], strict=True)
@@ -237,21 +230,10 @@ class Lanes:
             self.sincos_values[key] = self.b.extract_value(both, 0), self.b.extract_value(both, 1)
         return self.sincos_values[key][0 if node.op == "sin" else 1]
 
-    def _each_lane(self, name: str, x):
-        function = external(self.module, name, DOUBLE, [DOUBLE] * len(x))
-        if self.width == 1:
-            return self.b.call(function, x)
-        total = ir.Constant(self.kind, ir.Undefined)
-        for lane in range(self.width):
-            place = ir.Constant(LANE, lane)
-            value = self.b.call(function, [self.b.extract_element(part, place) for part in x])
-            total = self.b.insert_element(total, value, place)
-        return total
-
 
 def kind(width: int) -> ir.Type:
     """Type of ``width`` doubles."""
-    return DOUBLE if width == 1 else ir.VectorType(DOUBLE, width)
+    return vector_of(DOUBLE, width)
 
 
 def _is_literal(value) -> bool:
@@ -261,8 +243,3 @@ def _is_literal(value) -> bool:
 
 def _is_condition(value) -> bool:
     return value.type == BIT or (isinstance(value.type, ir.VectorType) and value.type.element == BIT)
-
-
-def lane_indices(places) -> ir.Constant:
-    """Constant of the lanes that a shuffle takes."""
-    return ir.Constant(ir.VectorType(LANE, len(places)), list(places))

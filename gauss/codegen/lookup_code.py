@@ -6,10 +6,10 @@ The row of a number among equally spaced breaks is found by a division and one c
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen.intrinsics import intrinsic
+from gauss.codegen.ir_module import DOUBLE, broadcast, in_every_lane, intrinsic, lane_by_lane, vector_of
 from gauss.codegen.lookup import Column
 
-DOUBLE, PLACE, BYTE = ir.DoubleType(), ir.IntType(32), ir.IntType(8)
+PLACE, BYTE = ir.IntType(32), ir.IntType(8)
 
 
 def lookup_code(module: ir.Module, op: str, column: Column, width: int) -> ir.Function:
@@ -24,19 +24,16 @@ class _Lookup:
 
     def __init__(self, module: ir.Module, name: str, op: str, column: Column, width: int):
         self.module, self.width = module, width
-        self.kind, self.places = (self._vector(one) for one in (DOUBLE, PLACE))
+        self.kind, self.places = (vector_of(one, width) for one in (DOUBLE, PLACE))
         self.function = ir.Function(module, ir.FunctionType(self.kind, [self.kind]), name)
         self.function.linkage = "internal"
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
         (x,) = self.function.args
         self.b.ret(getattr(self, f"_{op}")(column, x))
 
-    def _vector(self, kind: ir.Type) -> ir.Type:
-        return kind if self.width == 1 else ir.VectorType(kind, self.width)
-
     def _all(self, kind: ir.Type, value) -> ir.Constant:
         """The same number in every lane."""
-        return ir.Constant(self._vector(kind), value if self.width == 1 else [value] * self.width)
+        return in_every_lane(kind, self.width, value)
 
     def _entry(self, column: Column, row):
         return self._read(self._array(column), self.b.fptosi(row, self.places))
@@ -74,7 +71,7 @@ class _Lookup:
         row.add_incoming(self._all(PLACE, 0), begin)
         left.add_incoming(PLACE(count), begin)
         half = b.lshr(b.add(left, PLACE(1)), PLACE(1))
-        further = b.add(row, self._spread(half))
+        further = b.add(row, broadcast(b, half, self.width))
         new = b.select(b.fcmp_ordered("<", self._read(array, further), x), further, row)
         rest = b.lshr(left, PLACE(1))
         row.add_incoming(new, loop)
@@ -83,23 +80,10 @@ class _Lookup:
         b.position_at_end(end)
         return new
 
-    def _spread(self, place):
-        """One place in every lane."""
-        if self.width == 1:
-            return place
-        single = self.b.insert_element(ir.Constant(self.places, ir.Undefined), place, PLACE(0))
-        return self.b.shuffle_vector(single, ir.Constant(self.places, ir.Undefined), self._all(PLACE, 0))
-
     def _read(self, array, places):
         """Numbers of an array at the places of all lanes."""
         b = self.b
-        if self.width == 1:
-            return b.load(b.gep(array, [places]))
-        found = ir.Constant(self.kind, ir.Undefined)
-        for lane in range(self.width):
-            number = b.load(b.gep(array, [b.extract_element(places, PLACE(lane))]))
-            found = b.insert_element(found, number, PLACE(lane))
-        return found
+        return lane_by_lane(b, self.width, lambda place: b.load(b.gep(array, [place])), places)
 
     def _array(self, column: Column):
         """Pointer to a constant array; bytes are written and read faster than numbers."""

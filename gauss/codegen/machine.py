@@ -10,13 +10,12 @@ import zlib
 from gauss.codegen import object_cache, tiers
 from gauss.codegen.linking import linked
 from gauss.codegen.object_cache import packed, unpacked
-from gauss.codegen.object_code import about, optimised_objects, quick_objects
+from gauss.codegen.object_code import SHORTEST_WHOLE, about, optimised_objects, quick_objects
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, EntryPoint, MachineCode
 
 __all__ = ["CodeCaller", "MachineCode", "load", "load_cached"]
 
-SHORT = 50_000  # characters of a module that is optimised at once, in less than 30 ms
 COMPRESSION = 1  # level of zlib: 4 ms for a megabyte
 
 
@@ -51,8 +50,8 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
     ir_text : str
         The module.
     optimise : int
-        0: quick compilation, code half as fast; 1: optimised where control flows; 2: optimised as a whole, calls inlined.
-        Above 0, in which tier depends on :func:`gauss.codegen.tiers.wanted`.
+        0: quick compilation, code half as fast; 1: optimised where control flows, short modules as by 2; 2: optimised as a
+        whole, calls inlined. Above 0, in which tier depends on :func:`gauss.codegen.tiers.wanted`.
     """
     key = object_cache.key(about(optimise), ir_text)
     code = load_cached(key)
@@ -60,7 +59,7 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
         return code
     OPTIMISER.rest()
     tier = tiers.wanted()
-    if not optimise or tier == OPTIMISED or (tier == AUTO and len(ir_text) < SHORT):
+    if not optimise or tier == OPTIMISED or (tier == AUTO and len(ir_text) < SHORTEST_WHOLE):  # in less than 30 ms
         return _optimised(key, ir_text, optimise)
     quick, source = quick_objects(ir_text), zlib.compress(ir_text.encode(), COMPRESSION)
     object_cache.write(key + object_cache.QUICK_SUFFIX, packed([*quick, source, str(optimise).encode()]))

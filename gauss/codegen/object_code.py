@@ -17,18 +17,26 @@ import llvmlite.binding as llvm
 
 from gauss.codegen.processor import features, prepare_llvm
 from gauss.codegen.terminal_line import units_in_progress
-from gauss.codegen.whole_selection import selected_whole
 
 OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
-PASSES = "passes where control flows, in units"  # straight-line code of a hash-consed graph gains nothing by passes
+# Straight-line code of a hash-consed graph gains nothing by passes; steps of a few bodies, by inlining of their functions.
+PASSES = "passes where control flows, in units; modules of a length as a whole, inlined"
 RELOCATION = "static"  # LLVM's runtime linker mistakes the offset table of one object for that of another
 UNIT_LENGTH = 80_000  # characters of IR compiled at a time, in about 40 ms
-SELECTED_WHOLE = "x86_64"  # processor on which some functions are (gauss.codegen.whole_selection)
+# Lengths of modules that are optimised as a whole: in shorter ones the first motion waits for it, in longer ones others do.
+SHORTEST_WHOLE, LONGEST_WHOLE = 50_000, 250_000
+SELECTED_WHOLE = "x86_64"  # processor on which some functions are selected whole
 CONTRACTED = " contract "  # flag of instructions that the compiler may fuse, which FastISel never does
 FUNCTION = re.compile(r"^define [^\n]*\n\{\n.*?^\}\n", re.MULTILINE | re.DOTALL)
 GLOBAL = re.compile(r'^(@"[^"]*") = .*\n', re.MULTILINE)
 NAME = re.compile(r'@"[^"]*"')
 INTERNAL = re.compile(r"^define internal ")
+DEFINITION = "\ndefine internal void "
+VOID_CALL = re.compile(r'(?<=call )void (@"[^"]*")\(')
+CONVENTION = "swiftcc "
+MULTIPLY_ADD = '@"llvm.fmuladd.f64"('
+LEAST_MULTIPLY_ADDS = 10  # multiply–adds of a function that is handed over: with fewer, nothing is gained
+PASSED_ON = ')* @"', 'ptr @"'  # before the name of a function that is not called there, but passed on
 
 
 @cache
@@ -69,15 +77,18 @@ def optimised_objects(ir_text: str, optimise: int) -> Iterator[bytes]:
     optimise : int
         As of :func:`gauss.codegen.machine.load`, at least 1; modules that are optimised as a whole are one unit.
     """
-    if optimise == 1:
+    if optimise > 1 or (SHORTEST_WHOLE <= len(ir_text) <= LONGEST_WHOLE and CONTRACTED not in ir_text):
+        yield from map(_inlined, units_in_progress([ir_text]))
+    else:
         short = len(ir_text) <= UNIT_LENGTH
         yield from map(_optimised, units_in_progress([ir_text] if short else ModuleUnits(ir_text).short(UNIT_LENGTH)))
-    else:
-        (unit,) = units_in_progress([ir_text])
-        module, builder = _parsed(unit), _builder()
-        module.verify()
-        builder.getModulePassManager().run(module, builder)
-        yield target(OPTIMISED).emit_object(module)
+
+
+def _inlined(unit: str) -> bytes:
+    module, builder = _parsed(unit), _builder()
+    module.verify()
+    builder.getModulePassManager().run(module, builder)
+    return target(OPTIMISED).emit_object(module)
 
 
 def _optimised(unit: str) -> bytes:
@@ -105,13 +116,7 @@ def _passes() -> tuple[llvm.FunctionPassManager, llvm.PassBuilder]:
 
 
 class ModuleUnits:
-    """Text of a module, divided by functions.
-
-    Parameters
-    ----------
-    ir_text : str
-        The module, as llvmlite writes it.
-    """
+    """Text of a module, as llvmlite writes it, divided by functions."""
 
     def __init__(self, ir_text: str):
         head = FUNCTION.sub("", ir_text)
@@ -152,3 +157,34 @@ class ModuleUnits:
             if k not in inside and NAME.findall(first)[0] in used:
                 lines.append(first.replace("define ", "declare ", 1) + "\n")
         return "".join([self._head, *lines, *(self.functions[k] for k in mine)])
+
+
+def selected_whole(ir_text: str) -> str:
+    """The module, with instructions of long straight-line functions selected all at once by quick compilation.
+
+    LLVM's FastISel knows no fused multiply–add: it hands each one over to the selector of the optimised tier by itself,
+    which takes 12 µs. In a block that is handed over as a whole, a multiply–add takes 6 µs and another operation 4 µs, which
+    FastISel selects in 1.3 µs. FastISel selects a block from its end on, and hands it over where it cannot select the
+    return: it cannot in functions of Swift's calling convention, which passes pointers and integers as that of C does. The
+    functions and all calls of them get that convention.
+    """
+    head, *functions = ir_text.split(DEFINITION)
+    names = {function.partition("(")[0] for function in functions if _gains(function.partition("\n}\n")[0])}
+    if any(pointer in ir_text for pointer in PASSED_ON):  # who calls those does not know their convention
+        names = {name for name in names if not any(f"{pointer[:-2]}{name}" in ir_text for pointer in PASSED_ON)}
+    if not names:
+        return ir_text
+
+    def call(found: re.Match) -> str:
+        return CONVENTION + found.group() if found.group(1) in names else found.group()
+
+    text = [VOID_CALL.sub(call, head)]
+    for function in functions:
+        own = CONVENTION if function.partition("(")[0] in names else ""
+        text += [DEFINITION[:-5], own, "void ", VOID_CALL.sub(call, function) if "call void" in function else function]
+    return "".join(text)
+
+
+def _gains(function: str) -> bool:
+    """Whether a function is one block with multiply–adds enough."""
+    return function.count(MULTIPLY_ADD) >= LEAST_MULTIPLY_ADDS and "\n  br " not in function

@@ -13,11 +13,10 @@ from typing import NamedTuple
 
 from llvmlite import ir
 
-from gauss.codegen.device_module import DeviceModule
 from gauss.codegen.expression import INDEX_OF, Expression
 from gauss.codegen.graph import TURNS
 from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides
-from gauss.codegen.lanes import INTEGER
+from gauss.codegen.ir_module import INTEGER, DeviceModule
 from gauss.codegen.schedule import Schedule
 from gauss.codegen.straight_line import Results, calling, passed_on, straight_line
 
@@ -36,17 +35,7 @@ def lengths(module: ir.Module) -> tuple[int, int]:
 
 
 def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: int, strided: bool = False) -> ir.Function:
-    """Code of a function for one vector width, in pieces.
-
-    Parameters
-    ----------
-    callees : dict
-        Code of the called functions, for this width.
-    width : int
-        Number of states at a time.
-    strided : bool
-        Whether its inputs and outputs may be apart.
-    """
+    """Code of a function for one vector width, in pieces, with the code of the functions that it calls for this width."""
     pieces = pieces_of(module, name, whole, callees, width, strided, lengths(module)[1])
     body, lanes = begin_function(module, name, width)
     frame = lanes.b.bitcast(lanes.b.alloca(lanes.kind, max(pieces.slots, 1)), POINTER)

@@ -17,11 +17,12 @@ from gauss.codegen import processor
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import PAGE, POINTER, begin_function, counted_loop, input_reader, output_writer
-from gauss.codegen.lanes import DOUBLE, INTEGER, LANE, Lanes, kind
+from gauss.codegen.ir_module import DOUBLE, INTEGER, LANE
+from gauss.codegen.lanes import Lanes, kind
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.packed_schedule import PackedSchedule, frame_places, runs, vector_length
-from gauss.codegen.packs import Pack, Packs
 from gauss.codegen.schedule import schedule
+from gauss.codegen.superword import Pack, Packs
 
 if TYPE_CHECKING:
     from gauss.codegen.emit import Writer

@@ -7,9 +7,8 @@ from heapq import heappop, heappush
 
 from gauss.codegen.expression import Expression
 from gauss.codegen.graph import BINARY, TURNS, UNARY
-from gauss.codegen.multiply_add import FUSED
-from gauss.codegen.packs import LEAVES, Pack, Packs
-from gauss.codegen.schedule import LATENCY, Schedule
+from gauss.codegen.schedule import FUSED, LATENCY, Schedule
+from gauss.codegen.superword import LEAVES, Pack, Packs
 
 EXACT = frozenset({"neg", "sqrt", "add", "sub", "mul", "div", "min", "max", "less", "less_equal"})  # as machine code rounds
 

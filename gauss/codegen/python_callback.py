@@ -15,9 +15,8 @@ import llvmlite.binding as llvm
 from llvmlite import ir
 
 from gauss.codegen.emit import Writer
-from gauss.codegen.intrinsics import external
 from gauss.codegen.ir_blocks import POINTER
-from gauss.codegen.lanes import INTEGER
+from gauss.codegen.ir_module import INTEGER, external
 from gauss.codegen.native_function import NativeFunction
 
 SYMBOL = "gauss_python_callback"
@@ -56,15 +55,7 @@ done:
 
 
 class PythonCallback(NativeFunction):
-    """Function of machine code that asks Python: the object that is entered last, see :class:`Receiver`.
-
-    Parameters
-    ----------
-    name : str
-        Name in the code.
-    n_in, n_out : int
-        Numbers of inputs and of outputs.
-    """
+    """Function of machine code that asks Python: the object that is entered last, see :class:`Receiver`."""
 
     def __init__(self, name: str, n_in: int, n_out: int):
         self.name, self.n_in, self.n_out = name, n_in, n_out

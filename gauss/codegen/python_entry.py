@@ -10,7 +10,7 @@ from llvmlite import ir
 from gauss.codegen import cpython_layout
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
-from gauss.codegen.lanes import DOUBLE, INTEGER
+from gauss.codegen.ir_module import DOUBLE, INTEGER
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface, Shape
 
@@ -22,15 +22,6 @@ class EntryWriter:
     """Emitter of the function that Python calls.
 
     Addresses of Python's objects and functions lie in a table that each process fills.
-
-    Parameters
-    ----------
-    writer : Writer
-        Writer of its module.
-    function : Function or NativeFunction
-        The function; its last outputs are the limited quantities.
-    interface : Interface
-        Arguments, results and limits.
     """
 
     def __init__(self, writer: Writer, function: Function | NativeFunction, interface: Interface):

@@ -1,25 +1,29 @@
 """Instruction scheduling: reassociation of sums of products, then depth-first order by latency.
 
-A product in a sum is one fused multiply–add. So a sum of products begins with a term that is not a product, and adds the
-others in the order of their availability: its critical path has one addition after the last term. Sums without products keep
-their order, also within other sums: nothing is gained, and the error term of a compensated summation is a difference x − y
-of nearly equal numbers, which reassociation would destroy. The order is the same for all vector widths, so all round alike.
+A product is contracted with the sum that is its only user: both are rounded once. So a sum of products begins with a term
+that is not a product, and adds the others in the order of their availability: its critical path has one addition after the
+last term. Sums without products keep their order, also within other sums: nothing is gained, and the error term of a
+compensated summation is a difference x − y of nearly equal numbers, which reassociation would destroy. All is decided on the
+graph, for every vector width alike: a compiler would decide by the surrounding code, and round scalar and SIMD code
+differently.
 
 Operations are emitted depth first from the outputs, the longest latency first: a result is used soon after it is computed,
 so that few are spilled (Sethi and Ullman, J. ACM 17, 1970).
 """
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from gauss.codegen.expression import INDEX_OF, Expression, operand_indices
 from gauss.codegen.function import Function
 from gauss.codegen.graph import BINARY, Graph
-from gauss.codegen.multiply_add import fused
 
 # latencies, in units of an addition
 LATENCY = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100, "row": 40, "entry": 8}
 CHAIN = frozenset({"add", "sub", "neg"})
+FUSED = {"fma": (1, 1), "fms": (1, -1), "fnma": (-1, 1)}  # ± x y ± z: signs of product and sum
+CONTRACTED = {"add": ("fma", "fma"), "sub": ("fms", "fnma")}  # where the first, the second operand is the product
 
 
 class Schedule(NamedTuple):
@@ -191,3 +195,26 @@ def part(whole: Schedule, outputs: list) -> Schedule:
             needed.add(index)
             waiting += [x.index for x in known[index].operands]
     return Schedule([node for node in whole.nodes if node.index in needed], whole.inputs, outputs)
+
+
+def fused(nodes: Sequence[Expression], outputs) -> list[Expression]:
+    """Operations in the same order, products contracted with the sums that are their only users.
+
+    A contracted sum keeps its index, by which its users refer to it.
+    """
+    uses = Counter(operand_indices(nodes))
+    uses.update(x.index for x in outputs if isinstance(x, Expression))
+    found = {}
+    for node in nodes:
+        found[node.index] = node
+        if node.op in ("add", "sub"):
+            x, y = node.operands
+            if y.op == "mul" and uses[y.index] == 1:
+                product, other, kind = y, x, CONTRACTED[node.op][1]
+            elif x.op == "mul" and uses[x.index] == 1:
+                product, other, kind = x, y, CONTRACTED[node.op][0]
+            else:
+                continue
+            operands = (*found.pop(product.index).operands, other)
+            found[node.index] = Expression(node.graph, kind, operands, None, node.index)
+    return list(found.values())

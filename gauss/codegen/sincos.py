@@ -8,8 +8,7 @@ in pairs of doubles, up to |x| = 1e9 rad, and the result is NaN beyond.
 
 from llvmlite import ir
 
-from gauss.codegen.device_module import DeviceModule
-from gauss.codegen.intrinsics import intrinsic
+from gauss.codegen.ir_module import DOUBLE, LANE, DeviceModule, in_every_lane, intrinsic, lane_by_lane, vector_of
 from gauss.codegen.text_builder import TextBuilder
 
 LARGEST_REDUCED_ANGLE = 1e5  # [rad]: above, the products with P1 and P2 are rounded
@@ -36,15 +35,7 @@ COS = (
 
 
 class SinCos:
-    """Emitter of the function ``sincos`` of a module for one vector width.
-
-    Parameters
-    ----------
-    kind : llvmlite.ir.Type
-        double, or a vector of them.
-    width : int
-        Number of lanes.
-    """
+    """Emitter of the function ``sincos`` of a module for one vector width, of doubles or of vectors of them."""
 
     def __init__(self, module: ir.Module, kind: ir.Type, width: int):
         self.module, self.kind, self.width = module, kind, width
@@ -53,7 +44,7 @@ class SinCos:
 
     def constant(self, value: float) -> ir.Constant:
         """Constant, the same in every lane."""
-        return ir.Constant(self.kind, value if self.width == 1 else [value] * self.width)
+        return in_every_lane(DOUBLE, self.width, value)
 
     def _intrinsic(self, name: str, arguments: int = 1) -> ir.Function:
         return intrinsic(self.module, name, self.kind, arguments)
@@ -139,10 +130,9 @@ class SinCos:
         return b.fadd(w, b.fadd(lost, b.fsub(b.fmul(z, rest), b.fmul(y, tail))))
 
     def _quadrant(self, b: ir.IRBuilder, q, sine, cosine):
-        whole = ir.IntType(32) if self.width == 1 else ir.VectorType(ir.IntType(32), self.width)
-        number = lambda n: ir.Constant(whole, n if self.width == 1 else [n] * self.width)  # noqa: E731
+        number = lambda n: in_every_lane(LANE, self.width, n)  # noqa: E731
         # the conversion of a huge q is undefined, but such a lane takes the result of the C library
-        k = b.fptosi(q, whole)
+        k = b.fptosi(q, vector_of(LANE, self.width))
         odd = b.icmp_signed("!=", b.and_(k, number(1)), number(0))
         s, c = b.select(odd, cosine, sine), b.select(odd, sine, cosine)
         negative = b.icmp_signed("!=", b.and_(k, number(2)), number(0))
@@ -151,15 +141,5 @@ class SinCos:
         return s, b.select(negative, b.fneg(c), c)
 
     def _library(self, b: ir.IRBuilder, x):
-        results = []
-        for name in ("llvm.sin", "llvm.cos"):
-            function = intrinsic(self.module, name, ir.DoubleType(), 1)
-            if self.width == 1:
-                results.append(b.call(function, [x]))
-                continue
-            total = ir.Constant(self.kind, ir.Undefined)
-            for lane in range(self.width):
-                place = ir.Constant(ir.IntType(32), lane)
-                total = b.insert_element(total, b.call(function, [b.extract_element(x, place)]), place)
-            results.append(total)
-        return results
+        functions = (intrinsic(self.module, name, DOUBLE, 1) for name in ("llvm.sin", "llvm.cos"))
+        return [lane_by_lane(b, self.width, lambda one, code=code: b.call(code, [one]), x) for code in functions]

@@ -7,22 +7,15 @@ reduction of an angle needs more digits than a single has.
 from llvmlite import ir
 
 from gauss.codegen.expression import Expression
-from gauss.codegen.lanes import DOUBLE, Lanes
+from gauss.codegen.ir_module import DOUBLE
+from gauss.codegen.lanes import Lanes
 
 SINGLE = ir.FloatType()
 LARGEST_SINGLE = 3.4028234663852886e38  # larger constants are infinite
 
 
 class SingleLanes(Lanes):
-    """Emitter of operations in single precision; memory is double.
-
-    Parameters
-    ----------
-    module : llvmlite.ir.Module
-        Module of the declarations.
-    builder : llvmlite.ir.IRBuilder
-        Insertion point.
-    """
+    """Emitter of operations in single precision; memory is double."""
 
     def __init__(self, module: ir.Module, builder: ir.IRBuilder):
         super().__init__(module, 1, builder)

@@ -8,11 +8,11 @@ from collections.abc import Callable
 
 from llvmlite import ir
 
-from gauss.codegen.device_module import vector_width
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER
-from gauss.codegen.lanes import INTEGER, Lanes, kind
+from gauss.codegen.ir_module import INTEGER, vector_width
+from gauss.codegen.lanes import Lanes, kind
 from gauss.codegen.schedule import Schedule
 from gauss.codegen.superword import IsomorphicPart, ordered_operands, superword_groups
 
@@ -144,17 +144,7 @@ def result_rooms(lanes: Lanes, nodes) -> dict:
 
 
 class Results:
-    """Results of a call in memory of their own: they are loaded where they are used.
-
-    Parameters
-    ----------
-    lanes : Lanes
-        Emitter of operations.
-    room : llvmlite.ir.Value
-        Pointer to the memory.
-    function : Function
-        The called function.
-    """
+    """Results of a call in memory of their own: they are loaded where they are used."""
 
     def __init__(self, lanes: Lanes, room, function: Function):
         self.lanes, self.room, self.count = lanes, lanes.b.bitcast(room, POINTER), len(function.outputs)

@@ -77,19 +77,20 @@ def _function_of(node: Expression) -> Callable[..., float]:
         return lambda condition, x, y: x if condition else y
     if op in LOOKUPS:
         return partial(LOOKUPS[op], node.value)
-    if op not in BINARY and op not in UNARY:
+    return _numeric(op)
+
+
+def _numeric(op: str) -> Callable[..., float]:
+    found = BINARY.get(op) or UNARY.get(op)
+    if found is None:
         raise TypeError(f"cannot substitute in a {op!r}.")
-    return BINARY[op] if op in BINARY else UNARY[op]
+    return found
 
 
 def _rebuilt(node: Expression, operands) -> Expression:
     """Node of the same operation on other operands."""
     if all(new is old for new, old in zip(operands, node.operands, strict=True)):
         return node
-    if node.op == "select":
-        return node.graph.select(*operands)
-    if node.op in LOOKUPS:
-        return node.graph.lookup(node.op, node.value, *operands)
-    if node.op not in BINARY and node.op not in UNARY:
-        raise TypeError(f"cannot substitute in a {node.op!r}.")
-    return node.graph.binary(node.op, *operands) if node.op in BINARY else node.graph.unary(node.op, *operands)
+    if node.op != "select" and node.op not in LOOKUPS:
+        _numeric(node.op)
+    return node.graph.copy(node, operands)

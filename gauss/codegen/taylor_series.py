@@ -17,7 +17,8 @@ from gauss.codegen import processor
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER, counted_loop
-from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes, lane_indices
+from gauss.codegen.ir_module import DOUBLE, INTEGER, broadcast, lane_indices
+from gauss.codegen.lanes import FLAGS, Lanes
 from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.recurrences import LEAD, ROW, SUMS, WINDOW, SeriesPlan
 
@@ -97,7 +98,7 @@ class _SeriesWriter:
         b, block = self.b, self.block
         past = b.and_(b.sub(k, INTEGER(1)), INTEGER(-block.width))
         begin, lanes = b.add(past, INTEGER(1)), ir.VectorType(INTEGER, block.width)
-        here = b.icmp_signed("==", _in_all(b, b.sub(k, begin), block.width), ir.Constant(lanes, list(range(block.width))))
+        here = b.icmp_signed("==", broadcast(b, b.sub(k, begin), block.width), ir.Constant(lanes, list(range(block.width))))
         with self.loop(INTEGER(0), INTEGER(self.plan.history), 1) as row:
             place = b.add(b.mul(row, INTEGER(ROW)), b.add(begin, INTEGER(LEAD)))
             latest = b.add(row, INTEGER(ROW * len(self.plan.rows)))
@@ -175,7 +176,7 @@ class _ConvolutionWriter(_SeriesWriter):
         _, k, j = self.function.args
         b, block = self.b, self.block
         steps = ir.Constant(ir.VectorType(INTEGER, block.width), list(range(block.width)))
-        orders, here = b.add(_in_all(b, j, block.width), steps), _in_all(b, k, block.width)
+        orders, here = b.add(broadcast(b, j, block.width), steps), broadcast(b, k, block.width)
         before, reached = b.icmp_signed("<", orders, here), b.icmp_signed("<=", orders, here)
         none = block.constant(0.0)
         for name, terms in groupby(products, lambda product: product[0]):
@@ -306,10 +307,3 @@ def _internal(module: ir.Module, name: str, kinds: list[ir.Type]) -> ir.Function
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), name=module.get_unique_name(name))
     function.linkage = "internal"
     return function
-
-
-def _in_all(b: ir.IRBuilder, value, width: int):
-    """Broadcast an integer to every lane."""
-    kind = ir.VectorType(INTEGER, width)
-    single = b.insert_element(ir.Constant(kind, ir.Undefined), value, ir.IntType(32)(0))
-    return b.shuffle_vector(single, ir.Constant(kind, ir.Undefined), lane_indices([0] * width))

@@ -9,12 +9,11 @@ from typing import NamedTuple
 
 from llvmlite import ir
 
-BIT, INTEGER, DOUBLE = ir.IntType(1), ir.IntType(64), ir.DoubleType()
+from gauss.codegen.ir_module import BIT, DOUBLE, INTEGER
+
 ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "one"}
 SIGNED = {"<": "slt", "<=": "sle", ">": "sgt", ">=": "sge", "==": "eq", "!=": "ne"}
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
-
-
 NEW = tuple.__new__  # of a named tuple, without the overhead of its own
 
 
@@ -33,13 +32,8 @@ class TextValue(NamedTuple):
 class TextBuilder(ir.IRBuilder):
     """Builder that writes the frequent instructions as text, and leaves the others to llvmlite.
 
-    Parameters
-    ----------
-    block : llvmlite.ir.Block
-        Insertion point.
-    is_only_block : bool
-        Whether the function has no other block, and no other builder. Its values are then numbers instead of names, which
-        LLVM reads in two thirds of the time; they must stand in order.
+    Values of the only block of a function are numbers instead of names, which LLVM reads in two thirds of the time; they
+    must stand in order, so that there is no other builder.
     """
 
     def __init__(self, block: ir.Block, is_only_block: bool = False):

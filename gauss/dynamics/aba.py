@@ -28,9 +28,9 @@ class Elimination(NamedTuple):
     the inertia of the inner link at once; ``projected`` is then the whole Î of the link.
     """
 
-    U: np.ndarray
-    D_inverse: np.ndarray
-    projected: tuple | None = None
+    U: np.ndarray  # (6, k)
+    D_inverse: np.ndarray  # (k, k)
+    projected: tuple | None = None  # blocks A, B, C of Î − U D⁻¹ Uᵀ
 
     def force_inward(self, kin: JointKinematics, force, bias, driven):
         """Joint force u = τ − Sᵀ p, and the bias force p + (Î − U D⁻¹ Uᵀ) c + U D⁻¹ u passed on to the inner link."""
@@ -48,12 +48,7 @@ class FreeElimination:
 
     ZeroDivisionError if a pivot of Î is a constant zero.
 
-    Parameters
-    ----------
-    S : ndarray, shape (6, 6)
-        Motion subspace.
-    inertia : tuple of ndarray
-        Articulated inertia Î.
+    ``S`` (6, 6): motion subspace.
     """
 
     projected = (np.zeros((3, 3)),) * 3
@@ -305,15 +300,15 @@ def inertia_to_inner(link: Link, kin: JointKinematics, inertia):
     """Inertia of the outer link in the inner link frame."""
     for R, p in ((kin.R, kin.p), (link.R, link.p)):
         A, B, C = (congruent(R, block) for block in inertia)
-        A, C = _symmetric(A), _symmetric(C)
+        A, C = mirrored(A), mirrored(C)
         lever = skew(p)
         shifted = B + lever @ C
         A = A - shifted @ lever + lever @ B.T
-        inertia = _symmetric(A), shifted, C
+        inertia = mirrored(A), shifted, C
     return inertia
 
 
-def _symmetric(A: np.ndarray) -> np.ndarray:
+def mirrored(A: np.ndarray) -> np.ndarray:
     """The same matrix with its upper triangle mirrored: equal entries are one expression."""
     return np.array([[A[min(i, j), max(i, j)] for j in range(len(A))] for i in range(len(A))])
 
@@ -331,7 +326,7 @@ def _project(inertia, U, D_inverse, S):
     for axis in free_axes(S):
         full[axis, :] = 0.0
         full[:, axis] = 0.0
-    return blocks(_symmetric(full))
+    return blocks(mirrored(full))
 
 
 def whole_inertia(inertia) -> np.ndarray:

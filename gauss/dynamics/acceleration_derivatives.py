@@ -25,16 +25,9 @@ from gauss.system import State, System, coordinate_rates, whole
 class LoadedMechanism:
     """A system in one state under its loads, over symbols.
 
-    Parameters
-    ----------
-    loads : sequence of BoundLoad
-        Its loads, with traced laws.
-    t : Expression or float
-        Time [s].
-    q, v, load : ndarray, shape (n_q,), (n_v,), (n_v,)
-        Coordinates, rates, generalised forces added to the loads.
-    subsystems : sequence of Subsystem, optional
-        Subsystems of another stage of the reduction; those of the system when not given.
+    ``loads``: its loads, with traced laws. ``q``, ``v``, ``load`` (n_q,), (n_v,), (n_v,): coordinates, rates, generalised
+    forces added to the loads. ``subsystems``: subsystems of another stage of the reduction; those of the system when not
+    given.
     """
 
     def __init__(self, system: System, loads, t: Scalar, q, v, load, subsystems=None):
@@ -50,10 +43,7 @@ class LoadedMechanism:
     def accelerations(self, pattern: System | None = None) -> np.ndarray:
         """Accelerations (n_v,) alone, as of :meth:`motion`; refined where bodies of loops are unlike, else not numbers.
 
-        Parameters
-        ----------
-        pattern : System, optional
-            A system of numbers, where those of this one are symbols.
+        ``pattern``: a system of numbers, where those of this one are symbols.
         """
         found, pattern = self.motion()[0], pattern or self.system
         if not may_leak(pattern):
@@ -73,20 +63,10 @@ class LoadedMechanism:
         return motion, violation, self.mechanism.dependent_accelerations(rates)
 
     def changes(self, rates, multipliers, directions) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Changes along directions, at fixed accelerations and multipliers, symbols or numbers.
+        """Changes along directions, at fixed accelerations (n_v,) and multipliers (m,), symbols or numbers.
 
-        Parameters
-        ----------
-        rates, multipliers : ndarray, shape (n_v,), (m,)
-            Accelerations and multipliers.
-        directions : sequence of (ndarray, ndarray)
-            Displacements along the rates (n_v,), and changes of the rates (n_v,).
-
-        Returns
-        -------
-        list of tuple of ndarray
-            For each direction the change of the residual of the equations of motion (n_v,), of the loop constraints (m,),
-            and of dependent accelerations (n_v,).
+        Directions are displacements along the rates (n_v,), and changes of the rates (n_v,). For each the change of the
+        residual of the equations of motion (n_v,), of the loop constraints (m,), and of dependent accelerations (n_v,).
         """
         parts = self.residual(rates, multipliers)
         moving = np.concatenate([self.q, self.v])

@@ -95,10 +95,7 @@ class Accelerations:
 def forward_dynamics(system: System) -> Callable:
     """Compiled function (q, v, load, out=None, t=0.0) → q̈.
 
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled, with the reasons.
+    SimulationError if the system cannot be compiled, with the reasons.
     """
     if not system.n_v:
         return _last(system, system.loads)
@@ -123,9 +120,8 @@ def forward_dynamics_on_device(system: System, device) -> "DeviceFunction":
 
     SimulationError if the system cannot be compiled as a whole, with the reasons.
     """
-    from gauss.codegen.gpu.device_function import DeviceFunction
+    from gauss.codegen.gpu.device_function import DeviceFunction, RowsOnDevice
     from gauss.codegen.gpu.devices import device_name
-    from gauss.codegen.gpu.rows import RowsOnDevice
 
     laws, device = Laws(system), device_name(device)
     DEVICE_FUNCTIONS.plan(Question(system, laws))

@@ -49,12 +49,8 @@ class AssembledPose(NamedTuple):
 def assembled(system: System, guess: State, held, restart: bool) -> AssembledPose:
     """Pose that meets the constraints, near a guess if there is one, or that of the least residual.
 
-    Parameters
-    ----------
-    held : sequence of int
-        Entries of v whose coordinates are fixed.
-    restart : bool
-        Whether starts around the guess are tried where the paths from it end at a residual.
+    ``held``: entries of v whose coordinates are fixed. ``restart``: whether starts around the guess are tried where the
+    paths from it end at a residual.
     """
     best = _pose(system, project_positions(system, guess, NEWTON_STEPS, held))
     if best.is_met and _distance(system, guess, best.state) <= FAR_POSE:
@@ -105,9 +101,8 @@ def _distance(system: System, guess: State, state: State) -> float:
     found = 0.0
     for joint in system.joints:
         change = np.abs(state.q[joint.q] - guess.q[joint.q])
-        plain = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
-        units = system.scale.coordinates[joint.v][:plain]
-        found = max(found, float((change[:plain] / units).max(initial=0.0)))
+        units = system.scale.coordinates[joint.v][: joint.n_plain]
+        found = max(found, float((change[: joint.n_plain] / units).max(initial=0.0)))
     return found
 
 

@@ -17,16 +17,18 @@ from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.coupling_calls import CouplingCalls
 from gauss.dynamics.link_frames import joint_sides, link_frames
 from gauss.dynamics.link_kernels import (
+    GROUND_POSE,
+    LoopJointKind,
     acceleration,
     eliminate_link,
     force,
     forward_kinematics,
     link_acceleration,
+    loop_joint_numbers,
     pose,
     residual_force,
 )
 from gauss.dynamics.loop_fronts import LoopFronts
-from gauss.dynamics.loop_kernels import GROUND_POSE, LoopJointKind, loop_joint_numbers
 from gauss.dynamics.tree_recursion import link_numbers, link_of
 from gauss.system import Subsystem
 from gauss.system.elimination_cost import elimination_roots, path_to_ground
@@ -38,12 +40,7 @@ DAMPED = float(np.sqrt(MU))  # regularisation: along rows with smaller pivots ac
 class CallGraph:
     """A subsystem with loops, recorded section by section.
 
-    Parameters
-    ----------
-    subsystem : Subsystem
-        One without relations and gear trains.
-    q, v : ndarray
-        Slots of its coordinates and rates.
+    ``subsystem``: one without relations and gear trains. ``q``, ``v``: slots of its coordinates and rates.
     """
 
     def __init__(self, subsystem: Subsystem, recorder: CallRecorder, q, v):
@@ -297,21 +294,20 @@ class CallGraph:
             for body, held in self.held[index].items():
                 if body >= 0:
                     along = tau[self.subsystem.joints[index].v]
-                    (forces[body],) = self.recorder.call(
-                        "push", _with_wrenches, forces[body], held, parts[index], self.free[index][body], along
-                    )
+                    given = forces[body], held, parts[index], self.free[index][body], along
+                    (forces[body],) = self.recorder.call("push", lambda f, A, y, B, tau: (f + A @ y - B @ tau,), *given)
         return forces
 
     def _values(self, rates, accelerations, still: bool):
         """Record the left sides of the rows; rates of loop joints are added to ``rates``."""
+        value = lambda loop, numbers, q, v, scale, *given: loop.value(numbers, q, v, scale, given, still)  # noqa: E731
         values, turning = {}, {body: np.zeros(3) for body in self.omega} if still else self.omega
         for index in self.loops:
             joint = self.subsystem.joints[index]
             ends = joint.parent, joint.child
             motions = *(turning[body] for body in ends), *(accelerations[body] for body in ends), accelerations[GROUND]
-            function = _value_still if still else _value
             values[index], own = self._at_loop(
-                f"value {still}", index, function, self.q[joint.q], self.v[joint.v], self.scale[index], *motions
+                f"value {still}", index, value, self.q[joint.q], self.v[joint.v], self.scale[index], *motions
             )
             rates[joint.v] = self.recorder.array(own)
         return self.joined(values | self.couplings.values(rates))
@@ -320,11 +316,9 @@ class CallGraph:
         """Object array (m,) of all rows, given by blocks."""
         found = np.zeros(sum(map(len, self.rows.values()))).astype(object)
         for index, block in blocks.items():
-            found[self.rows[index]] = self.recorder.array(self._block(block))
+            operand = block if isinstance(block, Operand) else self.recorder.operand(block)
+            found[self.rows[index]] = self.recorder.array(operand)
         return found
-
-    def _block(self, vector):
-        return vector if isinstance(vector, Operand) else self.recorder.operand(vector)
 
     def rows_of(self, vector) -> dict[int, np.ndarray]:
         """Parts of a vector of all rows, by block."""
@@ -339,15 +333,3 @@ class CallGraph:
 
     def _none(self) -> np.ndarray:
         return np.zeros(self.subsystem.n_v).astype(object)
-
-
-def _with_wrenches(force, held, multipliers, free, tau):
-    return (force + held @ multipliers - free @ tau,)
-
-
-def _value(loop: LoopJointKind, numbers, q, v, scale, *motions):
-    return loop.value(numbers, q, v, scale, motions, still=False)
-
-
-def _value_still(loop: LoopJointKind, numbers, q, v, scale, *motions):
-    return loop.value(numbers, q, v, scale, motions, still=True)

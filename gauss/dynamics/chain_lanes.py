@@ -20,8 +20,7 @@ from gauss.codegen.packed_function import PackedFunction
 from gauss.dynamics.equal_chains import EqualChains, equal_chains
 from gauss.dynamics.given_link_frames import GivenLinkFrames, with_given_frames
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.parameters import changed, count, numbers, with_numbers
-from gauss.dynamics.parametrised_system import ParametrisedSystem
+from gauss.dynamics.parameters import ParametrisedSystem, changed, count, numbers, with_numbers
 from gauss.dynamics.traced_system import Program
 from gauss.system import System
 
@@ -34,14 +33,7 @@ def in_chain_lanes(system: System, laws: Laws, once: Callable, sizes: tuple[int,
 
     Mechanisms with relations, and with traced loads that call functions, are left to code of single operations.
 
-    Parameters
-    ----------
-    laws : Laws
-        Its loads; the traced ones are included.
-    once : callable
-        Dynamics (program, q, v, generalised forces, t) of one state.
-    sizes : tuple of int
-        Lengths of these vectors.
+    ``once``: dynamics (program, q, v, generalised forces, t) of one state.
     """
     kinds = chains_for_lanes(system)
     if not kinds:

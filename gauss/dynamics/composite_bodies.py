@@ -17,16 +17,17 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Expression
+from gauss.dynamics.aba import mirrored
 from gauss.dynamics.link_frames import Link
 from gauss.dynamics.rnea import JointKinematics, KinematicTree, apply
 from gauss.rotations import congruent, cross, skew
 
 
 class Moments(NamedTuple):
-    """Momentum p (3,) of a body, and P = ∫ ẋ xᵀ dm (3, 3)."""
+    """Moments of the velocities of a body."""
 
-    momentum: np.ndarray
-    mixed: np.ndarray
+    momentum: np.ndarray  # (3,) p = ∫ ẋ dm
+    mixed: np.ndarray  # (3, 3) P = ∫ ẋ xᵀ dm
 
     def turned(self, R: np.ndarray, r: np.ndarray) -> "Moments":
         """Moments in the axes and about the origin of a frame from which the present one is turned by R and lies at r."""
@@ -50,12 +51,8 @@ class Moments(NamedTuple):
 class CompositeBodies:
     """Composite bodies of a tree in one state.
 
-    Parameters
-    ----------
-    v : ndarray, shape (n_v,)
-        Rates.
-    rate_of : callable, optional
-        Time derivative of functions of the coordinates at these rates; needed where subspaces move in their link frames.
+    ``rate_of``: time derivative of functions of the coordinates at these rates; needed where subspaces move in their link
+    frames.
     """
 
     def __init__(self, tree: KinematicTree, v: np.ndarray, rate_of: Callable = np.zeros_like):
@@ -114,10 +111,7 @@ class CompositeBodies:
         S_iᵀ (I_j Ψ̈_j + 2 B_j Ψ̇_j + S_j ×* f_j) and S_iᵀ (I_j (Ψ̇_j + Ṡ_j) + 2 B_j S_j) (Singh, Russell and Wensing,
         Efficient analytical derivatives of rigid-body dynamics using spatial vector algebra, 2022).
 
-        Parameters
-        ----------
-        acceleration : ndarray, shape (n_v,)
-            Joint accelerations.
+        ``acceleration`` (n_v,): joint accelerations.
         """
         S, inertias, B, inner = self.subspaces, self.inertias, self.moments, self._inner_motions(acceleration)
         slow = {body: motion_cross(inner[body][0], S[body]) for body in S}
@@ -144,12 +138,8 @@ class CompositeBodies:
     def _paired(self, within: dict, carried: dict, rates: dict, motions: dict) -> np.ndarray:
         """Matrix (n_v, n_v) of entries S_iᵀ F_j, and I_j S_j · A_i + B_jᵀ S_j · C_i, for joints i that carry j.
 
-        Parameters
-        ----------
-        within, carried : dict
-            Wrenches F (6, k) of each joint, at the joint itself and at those that carry it.
-        rates, motions : dict
-            A and C (6, k) of each joint.
+        ``within``, ``carried``: wrenches F (6, k) of each joint, at the joint itself and at those that carry it. ``rates``,
+        ``motions``: A and C (6, k) of each joint.
         """
         tree, to = self.tree, {edge.outer: edge for edge in self.tree.edges}
         found = np.zeros((self.v.size, self.v.size), dtype=object)
@@ -225,5 +215,4 @@ def _about_inner(R, p, mass, first, inertia) -> np.ndarray:
     g = first + (mass / 2.0) * p
     (x, y, z), added = 2.0 * p * g, np.outer(-p, g) - np.outer(g, p)
     added[np.diag_indices(3)] = y + z, x + z, x + y
-    found = congruent(R, inertia) + added
-    return np.array([[found[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])
+    return mirrored(congruent(R, inertia) + added)

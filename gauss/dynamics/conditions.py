@@ -22,12 +22,10 @@ from gauss.scene import ClosedGap, Collider, Contact, Points
 from gauss.scene.contact_pairs import have_closed_form
 from gauss.scene.patch_distances import no_closed_form
 from gauss.system import System, build, phase_scene, sides, whole
-from gauss.system.contact_gaps import of_shapes, slips
+from gauss.system.contact_mode import of_shapes, slips
 from gauss.system.elimination_cost import MOST_SHARED_JOINTS, MOST_WORK
 
-LARGE_TREE_BODIES = (
-    40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
-)
+LARGE_TREE_BODIES = 40  # bodies of a tree above which kernels of links run and compile faster than straight-line code
 MOST_RATES = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
 MOST_COUPLING_WORK = 10_000  # operations for couplings above which kernels are as fast, and compiled in a fifth of the time
 # Pairs of loops that share a joint of the tree, per body, up to which kernels of loops are made within seconds; they are
@@ -57,13 +55,7 @@ MOST_ROWS = 10  # loop constraints of a linear model in straight-line code: 15, 
 
 
 def refuse_motionless(system: System, what: str):
-    """Raise a SimulationError for a system in which nothing can move, which leaves nothing to do.
-
-    Parameters
-    ----------
-    what : str
-        Function that was called.
-    """
+    """Raise a SimulationError for a system in which nothing can move, which leaves nothing to do."""
     if not system.n_v:
         raise SimulationError(f"{what}: nothing in scene {system.scene.name!r} can move; give a joint that moves.")
 

@@ -37,25 +37,11 @@ def consistent(
 
     Given coordinates change as little as the constraints allow; random restarts are for other coordinates only.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    state : State
-        The guess.
-    kept : sequence of str
-        Joints, or single rates of joints, that keep their coordinates and rates if possible.
-    required : bool
-        Whether they must.
-    least_violation : bool
-        Return the pose of least residual for inconsistent constraints.
-    rough : bool
-        Whether the guess is rough: random restarts around it are allowed.
+    ``kept``: joints, or single rates of joints, that keep their coordinates and rates if possible. ``required``: whether
+    they must. ``least_violation``: return the pose of least residual for inconsistent constraints. ``rough``: whether the
+    guess is rough: random restarts around it are allowed.
 
-    Raises
-    ------
-    AssemblyError
-        If the constraints cannot be met; it carries the closest pose and the residual of each constraint.
+    AssemblyError if the constraints cannot be met; it carries the closest pose and the residual of each constraint.
     """
     state = within_limits(system, state)
     if not system.has_closures:

@@ -34,19 +34,12 @@ class BaumgarteFeedback(NamedTuple):
 class ConstrainedArticulatedBody:
     """A subsystem in one state, eliminated once for any number of right-hand sides.
 
-    Parameters
-    ----------
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Its coordinates and rates; floats or expressions.
-    relations : sequence of Rows
-        Rows of its relations in this state, in the order of ``subsystem.relations``.
+    ``q``, ``v`` (n_q,), (n_v,): its coordinates and rates; floats or expressions. ``relations``: rows of its relations in
+    this state, in the order of ``subsystem.relations``.
 
-    Attributes
-    ----------
-    constraints : list
-        Loop constraints: loop joints, then couplings, then relations. Each has ``value``, the left side of its rows;
-        ``unit_forces``, wrenches and generalised forces of a unit multiplier of each row; ``sizes``, K M⁻¹ Kᵀ of each row on
-        free bodies; ``velocity_rhs``, the right side C of its velocity rows.
+    Attributes: ``constraints``: loop constraints: loop joints, then couplings, then relations. Each has ``value``, the left
+    side of its rows; ``unit_forces``, wrenches and generalised forces of a unit multiplier of each row; ``sizes``, K M⁻¹ Kᵀ
+    of each row on free bodies; ``velocity_rhs``, the right side C of its velocity rows.
     """
 
     def __init__(self, subsystem: Subsystem, q, v, relations):
@@ -109,14 +102,8 @@ class ConstrainedArticulatedBody:
     def motion(self, tau, forces=None, feedback: BaumgarteFeedback | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the loop constraints.
 
-        Parameters
-        ----------
-        tau : ndarray, shape (n_v,)
-            Generalised forces.
-        forces : dict, optional
-            External forces and moments on bodies, {body: (force, moment)}.
-        feedback : BaumgarteFeedback, optional
-            Stabilisation.
+        ``tau`` (n_v,): generalised forces. ``forces``: external forces and moments on bodies, {body: (force, moment)}.
+        ``feedback``: stabilisation.
         """
         rates, accelerations = self.articulated.motion(tau, self._external_wrenches(tau, forces))
         target = 0.0 if feedback is None else feedback.rows
@@ -217,13 +204,15 @@ class ConstrainedArticulatedBody:
     def position_correction(self, phi, slack) -> np.ndarray:
         """Newton step (n_v,), the least in the mass metric, on the position residual.
 
-        Parameters
-        ----------
-        phi, slack : ndarray, list of ndarray
-            Residual of the rows, and coordinate errors of each loop joint; see :func:`loop_residual`.
+        ``phi``, ``slack``: residual of the rows, and coordinate errors of each loop joint; see :func:`loop_residual`.
         """
         multipliers = self.factor.solve(self.scale * phi) if self.unit_forces else ()  # Newton's steps refine, too
-        step = self._all_rates(*self.under_multipliers({}, {}, self.scale * multipliers), still=True)
+        return self._with_slack(
+            self._all_rates(*self.under_multipliers({}, {}, self.scale * multipliers), still=True), slack
+        )
+
+    def _with_slack(self, step, slack) -> np.ndarray:
+        """Displacement (n_v,) with the errors of the coordinates of loop joints added."""
         step = step.astype(np.result_type(step, *slack))  # numbers where no loop is closed
         for loop_joint, off in zip(self.loop_joints, slack, strict=True):
             step[loop_joint.joint.v] = step[loop_joint.joint.v] + off

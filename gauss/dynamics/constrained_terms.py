@@ -20,12 +20,7 @@ from gauss.system import System
 class ConstrainedTerms(StateTerms):
     """Terms of one system in one state that meets its constraints, for k independent coordinates.
 
-    Parameters
-    ----------
-    system, q, v, t
-        As of :class:`StateTerms`.
-    independent : sequence of int
-        Places of the independent rates in v.
+    ``system``, ``q``, ``v``, ``t``: as of :class:`StateTerms`. ``independent``: places of the independent rates in v.
     """
 
     def __init__(self, system: System, q, v, t: Scalar, independent):

@@ -52,10 +52,7 @@ def with_alike_bodies(system: System, pattern: System | None = None) -> tuple[Su
 
     A projection of what a step left, and its multipliers, keep their digits in this metric.
 
-    Parameters
-    ----------
-    pattern : System, optional
-        A system of numbers, where those of this one are symbols.
+    ``pattern``: a system of numbers, where those of this one are symbols.
     """
     pattern = pattern or system
     if not may_leak(pattern):
@@ -78,17 +75,7 @@ def refused_where_leaking(system: System, mechanism: Mechanism, values: np.ndarr
 def constraint_leak(system: System, mechanism: Mechanism) -> Scalar:
     """Sum of K x, relative, of rates x nearest to random ones, and of accelerations x under random forces.
 
-    Parameters
-    ----------
-    system : System
-        The system, of numbers.
-    mechanism : Mechanism
-        The system in one state.
-
-    Returns
-    -------
-    Scalar
-        Zero without loop constraints.
+    Zero without loop constraints. The system is one of numbers.
     """
     if not mechanism.scale.size:
         return 0.0

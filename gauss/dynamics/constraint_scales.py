@@ -4,6 +4,9 @@ Residuals are relative to them: the length of the scene for a distance, 1 for an
 constraints of a user.
 """
 
+from collections.abc import Callable
+from functools import wraps
+
 import numpy as np
 
 from gauss.dynamics.kinematics import kinematics
@@ -16,27 +19,18 @@ from gauss.system.relations import place_relations
 GRADIENT_DISTANCE = 0.1  # units: distance from the start at which gradients are taken that vanish there
 
 
-def _of_constraints(system: System) -> np.ndarray:
+def _once(scales: Callable[[System], np.ndarray]) -> Callable[[System], np.ndarray]:
+    """Function of a system that is evaluated once for each."""
+    return wraps(scales)(lambda system: cached(system, (scales,), lambda: scales(system)))
+
+
+@_once
+def constraint_scales(system: System) -> np.ndarray:
     """Scales (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.position_residual`."""
     length, coordinates = system.scale.length, system.scale.coordinates
     joint = np.array([1.0, 1.0, 1.0, length, length, length])
     driven = [coordinates[system.column(coupling.driven)] for coupling in system.scene.couplings.values()]
     return np.concatenate([*[joint] * len(system.joints), driven, relation_scales(system, system.relations)])
-
-
-def loop_distance_scales(system: System) -> np.ndarray:
-    """Scales of the rows of :func:`gauss.dynamics.assemble.closure_distances`, in that order."""
-    return _once(system, _distances)
-
-
-def constraint_scales(system: System) -> np.ndarray:
-    """Scales (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.position_residual`."""
-    return _once(system, _of_constraints)
-
-
-def gap_scales(system: System) -> np.ndarray:
-    """Scales (m,) of the gap functions."""
-    return _once(system, _of_gaps)
 
 
 def contact_scales(system: System) -> np.ndarray:
@@ -56,8 +50,9 @@ def set_valued_scales(system: System) -> np.ndarray:
     return np.array(slides)
 
 
-def _of_gaps(system: System) -> np.ndarray:
-    """Unit of its coordinate for a stop, the length for shapes and ropes, the size of its gradient for a gap of the user."""
+@_once
+def gap_scales(system: System) -> np.ndarray:
+    """Scales (m,) of the gap functions: unit of the coordinate of a stop, length of shapes, size of a gradient."""
     length, units, found = system.scale.length, system.scale.coordinates, []
     for side in sides(system.scene):
         if isinstance(side.whole, Stop):
@@ -85,7 +80,9 @@ def relation_scales(system: System, relations: Relations) -> np.ndarray:
     return np.where(found > 0.0, found, system.scale.length)
 
 
-def _distances(system: System) -> np.ndarray:
+@_once
+def loop_distance_scales(system: System) -> np.ndarray:
+    """Scales of the rows of :func:`gauss.dynamics.assemble.closure_distances`, in that order."""
     length, n = system.scale.length, len(system.joints)
     joints = sum(index < n for index in system.structure.closures)
     return np.concatenate([*[[1.0, length, length, length]] * joints, constraint_scales(system)[6 * n :]])
@@ -103,7 +100,3 @@ def _slopes(system: System, relations: Relations, state) -> np.ndarray:
         joints = [B * units[system.joints[index].v] for B, index in zip(own.B, placed.joints, strict=True)]
         found.append(np.abs(np.concatenate([np.zeros((placed.size, 1)), *bodies, *joints], axis=1)).max(axis=1))
     return np.concatenate(found)
-
-
-def _once(system: System, make) -> np.ndarray:
-    return cached(system, (make,), lambda: make(system))

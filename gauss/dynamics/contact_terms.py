@@ -10,7 +10,7 @@ from gauss.codegen import Function, Kernel, forward, jacobian, write
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.store import cached_on_disk
 from gauss.system import State, System, coordinate_rates, guards, sides
-from gauss.system.contact_gaps import slips
+from gauss.system.contact_mode import slips
 from gauss.system.relations import place_residuals
 
 
@@ -28,10 +28,7 @@ class ContactTerms(NamedTuple):
 class ContactTermsKernel:
     """Contact terms, as machine code, or inlined where they are traced.
 
-    Parameters
-    ----------
-    system : System
-        With unilateral constraints or set-valued elements.
+    ``system``: with unilateral constraints or set-valued elements.
     """
 
     def __init__(self, system: System):

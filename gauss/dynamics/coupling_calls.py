@@ -13,16 +13,10 @@ from gauss.system.elimination_cost import coupling_blocks
 class CouplingCalls:
     """Couplings of a subsystem in a call graph.
 
-    Attributes
-    ----------
-    members : dict
-        Indices of the couplings of each block, {block: array}; blocks are numbered after the joints.
-    scale : dict
-        Factors of the rows, {block: (m,)}.
-    unit_forces : dict
-        Forces of unit multipliers along joints, {block: {joint: (1, m)}}.
-    no_wrenches : dict
-        Zero wrenches (6, m), {m: wrenches}, as slots: the kernels of all links take them as they take others.
+    Attributes: ``members``: indices of the couplings of each block, {block: array}; blocks are numbered after the joints.
+    ``scale``: factors of the rows, {block: (m,)}. ``unit_forces``: forces of unit multipliers along joints, {block: {joint:
+    (1, m)}}. ``no_wrenches``: zero wrenches (6, m), {m: wrenches}, as slots: the kernels of all links take them as they take
+    others.
     """
 
     def __init__(self, subsystem: Subsystem, recorder: CallRecorder):
@@ -51,7 +45,9 @@ class CouplingCalls:
         for block, along in self.unit_forces.items():
             for joint, forces in along.items():
                 place = self.subsystem.joints[joint].v
-                (own,) = self.recorder.call("less coupling", _less, tau[place], forces, multipliers[block])
+                (own,) = self.recorder.call(
+                    "less coupling", lambda tau, forces, y: (tau - forces @ y,), tau[place], forces, multipliers[block]
+                )
                 tau[place] = self.recorder.array(own)
         return tau
 
@@ -62,7 +58,7 @@ class CouplingCalls:
             value = self.recorder.operand(np.zeros(len(self.members[block])).astype(object))
             for joint, forces in along.items():
                 own = rates[self.subsystem.joints[joint].v]
-                (value,) = self.recorder.call("coupled", _with_rates, value, forces, own)
+                (value,) = self.recorder.call("coupled", lambda x, forces, own: (x + own @ forces,), value, forces, own)
             found[block] = value
         return found
 
@@ -77,18 +73,5 @@ class CouplingCalls:
     def _position_residual(self, coupling, q) -> np.ndarray:
         own, other = (q[self.subsystem.joint(name).q] for name in (coupling.driven, coupling.driver))
         numbers = self.recorder.keep([coupling.ratio, coupling.offset])
-        (residual,) = self.recorder.call("coupled coordinates", _off, own, other, numbers)
+        (residual,) = self.recorder.call("coupled coordinates", lambda x, y, n: (x - n[0] * y - n[1],), own, other, numbers)
         return self.recorder.array(residual)
-
-
-def _less(tau, forces, multipliers):
-    return (tau - forces @ multipliers,)
-
-
-def _with_rates(value, forces, rates):
-    return (value + rates @ forces,)
-
-
-def _off(own, other, numbers):
-    ratio, offset = numbers
-    return (own - ratio * other - offset,)

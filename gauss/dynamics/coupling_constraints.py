@@ -28,14 +28,7 @@ class Couplings:
 class RelationRows:
     """Rows of one relation, A a + B q̈ = D, in link frames.
 
-    Parameters
-    ----------
-    tree : KinematicTree
-        The open tree in its state.
-    relation : Bound
-        Its bodies of the system and joints of the subsystem.
-    rows : Rows
-        Its blocks.
+    ``relation``: its bodies of the system and joints of the subsystem.
     """
 
     def __init__(self, tree: KinematicTree, relation, rows):
@@ -70,14 +63,7 @@ class RelationRows:
 class _CarriedBody:
     """Body of the system on the link that carries it, with its block A of the rows.
 
-    Parameters
-    ----------
-    tree : KinematicTree
-        The open tree.
-    frame : PlacedFrame
-        Principal central frame of the body on the body of the subsystem that carries it.
-    A : ndarray, shape (m, 6)
-        Its block.
+    ``frame``: principal central frame of the body on the body of the subsystem that carries it.
     """
 
     def __init__(self, tree: KinematicTree, frame, A):

@@ -18,12 +18,8 @@ from gauss.system import Subsystem, System
 class EmbeddedArticulatedBody(ConstrainedArticulatedBody):
     """A subsystem in one state with loops of full rank, eliminated once by :class:`EmbeddedLoops`.
 
-    Parameters
-    ----------
-    subsystem, q, v, relations
-        As of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
-    dependent : collection of int
-        Redundant rows, which follow from the others: their multipliers are zero.
+    ``subsystem``, ``q``, ``v``, ``relations``: as of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
+    ``dependent``: redundant rows, which follow from the others: their multipliers are zero.
     """
 
     def __init__(self, subsystem: Subsystem, q, v, relations, dependent: Collection[int] = ()):
@@ -106,21 +102,14 @@ class EmbeddedArticulatedBody(ConstrainedArticulatedBody):
 
     def position_correction(self, phi, slack) -> np.ndarray:
         """Newton step (n_v,); see :meth:`ConstrainedArticulatedBody.position_correction`."""
-        step = self.response(np.zeros(self.subsystem.n_v), -phi)[0]
-        for loop_joint, off in zip(self.loop_joints, slack, strict=True):
-            step[loop_joint.joint.v] = step[loop_joint.joint.v] + off
-        return step
+        return self._with_slack(self.response(np.zeros(self.subsystem.n_v), -phi)[0], slack)
 
 
 class EmbeddedMechanism(Mechanism):
     """A system in one state whose loops are eliminated where they close.
 
-    Parameters
-    ----------
-    system, q, v, t
-        As of :class:`gauss.dynamics.mechanism.Mechanism`.
-    dependent : sequence of collections of int
-        Redundant rows of each subsystem, see :class:`EmbeddedArticulatedBody`; none if empty.
+    ``system``, ``q``, ``v``, ``t``: as of :class:`gauss.dynamics.mechanism.Mechanism`. ``dependent``: redundant rows of each
+    subsystem, see :class:`EmbeddedArticulatedBody`; none if empty.
     """
 
     of_subsystem: type[EmbeddedArticulatedBody] = EmbeddedArticulatedBody

@@ -46,20 +46,17 @@ class Front(NamedTuple):
 
 
 class HubJoint(NamedTuple):
-    """Inner joint of a hub: constrained directions T of its wrenches, and the dual of its motion subspace."""
+    """Inner joint of a hub, which is cut."""
 
-    T: np.ndarray
-    dual: np.ndarray
-    rows: list[int]
+    T: np.ndarray  # (6, 6 − k) constrained directions of its wrenches
+    dual: np.ndarray  # (6, k) dual of its motion subspace
+    rows: list[int]  # its rows
 
 
 class EmbeddedLoops(ArticulatedBody):
     """Forward dynamics of a tree with loop constraints in one state.
 
-    Parameters
-    ----------
-    hubs : dict
-        Roots of the fronts of hubs, {hub: root}.
+    ``hubs``: roots of the fronts of hubs, {hub: root}.
     """
 
     def __init__(self, tree: KinematicTree, rows, hubs: dict[int, int]):

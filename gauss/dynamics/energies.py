@@ -28,12 +28,7 @@ def look_at_energies(motion: Kinematics, work) -> np.ndarray:
 
     The scale is the sum of the absolute terms of the potential energy, with a least height of each body by its size.
 
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics of the state.
-    work : array_like, shape (3,)
-        Work of drives and of forces on bodies, and energy dissipated, since the start [J].
+    ``work`` (3,): work of drives and of forces on bodies, and energy dissipated, since the start [J].
     """
     lifted, stored = _lifted(motion), stored_energies(motion)
     potential = sum(stored, start=-sum(lifted))

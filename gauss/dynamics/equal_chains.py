@@ -16,17 +16,17 @@ MOST_TRIALS = 1000  # partial numberings of a chain: equal trees need one for ea
 
 
 class BodyChain(NamedTuple):
-    """Bodies and joints of a chain in a subsystem, in the order of the first chain that it equals."""
+    """A chain of a subsystem, in the order of the first chain that it equals."""
 
-    bodies: tuple[int, ...]
+    bodies: tuple[int, ...]  # bodies, joints: their indices
     joints: tuple[int, ...]
 
 
 class EqualChains(NamedTuple):
-    """Equal chains of a subsystem of a system."""
+    """Equal chains of a subsystem."""
 
-    subsystem: Subsystem
-    chains: list[BodyChain]
+    subsystem: Subsystem  # the one they are in
+    chains: list[BodyChain]  # two or more
 
     @property
     def of_body(self) -> dict[int, tuple[int, int]]:

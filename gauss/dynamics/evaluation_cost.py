@@ -53,17 +53,7 @@ def slowdown(system: System, plan: Plan) -> float:
 def warn_of_slow_route(system: System, plan: Plan, evaluations: int):
     """Warn once for each system of a route that is :data:`CLIFF` times slower than one that an element bars.
 
-    Parameters
-    ----------
-    plan : Plan
-        Plan of the motion.
-    evaluations : int
-        Evaluations of the motion.
-
-    Warns
-    -----
-    SlowRouteWarning
-        With the elements, the estimated costs, and a remedy.
+    SlowRouteWarning with the elements, the estimated costs, and a remedy.
     """
     ratio, cost = slowdown(system, plan), evaluation_cost(system, plan)
     if ratio < CLIFF or cost * evaluations < LEAST_WASTE:

@@ -45,14 +45,14 @@ def _rates(scene: Scene, root: str) -> dict[str, float]:
 
 
 class Follower(NamedTuple):
-    """A joint of a gear train but the first: places of its coordinate and rate, and of those of the first joint."""
+    """A joint of a gear train but the first."""
 
-    q: int
+    q: int  # q, v: places of its coordinate and rate
     v: int
-    first_q: int
+    first_q: int  # first_q, first_v: those of the first joint
     first_v: int
-    ratio: float
-    offset: float
+    ratio: float  # q is the ratio times that of the first joint,
+    offset: float  # plus the offset
 
 
 def followers(system: System) -> list[Follower]:

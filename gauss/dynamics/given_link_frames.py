@@ -54,12 +54,8 @@ def ungrouped(subsystem: Subsystem) -> GivenLinkFrames:
 def with_moved_joint(subsystem: Subsystem, index: int, body: int, shift) -> GivenLinkFrames:
     """Subsystem, its inertias not regrouped, whose joint has another place on one of its bodies.
 
-    Parameters
-    ----------
-    index, body : int
-        The joint, and the body on which it moves.
-    shift : ndarray, shape (3,)
-        Displacement of the joint in the principal central frame of the body [m], floats or expressions.
+    ``index``, ``body``: the joint, and the body on which it moves. ``shift`` (3,): displacement of the joint in the
+    principal central frame of the body [m], floats or expressions.
     """
     given = ungrouped(subsystem)
     links, sides, turned = dict(given.links), dict(given.sides), given.links[body].R_central.T @ shift

@@ -22,12 +22,8 @@ STANDARD = ("mass", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 def inertial_regressor(terms: StateTerms, acceleration) -> np.ndarray:
     """Y (k, 10 n) for n bodies, over symbols.
 
-    Parameters
-    ----------
-    terms : StateTerms
-        Terms of a state; for independent coordinates, Y is projected on them.
-    acceleration : ndarray, shape (n_v,)
-        Accelerations of all joints; for independent coordinates the others are replaced by those of the constraints.
+    ``terms``: terms of a state; for independent coordinates, Y is projected on them. ``acceleration`` (n_v,): accelerations
+    of all joints; for independent coordinates the others are replaced by those of the constraints.
     """
     tree, system = terms.tree, terms.system
     links = tree.accelerations(terms.allowed_acceleration(acceleration))

@@ -1,5 +1,7 @@
 """Initial states without Newton steps: the start of the scene is kept by its content, a consistent state as it is given."""
 
+import warnings
+
 import numpy as np
 
 from gauss.codegen import Kernel, write
@@ -9,7 +11,7 @@ from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import RESIDUAL_ROUNDOFF, within_limits
 from gauss.dynamics.store import cached, cached_on_disk
-from gauss.errors import GaussError
+from gauss.errors import GaussError, StartWarning, listed, user_level
 from gauss.system import State, System
 
 RESIDUAL_THRESHOLD = 30  # residuals by numpy that take as long as compiling the residual
@@ -30,7 +32,7 @@ def scene_start(system: System) -> State:
         found.append(find() if start is None else start)
         return found[0], start is not None, system.rigid_joints
 
-    state, is_met, rigid_joints = cached_on_disk(system, (scene_start, _given_starts(system)), make)
+    state, is_met, rigid_joints = cached_on_disk(system, (scene_start, given_starts(system)), make)
     vars(system).setdefault("rigid_joints", rigid_joints)  # its own property, which would reduce the system to find them
     if not (found or is_met):
         return find()
@@ -49,10 +51,10 @@ def met_start(system: System) -> State | None:
         is_met = not (violations(system, start) or changed_starts(system, within_limits(system, given), start, names))
         return start if is_met else None
 
-    return cached(system, (met_start, _given_starts(system)), make)
+    return cached(system, (met_start, given_starts(system)), make)
 
 
-def _given_starts(system: System) -> tuple:
+def given_starts(system: System) -> tuple:
     """Starts of a scene as a cache key: systems whose scenes differ in nothing else share their cache."""
     return tuple(system.scene.starts.values())
 
@@ -60,12 +62,23 @@ def _given_starts(system: System) -> tuple:
 def projected(system: System, state: State) -> State:
     """State projected onto the constraints; one that meets them to round-off stays as it is.
 
-    AssemblyError if the constraints cannot be met from there.
+    AssemblyError if the constraints cannot be met from there. StartWarning if it is beyond the limits of a joint, where it
+    is moved to them.
     """
-    state = within_limits(system, state)
+    given, state = state, within_limits(system, state)
+    if state is not given and not np.array_equal(state.q, given.q):
+        _warn_of_limits(system, given, state)
     if not system.has_closures:
         return state
     return state if constraint_residual(system, state) <= RESIDUAL_ROUNDOFF else consistent(system, state)
+
+
+def _warn_of_limits(system: System, given: State, moved: State):
+    limited = [joint.name for joint in system.joints if system.scene.joints[joint.name].limits is not None]
+    changed = changed_starts(system, given, moved, limited)
+    if changed:
+        words = f"the state is beyond limits of joints, and was moved to them: {listed(changed.values())}."
+        warnings.warn(words, StartWarning, stacklevel=user_level())
 
 
 def constraint_residual(system: System, state: State) -> float:

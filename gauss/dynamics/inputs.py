@@ -24,12 +24,8 @@ def input_loads(system: System) -> tuple[BoundLoad, ...]:
 class InputForces:
     """Inputs of a system as generalised forces, Q = S clip(u) where each acts along one rate.
 
-    Attributes
-    ----------
-    columns : ndarray of int, shape (n_u,)
-        Rate along which each input acts, where all are torques or forces of one joint.
-    low, high : ndarray, shape (n_u,)
-        Least and largest effort [N m, N].
+    Attributes: ``columns`` (n_u,): rate along which each input acts, where all are torques or forces of one joint. ``low``,
+    ``high`` (n_u,): least and largest effort [N m, N].
     """
 
     def __init__(self, system: System):
@@ -76,10 +72,7 @@ class HeldLaw:
 def driven_scene(scene: Scene, laws: Mapping[str, Callable]) -> Scene:
     """Scene with drives, and forces on bodies, for its inputs.
 
-    Parameters
-    ----------
-    laws : mapping of str to callable
-        Input → law t ↦ value [N m, N], cut off at the limits of the input.
+    ``laws``: input → law t ↦ value [N m, N], cut off at the limits of the input.
     """
     loads: dict[str, Drive | Force] = {}
     for name, given in scene.inputs.items():

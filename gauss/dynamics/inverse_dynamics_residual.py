@@ -9,30 +9,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from gauss.backends.structure import Edge
-from gauss.dynamics.assemble import impressed
-from gauss.dynamics.constraint_rows import joint_rows
+from gauss.dynamics.assemble import impressed, joint_rows
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.rotations import cross
 
 
 def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np.ndarray:
-    """Residual (n_v,) of the equations of motion: loads, gravity and inertia; numbers or expressions.
+    """Residual (n_v,) of the equations of motion under joint accelerations (n_v,): loads, gravity and inertia.
 
-    Parameters
-    ----------
-    motion : Kinematics
-        Poses and velocities.
-    applied : Applied
-        Loads there.
-    rates : ndarray, shape (n_v,)
-        Joint accelerations.
-
-    Returns
-    -------
-    ndarray, shape (n_v,)
-        Zero for the accelerations of a tree without loop constraints. Loop joints exert no force here, and their coordinates
-        are left out.
+    Numbers or expressions; zero for the accelerations of a tree without loop constraints. Loop joints exert no force here,
+    and their coordinates are left out.
     """
     system, wrenches = motion.system, body_residuals(motion, applied, rates)
     parts = [part for wrench in wrenches.values() for part in wrench]
@@ -47,15 +34,7 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
 def body_residuals(motion: Kinematics, applied: Applied, rates) -> dict[int, tuple]:
     """Loads, gravity and inertia of each body under joint accelerations (n_v,): what its joints balance, with their drives.
 
-    Parameters
-    ----------
-    motion, applied, rates
-        As of :func:`inverse_dynamics_residual`.
-
-    Returns
-    -------
-    dict
-        {body: (moment about the centre of mass, force)} in world axes.
+    {body: (moment about the centre of mass, force)} in world axes.
     """
     system, inertial_forces, wrenches = motion.system, impressed(motion, applied), {}
     for edge, outer, moved in outward_accelerations(motion, rates):
@@ -66,21 +45,10 @@ def body_residuals(motion: Kinematics, applied: Applied, rates) -> dict[int, tup
 
 
 def outward_accelerations(motion: Kinematics, rates) -> Iterator[tuple[Edge, np.ndarray, np.ndarray]]:
-    """Accelerations of the bodies, A a + B q̈ = D outward along the spanning tree; numbers or expressions.
+    """Accelerations of the bodies under those of the joints (n_v,), A a + B q̈ = D outward along the spanning tree.
 
-    Parameters
-    ----------
-    motion : Kinematics
-        Poses and velocities, with the joints.
-    rates : ndarray, shape (n_v,)
-        Joint accelerations.
-
-    Yields
-    ------
-    edge : Edge
-        Edge of the tree to the body.
-    alpha, acceleration : ndarray, shape (3,)
-        Angular acceleration, and acceleration of the centre of mass, in world axes.
+    The edge of the tree to each body, its angular acceleration, and the acceleration of its centre of mass (3,), in world
+    axes; numbers or expressions.
     """
     accelerations = {-1: (np.zeros(3), np.zeros(3))}
     for edge in motion.system.structure.tree:

@@ -43,12 +43,9 @@ def accelerations_by_place(
     accelerations and multipliers, of the loops of the whole system: its reductions hold for present places. What redundant
     rows contradict is left out.
 
-    Parameters
-    ----------
-    system, loads, state, load, parameter
-        As of :func:`gauss.dynamics.parameter_terms.accelerations_by_parameter`.
-    following : ndarray, shape (3, n_q + n_v), optional
-        Changes of coordinates and rates by :func:`following_place`; both are fixed when not given.
+    ``system``, ``loads``, ``state``, ``load``, ``parameter``: as of
+    :func:`gauss.dynamics.parameter_terms.accelerations_by_parameter`. ``following`` (3, n_q + n_v): changes of coordinates
+    and rates by :func:`following_place`; both are fixed when not given.
     """
     t, q, v = state.t, state.q, state.v
     own, forces, _ = applied_loads(system, loads, state)
@@ -62,20 +59,10 @@ def accelerations_by_place(
 def place_changes(
     system: System, loads: Sequence[BoundLoad], state: State, load, parameter: str, rates, multipliers, following=None
 ) -> list[list[np.ndarray]]:
-    """Changes by the place of a joint, at fixed accelerations and multipliers of the loops of the whole system.
+    """Changes by the place of a joint, at fixed accelerations (n_v,) and multipliers (m,) of the loops of the whole system.
 
-    Parameters
-    ----------
-    system, loads, state, load, parameter, following
-        As of :func:`accelerations_by_place`.
-    rates, multipliers : ndarray, shape (n_v,), (m,)
-        Accelerations and multipliers.
-
-    Returns
-    -------
-    list of list of ndarray
-        For each axis the change of the residual of the equations of motion (n_v,), of the loop constraints (m,), and of
-        dependent accelerations (n_v,).
+    For each axis that of the residual of the equations of motion (n_v,), of the loop constraints (m,), and of dependent
+    accelerations (n_v,). Other arguments are those of :func:`accelerations_by_place`.
     """
     n, m = system.n_v, multipliers.size
 
@@ -135,16 +122,8 @@ def _moved(system: System, parameter: str, place) -> tuple[System, GivenLinkFram
 def _along_axes(parts: Callable, state: State, moving: np.ndarray, *more: np.ndarray) -> list[np.ndarray]:
     """Derivatives of parts(t, q, v, place, …) along each axis of a place, with coordinates and rates moving with it.
 
-    Parameters
-    ----------
-    parts : callable
-        Function over symbols; of ``more`` besides.
-    state : State
-        State over symbols.
-    moving : ndarray, shape (3, n_q + n_v)
-        Changes of coordinates and rates for each axis.
-    more : ndarray
-        Further arguments, which are fixed.
+    ``parts``: function over symbols; of ``more`` besides. ``moving`` (3, n_q + n_v): changes of coordinates and rates for
+    each axis. ``more``: further arguments, which are fixed.
     """
     t, q, v = state.t, state.q, state.v
 

@@ -1,4 +1,4 @@
-"""Functions of a large system for compiled loops, beside its dynamics: forces and power of the loads, energies.
+"""Functions of a large system for compiled loops: forces and power of the loads, energies; dynamics and check of a tree.
 
 Straight-line code of a system grows with the number of its links; kernels hold the code of each kind of link once. Traced
 loads are straight-line code.
@@ -9,14 +9,15 @@ from functools import cache, cached_property
 import numpy as np
 
 from gauss.codegen import Function, PythonCallback, write
-from gauss.codegen.kernels import ENERGY_SAMPLE, RowCode, RowFunction
-from gauss.dynamics.called_program import called_loads
+from gauss.codegen.kernels import ENERGY_SAMPLE, Correction, RowCode, RowFunction
 from gauss.dynamics.energies import energy_sample, least_magnitude, stored_energies
+from gauss.dynamics.error_scale import acceleration_scale
 from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.load_forces import generalised_forces
+from gauss.dynamics.load_forces import generalised_forces, traced_forces
 from gauss.dynamics.loads import Applied
+from gauss.dynamics.programs import called_loads
 from gauss.dynamics.traced_system import Program, off_unit
-from gauss.dynamics.tree_recursion import energy_recursion
+from gauss.dynamics.tree_recursion import energy_recursion, forward_tree_recursion, inverse_tree_recursion
 from gauss.system import State, System
 
 
@@ -48,13 +49,7 @@ class KernelProgram(Program):
     @cached_property
     def _load_forces(self) -> Function | None:
         """Function (t, q, v) → (generalised forces, power) of the loads; None without loads."""
-
-        def forces(t, q, v):
-            motion = Kinematics(self.system, State(t[0], q, v))
-            applied = Applied(motion, self.loads)
-            return generalised_forces(motion, applied), [applied.driven, applied.loaded, applied.dissipated]
-
-        return write(forces, 1, self.system.n_q, self.system.n_v, name="forces") if self.loads else None
+        return traced_forces(self.system, self.loads) if self.loads else None
 
     @cached_property
     def _called_loads(self) -> PythonCallback | None:
@@ -144,3 +139,39 @@ def added_forces(system: System, loads) -> Function:
         return generalised_forces(motion, Applied(motion, loads)), [off_unit(system, q)]
 
     return write(added, system.n_q, system.n_v, 1, name="loads")
+
+
+def tree_correction(system: System) -> Correction:
+    """Correction of accelerations by inverse dynamics, and with it the recursions of forward and inverse dynamics."""
+    floor = acceleration_scale(system) * float(system.scale.coordinates.min())
+    return Correction(forward_tree_recursion(system), inverse_tree_recursion(system), ground_acceleration(system), floor)
+
+
+class TreeProgram(KernelProgram):
+    """Functions of a large tree; states are not projected, for a tree has no loop constraints."""
+
+    @cached_property
+    def _correction(self) -> Correction:
+        return tree_correction(self.system)
+
+    def _emit_rates(self, code: RowCode):
+        n_q, n_v = self.system.n_q, self.system.n_v
+        inputs, loads = code.room(n_q + 2 * n_v + 6), code.room(n_v + 3)
+        self.put_load_forces(code, code.given, loads)
+        code.copy(inputs, code.at(code.given, 1), n_q + n_v)
+        code.copy(code.at(inputs, n_q + n_v), loads, n_v)
+        self.put_ground(code, code.at(inputs, n_q + 2 * n_v))
+        code.call(self._correction.forward, inputs, code.found)
+        code.copy(code.at(code.found, n_v), code.at(loads, n_v), 3)
+
+    def _emit_check(self, code: RowCode):
+        n_q, n_v, x, n_in = self.system.n_q, self.system.n_v, code.given, self._correction.arity[0]
+        inputs, loads, found = code.room(n_in), code.room(n_v + 3), code.room(n_v + 1)
+        self.put_load_forces(code, x, loads)
+        code.copy(inputs, code.at(x, 1), n_q + n_v)
+        code.copy(code.at(inputs, n_q + n_v), code.at(x, self.layout.row), n_v)
+        code.copy(code.at(inputs, n_q + 2 * n_v), loads, n_v)
+        code.call(self._correction, inputs, found)
+        code.put(code.found, 0, code.number(found, n_v))
+        code.put(code.found, 1, code.motions.constant(0.0))
+        self.put_energies(code, code.at(code.found, 2))

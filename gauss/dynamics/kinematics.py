@@ -18,35 +18,21 @@ WORLD_AXES = np.eye(3)
 
 @dataclass(frozen=True)
 class JointMotion:
-    """Kinematics of a joint in world axes.
+    """Kinematics of a joint in world axes."""
 
-    Parameters
-    ----------
-    P : ndarray, shape (3,)
-        Joint point, fixed in the child [m].
-    r, s : ndarray, shape (3,)
-        From the centre of mass of the child, of the parent, to P [m].
-    E_omega, E_v : ndarray, shape (3, k)
-        Motion subspace in world axes.
-    bias_omega, bias_v : ndarray, shape (3,)
-        E° q̇: rate of the subspace at fixed parent times the rates.
-    R_predicted : ndarray, shape (3, 3)
-        Joint frame of the child by the parent and the coordinates.
-    """
-
-    P: np.ndarray
-    r: np.ndarray
+    P: np.ndarray  # (3,) joint point, fixed in the child [m]
+    r: np.ndarray  # r, s (3,): from the centre of mass of the child, of the parent, to P [m]
     s: np.ndarray
-    E_omega: np.ndarray
+    E_omega: np.ndarray  # E_omega, E_v (3, k): motion subspace
     E_v: np.ndarray
-    bias_omega: np.ndarray
+    bias_omega: np.ndarray  # bias_omega, bias_v (3,): E° q̇, rate of the subspace at fixed parent times the rates
     bias_v: np.ndarray
-    R_predicted: np.ndarray
+    R_predicted: np.ndarray  # (3, 3) joint frame of the child by the parent and the coordinates
 
 
 @dataclass
 class _Poses:
-    """Result of :func:`_outward`; index −1 is the ground."""
+    """Result of :func:`_outward`, as the attributes of :class:`Kinematics`; index −1 is the ground."""
 
     state: State
     R: list
@@ -112,7 +98,8 @@ class Kinematics(View):
     def of_bodies(cls, system: System, state: State, R, x, W, u) -> "Kinematics":
         """Given poses and velocities of the bodies, without joints."""
         found = cls(system, state)
-        found._take(_of_bodies(system, state, R, x, W, u))
+        poses = [*R, WORLD_AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN]  # and those of the ground
+        found._take(_Poses(state, *poses, [None] * len(system.joints)))
         return found
 
     def _take(self, poses: _Poses):
@@ -128,11 +115,8 @@ class Kinematics(View):
 class KinematicsOnAccess(Kinematics):
     """Poses and velocities of all bodies by a function, called on first access; without joints.
 
-    Parameters
-    ----------
-    poses : callable
-        () → rotations (n + 1, 3, 3), centres of mass, angular velocities and velocities (n + 1, 3) of the bodies, then of
-        the ground, as one array.
+    ``poses``: () → rotations (n + 1, 3, 3), centres of mass, angular velocities and velocities (n + 1, 3) of the bodies,
+    then of the ground, as one array.
     """
 
     def __init__(self, system: System, state: State, poses: Callable[[], np.ndarray]):
@@ -147,11 +131,6 @@ class KinematicsOnAccess(Kinematics):
         numbers = known["_numbers"] if "_numbers" in known else known.setdefault("_numbers", self._bodies())
         (first, last, shape), n = BLOCKS[name], numbers.size // NUMBERS
         return known.setdefault(name, numbers[first * n : last * n].reshape(n, *shape))
-
-
-def _of_bodies(system: System, state: State, R, x, W, u) -> _Poses:
-    """Poses and velocities of the bodies, and those of the ground; without joints."""
-    return _Poses(state, [*R, WORLD_AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints))
 
 
 def kinematics(system: System, state: State) -> Kinematics:

@@ -19,14 +19,8 @@ from gauss.system import coordinate_rates
 class LinearTerms:
     """Linear model of one system in one state.
 
-    Parameters
-    ----------
-    terms : ConstrainedTerms
-        The system in the state, over symbols, with k independent coordinates.
-    loads : sequence of BoundLoad
-        Its loads, with traced laws.
-    load : ndarray, shape (n_v,)
-        Generalised forces added to the loads.
+    ``terms``: the system in the state, over symbols, with k independent coordinates. ``loads``: its loads, with traced laws.
+    ``load`` (n_v,): generalised forces added to the loads.
     """
 
     def __init__(self, terms: ConstrainedTerms, loads, load):
@@ -130,10 +124,7 @@ class LinearTerms:
     def measured(self, sensor, changes: np.ndarray) -> np.ndarray:
         """Changes (p, c) of what is measured along changes (3 n_v, c) of displacements, rates and accelerations.
 
-        Parameters
-        ----------
-        sensor : callable
-            (t, q, v, accelerations) → values (p,).
+        ``sensor``: (t, q, v, accelerations) → values (p,).
         """
         n, count, size = self.system.n_v, changes.shape[1], 0
         along = [np.concatenate([coordinate_rates(self.system, self.q, one[:n]), one[n:]]) for one in changes.T]

@@ -69,11 +69,8 @@ def joint_sides(subsystem: Subsystem, links: dict[int, Link], index: int) -> dic
     """Frame of a joint on its two bodies, in their link frames, by body. Dispatches on the type of the subsystem."""
     joint = subsystem.joints[index]
     sides = {joint.parent: (joint.R_parent, joint.p_parent), joint.child: (joint.R_child, joint.p_child)}
-    return {body: _from_link(links[body], R, p) for body, (R, p) in sides.items()}
-
-
-def _from_link(link: Link, R, p):
-    return rotations.clean(link.R_central.T @ R), link.R_central.T @ (p - link.p_central)
+    turns = {body: (links[body].R_central.T, links[body].p_central) for body in sides}
+    return {body: (rotations.clean(turn @ sides[body][0]), turn @ (sides[body][1] - p)) for body, (turn, p) in turns.items()}
 
 
 def _link(subsystem: Subsystem, edge: Edge, frames, own_turn: float, is_first: bool) -> Link:
@@ -92,11 +89,11 @@ def _link(subsystem: Subsystem, edge: Edge, frames, own_turn: float, is_first: b
 
 
 class Mass(NamedTuple):
-    """Inertia about the origin of a frame: mass, mass times its centre (3,), moments and products (3, 3)."""
+    """Inertia about the origin of a frame."""
 
-    mass: float
-    first: np.ndarray
-    inertia: np.ndarray
+    mass: float  # [kg]
+    first: np.ndarray  # (3,) mass times its centre [kg m]
+    inertia: np.ndarray  # (3, 3) moments and products [kg m²]
 
     def plus(self, other: "Mass") -> "Mass":
         """Sum of both."""

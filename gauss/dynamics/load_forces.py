@@ -12,7 +12,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from gauss.codegen import Kernel, write
+from gauss.codegen import Function, Kernel, write
 from gauss.codegen.kernels import address
 from gauss.dynamics.inverse_dynamics_residual import along_rates
 from gauss.dynamics.kinematics import ORIGIN, WORLD_AXES, Kinematics, KinematicsOnAccess, kinematics
@@ -30,38 +30,33 @@ ASKED = Drive, Force  # kinds of loads that are known by the values of their law
 def generalised_forces(motion: Kinematics, applied: Applied) -> np.ndarray:
     """Applied loads along the rates (n_v,), with those on bodies carried inward along the spanning tree.
 
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics, with its joints if there are loads on bodies; floats or expressions.
-    applied : Applied
-        Loads of this state.
+    ``motion``: kinematics, with its joints if there are loads on bodies; floats or expressions.
     """
-    system, P = motion.system, applied.P
-    loaded = {body for body in range(system.structure.n_bodies) if _acts(applied.F[body]) or _acts(applied.M[body])}
-    if not loaded:
-        return P
-    return P + along_rates(motion, {body: (applied.M[body], applied.F[body]) for body in loaded})
+    wrenches = {body: (applied.M[body], applied.F[body]) for body in applied.loaded_bodies}
+    return applied.P + along_rates(motion, wrenches) if wrenches else applied.P
 
 
-def _acts(part: np.ndarray) -> bool:
-    return part.dtype == object or bool(part.any())
+def traced_forces(system: System, loads: Sequence[BoundLoad]) -> Function:
+    """Function (t, q, v) → (generalised forces, power) of loads."""
+
+    def forces(t, q, v):
+        motion = Kinematics(system, State(t[0], q, v))
+        applied = Applied(motion, loads)
+        return generalised_forces(motion, applied), applied.power
+
+    return write(forces, 1, system.n_q, system.n_v, name="forces")
 
 
 class LoadForces:
     """Generalised forces and power of loads, (t, q, v) → (Q (n_v,), power (3,) of drives, forces, dampers).
 
-    Parameters
-    ----------
-    called : sequence of BoundLoad
-        Loads that Python evaluates.
-    laws : Laws, optional
-        Those whose traced loads are evaluated, too, by machine code; when not given, none are.
+    ``called``: loads that Python evaluates. ``laws``: those whose traced loads are evaluated, too, by machine code; when not
+    given, none are.
     """
 
     def __init__(self, system: System, called: Sequence[BoundLoad] = (), laws: Laws | None = None):
         self.system, self.called = system, list(called)
-        self._traced = None if laws is None or not laws.traced else _traced(system, laws)
+        self._traced = None if laws is None or not laws.traced else self._compiled(laws)
         self._asked = [bound for bound in self.called if isinstance(bound.load, ASKED)]
         self._applied = [bound for bound in self.called if not isinstance(bound.load, ASKED)]
         self._values, self._loaded = _values(system, self._asked), _loaded(system, self._applied)
@@ -72,6 +67,11 @@ class LoadForces:
         self._posed = bool(self._loaded) or any(needs_poses(bound.load) for bound in self.called)
         self.n_q, self.n_in = 1 + system.n_q, 1 + system.n_q + system.n_v
         self._size = self.n_in + sum(size for *_, size in self._values)
+
+    def _compiled(self, laws: Laws) -> Kernel:
+        """Machine code of the traced loads: (t, q, v) → (generalised forces, power)."""
+        make = lambda: Kernel(traced_forces(self.system, laws.traced), batch=False)  # noqa: E731
+        return cached_on_disk(self.system, (LoadForces, laws.key), make)
 
     def __call__(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Generalised forces, and power [W]."""
@@ -96,12 +96,8 @@ class LoadForces:
     def write(self, state: State, numbers: np.ndarray, place: int, found: int):
         """Write generalised forces and power (n_v + 3,) of a state to an address.
 
-        Parameters
-        ----------
-        numbers : ndarray
-            A :meth:`room` with its time, coordinates and rates, that nobody else writes to.
-        place, found : int
-            Addresses of ``numbers``, and of the results.
+        ``numbers``: a :meth:`room` with its time, coordinates and rates, that nobody else writes to. ``place``, ``found``:
+        addresses of ``numbers``, and of the results.
         """
         motion = None
         if self.called:
@@ -146,7 +142,7 @@ class LoadForces:
         if self._loaded:
             given = np.concatenate([inputs, *(part[body] for body in self._loaded for part in (applied.F, applied.M))])
             Q = Q + _at(self._transposed, address(given))
-        return np.concatenate([Q, [applied.driven, applied.loaded, applied.dissipated]])
+        return np.concatenate([Q, applied.power])
 
     def _placed(self, state: State, numbers: np.ndarray, place: int) -> Kinematics:
         """Kinematics with poses by machine code, at the first access: many laws need coordinates and rates only."""
@@ -174,7 +170,7 @@ class LoadForces:
             laws = [[ConstantLaw(next(parts)) if _varies(law) else law for law in one.laws] for one in self._asked]
             bound = [BoundLoad(one.load, tuple(own)) for one, own in zip(self._asked, laws, strict=True)]
             applied = Applied(motion, bound)
-            return generalised_forces(motion, applied), [applied.driven, applied.loaded, applied.dissipated]
+            return generalised_forces(motion, applied), applied.power
 
         sizes = 1, system.n_q, system.n_v, int(ends[-1])
         names = tuple((one.load.name, tuple(map(_varies, one.laws))) for one in self._asked)
@@ -230,15 +226,3 @@ def _bodies(system: System, bound: BoundLoad) -> list[int]:
     if not names:
         return list(range(system.structure.n_bodies))
     return [system.frame(name).body for name in names if name != GROUND]
-
-
-def _traced(system: System, laws: Laws) -> Kernel:
-    """Machine code of the traced loads: (t, q, v) → (generalised forces, power)."""
-
-    def forces(t, q, v):
-        motion = kinematics(system, State(t[0], q, v))
-        applied = Applied(motion, laws.traced)
-        return generalised_forces(motion, applied), [applied.driven, applied.loaded, applied.dissipated]
-
-    make = lambda: Kernel(write(forces, 1, system.n_q, system.n_v, name="forces"), batch=False)  # noqa: E731
-    return cached_on_disk(system, (LoadForces, laws.key), make)

@@ -49,16 +49,9 @@ def received(function: Callable[..., T], receiver: LoadReceiver) -> Callable[...
 def output_kernel(program: Program, system: System, of_step: bool, batch: bool) -> Callable[[np.ndarray], np.ndarray]:
     """Machine code of points → values of all outputs, within which it calls opaque laws where there are some.
 
-    Parameters
-    ----------
-    program : Program
-        Functions of the system; a :class:`gauss.dynamics.called_program.CalledProgram` if it has opaque laws.
-    system : System
-        System whose scene has the outputs; the program may be that of its smooth part.
-    of_step : bool
-        As of :func:`gauss.dynamics.outputs.output_function`.
-    batch : bool
-        Whether many points will be given at once.
+    ``program``: functions of the system; a :class:`gauss.dynamics.programs.CalledProgram` if it has opaque laws. ``system``:
+    system whose scene has the outputs; the program may be that of its smooth part. ``of_step``: as of
+    :func:`gauss.dynamics.outputs.output_function`. ``batch``: whether many points will be given at once.
     """
     called = program.laws.called
     kind = CallingKernel if called else Kernel

@@ -20,21 +20,11 @@ NO_FORCE.flags.writeable = False  # one array for all bodies without loads
 class Applied:
     """Sum of applied loads, without gravity.
 
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics; loads on coordinates need the state only.
-    loads : sequence of BoundLoad, optional
-        Loads; all of the system when not given.
+    ``motion``: kinematics; loads on coordinates need the state only. ``loads``: loads; all of the system when not given.
 
-    Attributes
-    ----------
-    F, M : list of ndarray
-        Main force (3,) [N] and main moment about the centre of mass (3,) [N m] of each body, world axes.
-    P : ndarray, shape (p,)
-        Generalised forces along the joint rates.
-    driven, loaded, dissipated : float
-        Power of drives, of forces on bodies, and dissipated in dampers [W].
+    Attributes: ``F``, ``M``: main force (3,) [N] and main moment about the centre of mass (3,) [N m] of each body, world
+    axes. ``P`` (p,): generalised forces along the joint rates. ``driven``, ``loaded``, ``dissipated``: power of drives, of
+    forces on bodies, and dissipated in dampers [W].
     """
 
     def __init__(self, motion: Kinematics, loads=None):
@@ -46,6 +36,11 @@ class Applied:
         for bound in system.loads if loads is None else loads:
             apply(bound.load, bound.laws, motion, self)
 
+    @property
+    def power(self) -> np.ndarray:
+        """Power (3,) of drives, of forces on bodies, and dissipated in dampers [W]."""
+        return np.array([self.driven, self.loaded, self.dissipated])
+
     def push(self, motion: Kinematics, body: int, point: np.ndarray, force: np.ndarray):
         """Add a force [N] at a point of a body, both in world axes."""
         self.F[body] = self.F[body] + force
@@ -53,9 +48,13 @@ class Applied:
 
     def on_bodies(self, motion: Kinematics) -> dict:
         """Force [N] and moment about the centre of mass [N m] on loaded bodies, in principal axes, {body: …}."""
+        return {i: (motion.R[i].T @ self.F[i], motion.R[i].T @ self.M[i]) for i in self.loaded_bodies}
+
+    @property
+    def loaded_bodies(self) -> list[int]:
+        """Bodies on which a force or a moment acts."""
         acts = lambda part: part.dtype == object or part.any()  # noqa: E731
-        bodies = [i for i in range(motion.system.structure.n_bodies) if acts(self.F[i]) or acts(self.M[i])]
-        return {i: (motion.R[i].T @ self.F[i], motion.R[i].T @ self.M[i]) for i in bodies}
+        return [i for i in range(len(self.F) - 1) if acts(self.F[i]) or acts(self.M[i])]
 
 
 @singledispatch

@@ -39,14 +39,8 @@ class RowFront(NamedTuple):
 class LoopFronts:
     """Factorisation of S + μ 1 of a subsystem.
 
-    Parameters
-    ----------
-    graph : CallGraph
-        The subsystem; its kinematics and the elimination of its tree are recorded.
-    mu : float
-        Regularisation μ.
-    roots : dict
-        Root of each block of rows, :data:`GROUND` or a link.
+    ``graph``: the subsystem; its kinematics and the elimination of its tree are recorded. ``roots``: root of each block of
+    rows, :data:`GROUND` or a link.
     """
 
     def __init__(self, graph: "CallGraph", mu: float, roots: dict[int, int]):

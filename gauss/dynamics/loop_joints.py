@@ -29,21 +29,10 @@ class LinkStates(NamedTuple):
 class LoopJoint:
     """A joint outside the spanning tree, in the axes of its frame on the parent; its rows are its constrained directions.
 
-    Parameters
-    ----------
-    tree : KinematicTree or LinkStates
-        The open tree in its state.
-    index : int
-        Index of the joint in its subsystem.
-    q, v : ndarray
-        All coordinates and rates.
+    ``q``, ``v``: all coordinates and rates.
 
-    Attributes
-    ----------
-    held : ndarray, shape (6, m)
-        Constrained directions: those of its constraint wrenches.
-    free : ndarray, shape (6, k)
-        Dual of its motion subspace E: ``free.T @ E`` is one.
+    Attributes: ``held`` (6, m): constrained directions: those of its constraint wrenches. ``free`` (6, k): dual of its
+    motion subspace E: ``free.T @ E`` is one.
     """
 
     def __init__(self, tree: KinematicTree | LinkStates, index: int, q, v):

@@ -1,5 +1,6 @@
 """Dynamics of a system in joint coordinates: the equations of its subsystems, each by itself, over numbers or symbols."""
 
+from collections.abc import Iterator
 from copy import copy
 
 import numpy as np
@@ -20,18 +21,10 @@ COORDINATE_STEPS = 3  # corrections of dependent coordinates: an angle δ is off
 def forward_dynamics(system: System, q, v, tau, forces=None, t: Scalar = 0.0) -> np.ndarray:
     """Joint accelerations (n_v,) under gravity and generalised forces.
 
-    Parameters
-    ----------
-    system : System
-        Any without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates and rates that meet the constraints; floats or expressions.
-    tau : ndarray, shape (n_v,)
-        Generalised forces along the rates [N m, N].
-    forces : dict, optional
-        Force [N] and moment about the centre of mass [N m] on bodies, {body: (force, moment)} in principal axes.
-    t : float
-        Time [s], for rheonomic constraints.
+    ``system``: any without obstacles (see :func:`gauss.dynamics.conditions.obstacles`). ``q``, ``v`` (n_q,), (n_v,):
+    coordinates and rates that meet the constraints; floats or expressions. ``tau`` (n_v,): generalised forces along the
+    rates [N m, N]. ``forces``: force [N] and moment about the centre of mass [N m] on bodies, {body: (force, moment)} in
+    principal axes. ``t``: time [s], for rheonomic constraints.
     """
     return Mechanism(system, q, v, t).motion(tau, forces)[0]
 
@@ -39,16 +32,8 @@ def forward_dynamics(system: System, q, v, tau, forces=None, t: Scalar = 0.0) ->
 class Mechanism:
     """A system in one state, eliminated once for any number of right-hand sides; vectors are those of the system.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates and rates; floats or expressions.
-    t : float
-        Time [s].
-    subsystems : sequence of Subsystem, optional
-        Subsystems of another stage of the reduction; those of the system when not given.
+    ``q``, ``v`` (n_q,), (n_v,): coordinates and rates; floats or expressions. ``subsystems``: subsystems of another stage of
+    the reduction; those of the system when not given.
     """
 
     of_subsystem: type[ConstrainedArticulatedBody] = ConstrainedArticulatedBody  # dynamics of each subsystem
@@ -82,12 +67,7 @@ class Mechanism:
     def motion(self, tau, forces=None, feedback: list[BaumgarteFeedback] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the loop constraints.
 
-        Parameters
-        ----------
-        tau, forces
-            As of :func:`forward_dynamics`.
-        feedback : list of BaumgarteFeedback, optional
-            Stabilisation of each subsystem.
+        ``tau``, ``forces``: as of :func:`forward_dynamics`. ``feedback``: stabilisation of each subsystem.
         """
         found = [
             body.motion(tau[body.subsystem.v], _carried(body.subsystem, forces), own)
@@ -116,12 +96,11 @@ class Mechanism:
 
     def correction(self, residual, rows) -> np.ndarray:
         """Change (n_v,) of the joint accelerations that removes the residuals of :meth:`residual`."""
-        pairs = zip(self.bodies, self._rows_of(rows), strict=True)
-        return self._whole([body.correction(residual[body.subsystem.v], own) for body, own in pairs])
+        return self._whole([body.correction(residual[body.subsystem.v], own) for body, own in self._with(rows)])
 
     def damped(self, rows) -> np.ndarray:
         """Residual (m,) of the loop constraints without its part along nearly dependent rows."""
-        return _joined([body.damped(own) for body, own in zip(self.bodies, self._rows_of(rows), strict=True)])
+        return _joined([body.damped(own) for body, own in self._with(rows)])
 
     def dependent_accelerations(self, rates) -> np.ndarray:
         """Joint accelerations (n_v,), with those of loop joints replaced by those that follow from the trees."""
@@ -131,29 +110,25 @@ class Mechanism:
         """Rates (n_v,) x and multipliers y with M x + Kᵀ y = tau and K x = target, or C of the velocity rows if None."""
         found = [
             body.response(tau[body.subsystem.v], body.velocity_rhs if target is None else own)
-            for body, own in zip(self.bodies, self._rows_of(self.velocity_rhs if target is None else target), strict=True)
+            for body, own in self._with(self.velocity_rhs if target is None else target)
         ]
         return self._whole([rates for rates, _ in found]), _joined([multipliers for _, multipliers in found])
 
     def released(self, tau, multipliers) -> np.ndarray:
         """Rates (n_v,) x with M x + Kᵀ y = tau for given multipliers y."""
-        pairs = zip(self.bodies, self._rows_of(multipliers), strict=True)
-        return self._whole([body.released(tau[body.subsystem.v], own) for body, own in pairs])
+        return self._whole([body.released(tau[body.subsystem.v], own) for body, own in self._with(multipliers)])
 
     def unprojected(self, residual, rows) -> np.ndarray:
         """Rates (n_v,) to which those that meet K x = rows and are :meth:`nearest` are the correction of residuals."""
-        pairs = zip(self.bodies, self._rows_of(rows), strict=True)
-        return self._whole([body.unprojected(residual[body.subsystem.v], own) for body, own in pairs])
+        return self._whole([body.unprojected(residual[body.subsystem.v], own) for body, own in self._with(rows)])
 
     def determined(self, multipliers) -> np.ndarray:
         """Multipliers without their part along redundant rows, which is undetermined."""
-        pairs = zip(self.bodies, self._rows_of(multipliers), strict=True)
-        return _joined([body.determined(own) for body, own in pairs])
+        return _joined([body.determined(own) for body, own in self._with(multipliers)])
 
     def reaction(self, multipliers) -> np.ndarray:
         """Generalised forces (n_v,) of the constraints, −Kᵀ y, along the independent coordinates."""
-        pairs = zip(self.bodies, self._rows_of(multipliers), strict=True)
-        return self._whole([body.reaction(own) for body, own in pairs])
+        return self._whole([body.reaction(own) for body, own in self._with(multipliers)])
 
     def along_tree(self, tau) -> np.ndarray:
         """Generalised forces (n_v,) along the independent coordinates, with those of loop joints carried inward."""
@@ -190,8 +165,7 @@ class Mechanism:
 
         With a target of zeros, v − x is orthogonal to the null space of K in the mass metric.
         """
-        pairs = zip(self.bodies, self._rows_of(target), strict=True)
-        return self._whole([body.nearest(v[body.subsystem.v], own) for body, own in pairs])
+        return self._whole([body.nearest(v[body.subsystem.v], own) for body, own in self._with(target)])
 
     def power(self, multipliers) -> Scalar:
         """Power of rheonomic constraints [W]: −λᵀ C."""
@@ -227,6 +201,10 @@ class Mechanism:
         ends = np.cumsum([body.scale.size for body in self.bodies], dtype=int)
         return [rows[end - body.scale.size : end] for body, end in zip(self.bodies, ends, strict=True)]
 
+    def _with(self, rows) -> Iterator[tuple[ConstrainedArticulatedBody, np.ndarray]]:
+        """Each subsystem with its entries in a vector (m,) of the loop constraints."""
+        return zip(self.bodies, self._rows_of(rows), strict=True)
+
     def _whole(self, vectors) -> np.ndarray:
         """Vector (n_v,) of the system from those of its subsystems; zero for what belongs to none."""
         return _placed(self.system, [body.subsystem.v for body in self.bodies], vectors)
@@ -235,13 +213,8 @@ class Mechanism:
 def refined_forward_dynamics(system: System, state: State, tau, forces=None, cut: Scalar = 0.0) -> RefinedAccelerations:
     """Joint accelerations of a system, refined to round-off, with an error bound; see :class:`RefinedForwardDynamics`.
 
-    Parameters
-    ----------
-    system, state, tau, forces
-        As of :func:`forward_dynamics`.
-    cut : float or Expression
-        Rank tolerance: loop constraints with less than this share of their length outside the span of the others are
-        left out.
+    ``system``, ``state``, ``tau``, ``forces``: as of :func:`forward_dynamics`. ``cut``: rank tolerance: loop constraints
+    with less than this share of their length outside the span of the others are left out.
     """
     relations, found, places = _relations(system, state), [], [one.v for one in system.subsystems]
     for one in system.subsystems:

@@ -8,8 +8,10 @@ from gauss.backends.closure import Factor
 from gauss.backends.motions import Allowed, allowed
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.consistent_states import consistent
+from gauss.dynamics.initial_states import given_starts
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
+from gauss.dynamics.store import cached
 from gauss.errors import BackendError, StateError, require
 from gauss.system import State, System, retract
 
@@ -109,6 +111,11 @@ def mobility(system: System, state: State | None = None) -> Mobility:
         redundant=_groups(system, found.redundancies),
         loose=_loose(system, found.redundancies),
     )
+
+
+def mobility_at_start(system: System) -> Mobility:
+    """Freedoms and redundant constraints at the start of the scene, found once."""
+    return cached(system, (mobility, given_starts(system)), lambda: mobility(system))
 
 
 def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:

@@ -23,21 +23,10 @@ class RowSpace:
     A residual η of the state makes redundant rows look independent by η, and the answer wrong by η/σ for the least singular
     value σ: a rank tolerance of √η balances the two.
 
-    Parameters
-    ----------
-    rows : ndarray, shape (m, n)
-        The rows.
-    units : ndarray, shape (n,)
-        Units of the coordinates.
-    residual : float
-        Residual η of the state, relative.
-    held : sequence of int
-        Places of coordinates that further rows keep at their values.
+    ``units`` (n,): units of the coordinates. ``residual``: residual η of the state, relative. ``held``: places of
+    coordinates that further rows keep at their values.
 
-    Attributes
-    ----------
-    rank : int
-        Number of independent rows.
+    Attributes: ``rank``: number of independent rows.
     """
 
     def __init__(self, rows: np.ndarray, units: np.ndarray, residual: float = 0.0, held=()):

@@ -5,19 +5,25 @@ which the loop does not let move by itself. N is geometry, and Nᵀ M N the iner
 residuals r, s of the equations of motion and of the constraints, with a particular solution K p = s,
 
     δq̈ = p + X (r − M p).
+
+Functions of a state by it take numbers, one state at a time, in a hundred times the time of machine code.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.acceleration_derivatives import LoadedMechanism
+from gauss.dynamics.joint_places import place_changes
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.null_space import RowSpace
+from gauss.dynamics.parameter_terms import OF_JOINTS
 from gauss.dynamics.projection import position_residual_of, relative
 from gauss.dynamics.store import cached_on_disk
+from gauss.dynamics.term_table import TERMS, traced_loads
 from gauss.errors import SimulationError
 from gauss.system import State, System, whole
 
@@ -39,19 +45,9 @@ class NullSpaceDynamics:
 
     SimulationError if too few digits are left.
 
-    Parameters
-    ----------
-    laws : Laws
-        Its loads; the traced ones are included.
-    state : State
-        State that meets the constraints.
-    load : ndarray, shape (n_v,)
-        Generalised forces added to the loads.
+    ``state``: state that meets the constraints. ``load`` (n_v,): generalised forces added to the loads.
 
-    Attributes
-    ----------
-    rates : ndarray, shape (n_v,)
-        Accelerations.
+    Attributes: ``rates`` (n_v,): accelerations.
     """
 
     def __init__(self, system: System, laws: Laws, state: State, load):
@@ -116,12 +112,8 @@ class NullSpaceDynamics:
     def response(self, force: np.ndarray, off: np.ndarray) -> np.ndarray:
         """Changes (n_v, k) of the accelerations that remove residuals.
 
-        Parameters
-        ----------
-        force : ndarray, shape (n_v, k)
-            Of the equations of motion, along the joints of the tree.
-        off : ndarray, shape (m, k)
-            Of the loop constraints.
+        ``force`` (n_v, k): of the equations of motion, along the joints of the tree. ``off`` (m, k): of the loop
+        constraints.
         """
         return self.L @ self._response(force, off)
 
@@ -149,3 +141,49 @@ def _kernels(system: System, loads) -> NullSpaceKernels:
         Kernel(write(residual, *sizes, n, m, name="residual"), batch=False),
         Kernel(write(change, *sizes, n, m, n, n, name="change")),
     )
+
+
+def null_space_terms(system: System, requests: Sequence, state: State, given: dict) -> list[np.ndarray]:
+    """Results of requests for functions of accelerations, and of others beside them, one after the other.
+
+    SimulationError if too few digits are left.
+
+    ``state``: state that meets the constraints. ``given``: rates, accelerations and generalised forces (n_v,), by their
+    names.
+    """
+    laws, load, found = traced_loads(system), given["load"], list[np.ndarray]()
+    dynamics = NullSpaceDynamics(system, laws, state, load)
+    for one in requests:
+        if one.name == "acceleration_derivatives":
+            found += np.split(dynamics.changes(np.eye(3 * system.n_v)), 3, axis=1)
+        elif one.name == "accelerations_by":
+            found.append(_by_parameter(dynamics, laws, one.frame, state, load))
+        else:
+            arguments = {"q": state.q, "v": state.v, "a": given.get("acceleration"), "l": load}
+            function = system.function(":".join(filter(None, one[:2])), **_axes(one))
+            results = function(*(arguments[letter] for letter in TERMS[one.name].arguments), None, state.t)
+            found += results if isinstance(results, tuple) else [results]
+    return found
+
+
+def _by_parameter(dynamics: NullSpaceDynamics, laws: Laws, parameter: str, state: State, load) -> np.ndarray:
+    """Derivative (n_v, k) of the accelerations by a parameter."""
+    system, given = dynamics.system, [state.q, state.v, load, dynamics.rates, dynamics.multipliers]
+    if parameter.partition(":")[0] not in OF_JOINTS:
+        function = system.function(f"inverse_dynamics_by:{parameter}")
+        columns = function(state.q, state.v, dynamics.rates, None, state.t)
+        return dynamics.response(-columns, np.zeros((dynamics.multipliers.size, columns.shape[1])))
+
+    def by_place(t, q, v, load, rates, multipliers):
+        parts = place_changes(system, laws.traced, State(t[0], q, v), load, parameter, rates, multipliers)
+        return np.array([np.concatenate(part) for part in parts]).T
+
+    make = lambda: Kernel(write(by_place, 1, *(part.size for part in given), name="by_place"), batch=False)  # noqa: E731
+    kernel = cached_on_disk(system, (_by_parameter, parameter, laws.key), make)
+    changes = kernel(np.concatenate([[state.t], *given])).reshape(-1, 3)
+    force, off, following = np.split(changes, np.cumsum([system.n_v, dynamics.multipliers.size]))
+    return dynamics.response(force, off) + following
+
+
+def _axes(one) -> dict[str, str]:
+    return {"reference": one.reference} if one.reference else {}

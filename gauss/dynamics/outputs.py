@@ -35,12 +35,8 @@ def output_function(program: Program, scene: Scene, of_step: bool = False) -> Fu
 
     SimulationError if forces of an output are not unique, or not known in this motion.
 
-    Parameters
-    ----------
-    program : Program
-        The system, with inputs where the scene has some.
-    of_step : bool
-        Whether the accelerations are those that the point holds, of a step of contacts, instead of those of its state.
+    ``program``: the system, with inputs where the scene has some. ``of_step``: whether the accelerations are those that the
+    point holds, of a step of contacts, instead of those of its state.
     """
     outputs = tuple(scene.outputs.values())
     asked = not of_step and any(output.kind in INERTIAL for output in outputs)

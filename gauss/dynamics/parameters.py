@@ -6,11 +6,11 @@ traced code depends.
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import fields, is_dataclass
-from types import FunctionType
+from dataclasses import dataclass, fields, is_dataclass
 
 import numpy as np
 
+from gauss.codegen import Graph, content_key
 from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.given_link_frames import with_given_frames
 from gauss.scene import Drive, Force, Pair
@@ -51,12 +51,7 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
 def with_numbers(system: System, values, dynamics: Dynamics) -> System:
     """System of the same kind with other numbers, which may be expressions of a shared graph.
 
-    Parameters
-    ----------
-    values : sequence of float or Expression
-        Numbers in the order of :func:`numbers`.
-    dynamics : Dynamics
-        Dynamics of the new system.
+    ``values``: numbers in the order of :func:`numbers`.
     """
     values, place = np.asarray(values, dtype=object), 0
     constraint_scales(system)  # cached for the numbers: expressions have no scales
@@ -121,21 +116,7 @@ def _mapped(thing, take: Callable, say: Callable):
     if is_dataclass(thing):
         names = [f.name for f in fields(thing)]
         return changed(thing, {name: _mapped(getattr(thing, name), take, say) for name in names})
-    say(_key(thing))
-    return thing
-
-
-def _key(thing):
-    """Hashable key of the content; of a function its code, closure and defaults."""
-    if isinstance(thing, FunctionType):
-        made_with = [cell.cell_contents for cell in thing.__closure__ or ()]
-        return thing.__code__, thing.__module__, tuple(_key(entry) for entry in (*made_with, *(thing.__defaults__ or ())))
-    if isinstance(thing, np.ndarray):
-        return thing.shape, thing.dtype.str, thing.tobytes()
-    try:
-        hash(thing)
-    except TypeError:
-        return repr(thing)
+    say(content_key(thing))
     return thing
 
 
@@ -145,3 +126,28 @@ def changed(thing, changes):
     for name, value in dict(changes).items():
         made.__dict__[name] = value
     return made
+
+
+@dataclass(frozen=True)
+class ParametrisedSystem:
+    """Systems of one kind."""
+
+    pattern: System  # one of them
+    system: System  # system with parameters, expressions of a shared graph, for the numbers that differ
+    varied: np.ndarray  # places of the parameters among the numbers of a system
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(f"p[{k}]" for k in range(len(self.varied)))
+
+
+def parametrised(pattern: System, members: np.ndarray) -> ParametrisedSystem:
+    """Parametrised system of systems of one kind.
+
+    ``pattern``: one of them. ``members`` (batch, n): numbers of each, see :func:`gauss.dynamics.parameters.numbers`.
+    """
+    varied = np.flatnonzero((members != members[0]).any(axis=0))
+    values, graph = members[0].astype(object), Graph(shared=True)
+    values[varied] = [graph.symbol(f"p[{k}]") for k in range(len(varied))]
+    return ParametrisedSystem(pattern, with_numbers(pattern, values, pattern.mechanics), varied)

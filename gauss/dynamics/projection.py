@@ -120,8 +120,7 @@ def scalar_coordinates(system: System, state: State) -> np.ndarray:
     """Coordinate of each rate (n_v,); 0 for components of angular velocities, which have none."""
     plain = np.zeros(system.n_v)
     for joint in system.joints:
-        k = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
-        plain[joint.v.start : joint.v.start + k] = state.q[joint.q.start : joint.q.start + k]
+        plain[joint.v][: joint.n_plain] = state.q[joint.q][: joint.n_plain]
     return plain
 
 

@@ -7,20 +7,75 @@ residuals are those of the equations of bodies, joints and loop constraints,
 
     f = Φ (a − a_free) − forces,   Eᵀ f = P,   a_o = X a_i + E q̈ + c,   K a = k.
 
-Loop constraints are solved through a square root of K M⁻¹ Kᵀ, so that near rank-deficient rows keep their digits, down to
-the root of the position residual.
+Loop constraints are solved through a square root of K M⁻¹ Kᵀ = WᵀW, so that near rank-deficient rows keep their digits, down
+to the root of the position residual: R of a QR factorisation of W has small pivots to round-off, those of WᵀW only to its
+square root (Björck, Numerical Methods for Least Squares Problems, 1996, sec. 2.4 and 6.6.5).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from gauss import math
 from gauss.codegen import Scalar, as_number
 from gauss.dynamics.constrained_aba import ConstrainedArticulatedBody, add_to, condensed
 from gauss.dynamics.given_link_frames import ungrouped
 from gauss.dynamics.rnea import square, to_outer
-from gauss.dynamics.sparse_qr import QR
 from gauss.rotations import cross
+
+SMALLEST_DIVISOR = 1e-300  # of a length that is cut off: its inverse stays finite
+
+
+class QR:
+    """Triangular factor of a matrix (n, m) of numbers or expressions, for solving WᵀW y = b, by modified Gram–Schmidt.
+
+    Columns are sparse, and scaled to unit length; linearly dependent ones are left out.
+
+    ``least_length``: columns below this length are left out. ``cut``: rank tolerance: columns with less than this share of
+    their length outside the span of the earlier ones are left out.
+    """
+
+    def __init__(self, W: np.ndarray, least_length: float, cut):
+        m = W.shape[1]
+        self.scale, self.inverse_pivots = [], []
+        self.above: list[dict[int, Any]] = [{} for _ in range(m)]  # of each column, entries of R above its pivot
+        directions: list[dict[int, Any]] = []
+        for j in range(m):
+            column = {i: entry for i, entry in enumerate(W[:, j]) if as_number(entry) != 0}
+            length = _length(column)
+            self.scale.append(math.where(length > least_length, 1.0 / math.maximum(length, SMALLEST_DIVISOR), 0.0))
+            column = {i: entry * self.scale[j] for i, entry in column.items()}
+            self._orthogonalise(j, column, directions)
+            pivot = _length(column)
+            self.inverse_pivots.append(math.where(pivot > cut, 1.0 / math.maximum(pivot, SMALLEST_DIVISOR), 0.0))
+            directions.append({i: entry * self.inverse_pivots[j] for i, entry in column.items()})
+
+    def _orthogonalise(self, j: int, column: dict[int, Any], directions: list[dict[int, Any]]):
+        """Subtract the components along earlier directions from column j, in place."""
+        for k, direction in enumerate(directions):
+            shared = [i for i in direction if i in column]
+            if not shared:
+                continue
+            self.above[j][k] = sum(direction[i] * column[i] for i in shared)
+            for i, entry in direction.items():
+                column[i] = column.get(i, 0.0) - self.above[j][k] * entry
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solution y (m,) of WᵀW y = b; 0 for columns that are left out."""
+        m = len(self.above)
+        y = [b[j] * self.scale[j] for j in range(m)]
+        for j in range(m):
+            y[j] = (y[j] - sum(entry * y[k] for k, entry in self.above[j].items())) * self.inverse_pivots[j]
+        for j in reversed(range(m)):
+            y[j] = y[j] * self.inverse_pivots[j]
+            for k, entry in self.above[j].items():
+                y[k] = y[k] - entry * y[j]
+        return np.array([*(y[j] * self.scale[j] for j in range(m)), None], dtype=object)[:-1]
+
+
+def _length(column: dict):
+    return np.sqrt(sum(entry * entry for entry in column.values())) if column else 0.0
+
 
 LEAST_ROW_LENGTH = 1e-8  # √round-off, relative to the row on free bodies: shorter rows the tree meets by itself
 REFINEMENTS = 2  # the first removes the errors of the elimination, the second measures those of the first
@@ -65,13 +120,9 @@ class RefinedAccelerations(NamedTuple):
 class RefinedForwardDynamics(ConstrainedArticulatedBody):
     """Forward dynamics of a subsystem in one state with iterative refinement.
 
-    Parameters
-    ----------
-    subsystem, q, v, relations
-        As of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
-    cut : float or Expression
-        Rank tolerance: loop constraints with less than this share of their length outside the span of the others are
-        left out.
+    ``subsystem``, ``q``, ``v``, ``relations``: as of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
+    ``cut``: rank tolerance: loop constraints with less than this share of their length outside the span of the others are
+    left out.
     """
 
     def __init__(self, subsystem, q, v, relations, cut):

@@ -31,19 +31,10 @@ class JointKinematics(NamedTuple):
 class KinematicTree:
     """Kinematics of an open tree in one state, and its inverse dynamics; loop joints are left out.
 
-    Parameters
-    ----------
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates and rates; floats or expressions.
+    ``q``, ``v`` (n_q,), (n_v,): coordinates and rates; floats or expressions.
 
-    Attributes
-    ----------
-    links : dict
-        Constants of each body's link; −1 is the ground.
-    joint_kinematics : dict
-        Kinematics of the joint to each body from its inner body.
-    omegas : dict
-        Angular velocity (3,) of each link in its frame.
+    Attributes: ``links``: constants of each body's link; −1 is the ground. ``joint_kinematics``: kinematics of the joint to
+    each body from its inner body. ``omegas``: angular velocity (3,) of each link in its frame.
     """
 
     def __init__(self, subsystem: Subsystem, q, v):
@@ -147,16 +138,7 @@ def kinematics_of_joint(
 ) -> tuple[JointKinematics, np.ndarray]:
     """Kinematics of a joint, and the angular velocity of its outer link.
 
-    Parameters
-    ----------
-    forward : bool
-        Whether the link is the child of the joint.
-    link : Link
-        Constants of the link.
-    q, v : ndarray
-        Coordinates and rates of the joint.
-    inner : ndarray, shape (3,)
-        Angular velocity of the inner link in its frame.
+    ``forward``: whether the link is the child of the joint. ``inner`` (3,): angular velocity of the inner link in its frame.
     """
     R, p, S, drift = _from_parent(pair, link.turn, q, v) if forward else _from_child(pair, link.turn, q, v)
     relative = S @ v

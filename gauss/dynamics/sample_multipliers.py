@@ -17,7 +17,7 @@ from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
-from gauss.dynamics.mobility import mobility
+from gauss.dynamics.mobility import mobility_at_start
 from gauss.dynamics.store import cached, cached_on_disk
 from gauss.dynamics.traced_system import largest
 from gauss.rotations import cross
@@ -31,22 +31,14 @@ def are_unique(system: System) -> bool:
     """Whether the state determines all multipliers: no redundant rows, contacts, set-valued elements, losses."""
     if system.contacts.placed or system.set_valued.placed or system.losses or not system.n_v:
         return False
-    found = cached(system, (mobility,), lambda: mobility(system))
+    found = mobility_at_start(system)
     return not found.redundant and not found.is_singular
 
 
 def sample_multipliers(system: System, t, q, v) -> tuple[np.ndarray, np.ndarray] | None:
-    """Multipliers (k, r) of all constraints at k states, and whether they are certain (k,).
+    """Multipliers (k, r) of all constraints at k states t (k,), q (k, n_q), v (k, n_v), and whether they are certain (k,).
 
-    Parameters
-    ----------
-    t, q, v : ndarray, shape (k,), (k, n_q), (k, n_v)
-        Times, coordinates, rates.
-
-    Returns
-    -------
-    tuple of ndarray, or None
-        None where they are not unique, or a law of a load cannot be traced.
+    None where they are not unique, or a law of a load cannot be traced.
     """
     laws = Laws(system)
     if laws.called or not are_unique(system):

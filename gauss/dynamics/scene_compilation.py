@@ -1,5 +1,6 @@
 """Compilation of a scene: Scene → System with its dynamics, in tree coordinates or in maximal ones."""
 
+from copy import copy
 from dataclasses import replace
 
 from gauss.arguments import named_arguments
@@ -45,10 +46,18 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     if coordinates not in COORDINATES:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
     with gc_pause():
+        scene = _as_it_is(scene)
         system = build(scene, SystemDynamics())
         if coordinates != "maximal":
             return system
         return build(floating(scene, system), SystemDynamics())
+
+
+def _as_it_is(scene: Scene) -> Scene:
+    """Scene with collections of its own: elements do not change, and those of later do not reach a system."""
+    made = copy(scene)
+    vars(made).update({name: value.copy() for name, value in vars(scene).items() if isinstance(value, dict)})
+    return made
 
 
 def floating(scene: Scene, tree: System) -> Scene:

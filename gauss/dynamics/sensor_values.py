@@ -20,22 +20,7 @@ OF_SUBTREES = ("center_of_mass", "center_of_mass_velocity", "angular_momentum")
 
 
 def measured(output: Output, motion: Kinematics, acceleration=None) -> np.ndarray:
-    """Values of an output.
-
-    Parameters
-    ----------
-    output : Output
-        The sensor.
-    motion : Kinematics
-        Poses and velocities.
-    acceleration : ndarray, shape (n_v,), optional
-        Accelerations, for the kinds that depend on them.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Values in one row, a rotation row by row.
-    """
+    """Values (m,) of an output, a rotation row by row; accelerations (n_v,) for the kinds that depend on them."""
     if output.kind == "coordinate":
         return motion.state.q[motion.system.joint(output.of).q]
     if output.kind == "rate":

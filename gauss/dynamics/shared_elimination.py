@@ -23,12 +23,7 @@ MOST_PLACE_OPERATIONS = 2_500  # of ``place``, up to which what every step runs 
 class SharedElimination:
     """Functions of the states of one system, over expressions.
 
-    Parameters
-    ----------
-    program : Program
-        Its system, loads and stabilisation.
-    added : int
-        n_v if generalised forces are added to the loads, else 0.
+    ``added``: n_v if generalised forces are added to the loads, else 0.
     """
 
     def __init__(self, program: "Program", added: int = 0):

@@ -17,8 +17,8 @@ from gauss.dynamics.constrained_terms import ConstrainedTerms
 from gauss.dynamics.constraint_leak import LARGEST_LEAK, REFUSED_LEAK, constraint_leak, may_leak
 from gauss.dynamics.inertial_regressor import STANDARD
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
-from gauss.dynamics.mobility import mobility
-from gauss.dynamics.null_space_terms import null_space_terms
+from gauss.dynamics.mobility import mobility_at_start
+from gauss.dynamics.null_space_dynamics import null_space_terms
 from gauss.dynamics.parameter_terms import size_of
 from gauss.dynamics.projection import fixed_columns
 from gauss.dynamics.rigid_loops import is_in_other_pose, refuse_other_pose
@@ -53,11 +53,11 @@ ARGUMENTS = "q", "v", "acceleration", "load"  # in this order
 
 
 class Request(NamedTuple):
-    """A term, with the name of its frame or parameter, and its axes."""
+    """A term that is asked for."""
 
-    name: str
-    frame: str = ""
-    reference: str = ""
+    name: str  # name of the function
+    frame: str = ""  # name of its frame or parameter
+    reference: str = ""  # its axes
 
 
 def state_function(
@@ -81,16 +81,14 @@ def state_function(
     return cached(system, (*key, device), lambda: _on_device(system, requests, columns, key, device))
 
 
-def traced_function(
-    system: System, names: Sequence[str], reference: str = REFERENCES[0], independent=None
-) -> tuple[Function, Interface]:
+def traced_function(system: System, names: Sequence[str]) -> tuple[Function, Interface]:
     """Trace of a function of a state, or of several at once, with its arguments and the shapes of its results.
 
     The last outputs of the trace are error measures, one for each limit of the interface.
 
     ArgumentError, StateError, SimulationError as of :func:`state_function`.
     """
-    found = _function(system, *_requested(system, names, reference, independent))
+    found = _function(system, *_requested(system, names, REFERENCES[0], None))
     return found.trace(), found.interface
 
 
@@ -159,7 +157,7 @@ def _columns(system: System, independent) -> tuple[int, ...]:
     """Places of independent coordinates in v."""
     names = (independent,) if isinstance(independent, str) else tuple(independent)
     columns = fixed_columns(system, names)
-    freedoms = cached(system, (mobility,), lambda: mobility(system)).nearby
+    freedoms = mobility_at_start(system).nearby
     if len(columns) != freedoms or len(set(columns)) != freedoms:
         raise StateError(
             f"independent: expected {freedoms} different coordinates, one for each degree of freedom, "
@@ -206,8 +204,7 @@ def _function(system: System, requests, columns) -> TracedFunction:
 
 def _on_device(system: System, requests, columns, key, device: str) -> Callable:
     """Function of requests over rows on a device; its reasons to refuse a row are those of the function on this CPU."""
-    from gauss.codegen.gpu.device_function import DeviceFunction
-    from gauss.codegen.gpu.rows import RowsOnDevice
+    from gauss.codegen.gpu.device_function import DeviceFunction, RowsOnDevice
 
     function = _function(system, requests, columns)
     make = lambda: RowsOnDevice(device, function.trace(), function.interface)  # noqa: E731
@@ -219,16 +216,8 @@ def _on_device(system: System, requests, columns, key, device: str) -> Callable:
 def compiled(system: System, function: TracedFunction, columns, key: tuple) -> Callable:
     """Machine code of a function of a state, with the checks of its arguments.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    function : TracedFunction
-        The function.
-    columns : sequence of int or None
-        Places of its independent coordinates in v, None where none are chosen.
-    key : tuple
-        What tells it from other functions of the system in the cache.
+    ``columns``: places of its independent coordinates in v, None where
+    none are chosen. ``key``: what tells it from other functions of the system in the cache.
     """
     trace, interface, name, by_null_space = function
     sizes, limits = interface.vectors, interface.limits

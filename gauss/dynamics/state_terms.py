@@ -26,12 +26,7 @@ REFERENCES = ("local_world_aligned", "world", "local")
 class StateTerms:
     """Terms of one system in one state; each is traced when it is first asked for.
 
-    Parameters
-    ----------
-    q, v : ndarray, shape (n_q,), (n_v,)
-        Coordinates, symbols; rates, symbols or zeros.
-    t : Expression or float
-        Time [s].
+    ``q``, ``v`` (n_q,), (n_v,): coordinates, symbols; rates, symbols or zeros.
     """
 
     def __init__(self, system: System, q, v, t: Scalar = 0.0):

@@ -5,7 +5,7 @@ Integrator loops and engines are compiled from them. Points are vectors (:class:
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -30,7 +30,7 @@ from gauss.dynamics.laws.switching_functions import SwitchingFunctions
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
-from gauss.dynamics.parametrised_system import ParametrisedSystem
+from gauss.dynamics.parameters import ParametrisedSystem
 from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.rigid_loops import is_in_other_pose
 from gauss.dynamics.shared_elimination import SharedElimination
@@ -59,25 +59,12 @@ class Kernels(NamedTuple):
 class Program:
     """Functions of one system.
 
-    Parameters
-    ----------
-    system : System
-        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
-    laws : Laws
-        Its loads; the traced ones are included.
-    drift : Drift
-        Constraint stabilisation.
-    memory : int
-        Numbers of the state of the method.
-    family : ParametrisedSystem, optional
-        The parametrised system, if some numbers of the system are parameters.
-    inputs : bool
-        Whether the inputs of the scene are parameters, held in each step; otherwise they are zero.
+    ``system``: one without obstacles (see :func:`gauss.dynamics.conditions.obstacles`). ``memory``: numbers of the state of
+    the method. ``family``: the parametrised system, if some numbers of the system are parameters. ``inputs``: whether the
+    inputs of the scene are parameters, held in each step; otherwise they are zero.
 
-    Attributes
-    ----------
-    checks_bodies : bool
-        Whether accelerations of a tree are checked by inverse dynamics of all bodies, independent of link frames.
+    Attributes: ``checks_bodies``: whether accelerations of a tree are checked by inverse dynamics of all bodies, independent
+    of link frames.
     """
 
     checks_bodies = True
@@ -294,7 +281,7 @@ class Program:
             q = retract(self.system, q, shared.newton_step(place, shared.loop_residual(t, q)))
         place = shared.place(t, q, often=True)
         v = shared.nearest(place, v, np.zeros(m), 1.0, often=True)
-        residual = _fold(math.maximum, [0.0, *np.abs(shared.loop_residual(t, q)[:m] * self.shares)])
+        residual = reduce(math.maximum, [0.0, *np.abs(shared.loop_residual(t, q)[:m] * self.shares)])
         acceleration, power, _, monitored = shared.motion(place, v, often=True)
         return q, v, acceleration, power, monitored[1:], [residual]
 
@@ -311,7 +298,7 @@ class Program:
     def monitored(self, mechanism: Mechanism) -> list:
         """Least pivot of S, and its singularity, 1 plus the sum of the inverse pivots; 1 if these are not monitored."""
         pivots = mechanism.pivots if self.has_full_rank else ()
-        return [_fold(math.minimum, [1.0, *pivots]), 1.0 + sum(1.0 / pivot for pivot in pivots)]
+        return [reduce(math.minimum, [1.0, *pivots]), 1.0 + sum(1.0 / pivot for pivot in pivots)]
 
     def applied(self, state: State):
         """Generalised forces, forces on bodies and power of its loads, see :func:`applied_loads`."""
@@ -366,12 +353,12 @@ def applied_loads(system: System, loads, state: State):
         return np.zeros(system.n_v), {}, np.zeros(3)
     motion = kinematics(system, state)
     applied = Applied(motion, loads)
-    return applied.P, applied.on_bodies(motion), np.array([applied.driven, applied.loaded, applied.dissipated])
+    return applied.P, applied.on_bodies(motion), applied.power
 
 
 def largest(values):
     """Largest absolute value."""
-    return _fold(math.maximum, np.abs(values))
+    return reduce(math.maximum, np.abs(values))
 
 
 def absolute_sum(*vectors):
@@ -381,10 +368,3 @@ def absolute_sum(*vectors):
         half = len(values) // 2
         values = np.concatenate([values[:half] + values[half : 2 * half], values[2 * half :]])
     return values.sum()
-
-
-def _fold(function, values):
-    total = values[0]
-    for value in values[1:]:
-        total = function(total, value)
-    return total

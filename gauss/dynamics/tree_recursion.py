@@ -28,13 +28,13 @@ UPPER = np.triu_indices(3)
 class LinkKind(NamedTuple):
     """Properties that links with common code share."""
 
-    name: str
+    name: str  # kind of the joint to its inner link
     subspace: tuple  # at the reference configuration: distinguishes screws of different pitch
-    forward: bool
-    is_root: bool
-    is_leaf: bool
+    forward: bool  # whether the link is the child of that joint
+    is_root: bool  # whether the inner link is the ground
+    is_leaf: bool  # whether no link hangs on it
     is_first: bool  # of the links on one inner link, in the order of the inward pass
-    zeros: tuple
+    zeros: tuple  # which of its constants are zero; empty where these are not distinguished
 
 
 def forward_tree_recursion(system: System) -> TreeRecursion:
@@ -143,14 +143,7 @@ def symmetric(upper) -> np.ndarray:
 class _LinkCode:
     """Kind of link whose steps are traced.
 
-    Parameters
-    ----------
-    pair : Pair
-        Its joint.
-    constants : ndarray
-        Numbers of a link of this kind.
-    varying : ndarray of int
-        Which of them differ from link to link.
+    ``constants``: numbers of a link of this kind. ``varying``: which of them differ from link to link.
     """
 
     def __init__(self, pair: Pair, kind: LinkKind, constants: np.ndarray, varying: np.ndarray):

@@ -6,6 +6,7 @@ Lie groups).
 """
 
 from functools import partial
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -96,7 +97,7 @@ def generalised_alpha(rho: float = 0.8) -> FixedStep:
     SimulationError
         If ρ∞ is not between 0 and 1.
     """
-    if not 0.0 <= rho <= 1.0:
+    if not isinstance(rho, Real) or not 0.0 <= rho <= 1.0:
         raise SimulationError(f"generalised_alpha: rho: expected a number from 0 to 1, got {rho!r}.")
     return FixedStep(
         "generalised_alpha" if rho == 0.8 else f"generalised_alpha({rho:g})",

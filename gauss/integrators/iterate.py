@@ -28,14 +28,7 @@ class NonlinearSolution(NamedTuple):
 def fixed_point(iterate: Callable, start: np.ndarray) -> NonlinearSolution:
     """Fixed point of x → (x, relative change), iterated until x no longer changes.
 
-    Expressions that do not depend on x are computed once, before the first iteration.
-
-    Parameters
-    ----------
-    iterate : callable
-        The map, called once, with symbols.
-    start : ndarray of Expression
-        Initial x.
+    The map is called once, with symbols; expressions that do not depend on x are computed once, before the first iteration.
     """
     graph = _graph(start)
     symbols = fresh_symbols(graph, "x", start.size)
@@ -50,18 +43,8 @@ def newton(
 ) -> NonlinearSolution:
     """Solution of r(x) = 0 by a simplified Newton iteration, its matrix by finite differences at the start.
 
-    Parameters
-    ----------
-    residual : callable
-        Function r of numbers, or called once, with symbols.
-    start : ndarray
-        Initial x.
-    size : float
-        Positive size added to the sum of the unknowns over their units: changes are relative to both.
-    units : ndarray
-        Units of the unknowns.
-    softness : ndarray, optional
-        See :class:`gauss.codegen.kernels.Newton`.
+    The residual is called with numbers, or once, with symbols. Changes are relative to the sum of the unknowns over their
+    units plus a positive ``size``. Softness: see :class:`gauss.codegen.kernels.Newton`.
     """
     softness, start = np.zeros(start.size) if softness is None else softness * units, start / units
     scaled = lambda x: residual(units * x)  # noqa: E731

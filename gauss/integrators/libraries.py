@@ -76,8 +76,9 @@ def _scipy(method: str) -> Callable:
                     if solver.status == "failed":
                         break
                     if not sampled or solver.t != reached:
+                        inside = sampled and np.searchsorted(times, reached) < np.searchsorted(times, solver.t, "right")
                         reached = solver.t
-                        steps.append((solver.t, solver.y, solver.dense_output() if sampled else None))
+                        steps.append((solver.t, solver.y, solver.dense_output() if inside else None))  # three evaluations
             except KeyboardInterrupt as error:
                 interruption = error
         counts = len(steps), solver.nfev, int(solver.nlu)
@@ -103,11 +104,6 @@ class _Interruptible:
     """A callback (…, out) of compiled code, which loses its steps where a callback raises: after Ctrl-C it gives NaN.
 
     As a context it takes care of Ctrl-C within the compiled code, which Python would raise at the first line of a callback.
-
-    Parameters
-    ----------
-    function : callable
-        Writes into its last argument.
     """
 
     def __init__(self, function: Callable):

@@ -22,23 +22,14 @@ class Tableau:
 
 @dataclass(frozen=True)
 class EmbeddedPair(Tableau):
-    """Embedded pair: a method with error estimates and dense output.
+    """Embedded pair: a method with error estimates and dense output."""
 
-    Parameters
-    ----------
-    errors : ndarray, shape (1 or 2, s + 1)
-        Weights of the error estimates, the slope at the end included; of two, the second tames the first
-        (Hairer et al. I, II.10, "Step size control" of DOP853).
-    extra_A, extra_c : ndarray, shape (m, s + 1 + m), (m,)
-        Further stages for dense output.
-    dense : ndarray, shape (k, s + 1 + m)
-        Weights of the last k coefficients of dense output.
-    """
-
+    # (1 or 2, s + 1) weights of the error estimates, the slope at the end included; of two, the second tames the first
+    # (Hairer et al. I, II.10, "Step size control" of DOP853)
     errors: np.ndarray
-    extra_A: np.ndarray
+    extra_A: np.ndarray  # extra_A (m, s + 1 + m), extra_c (m,): further stages for dense output
     extra_c: np.ndarray
-    dense: np.ndarray
+    dense: np.ndarray  # (k, s + 1 + m) weights of the last k coefficients of dense output
 
     @property
     def polynomial(self) -> np.ndarray:

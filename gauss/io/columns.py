@@ -11,7 +11,6 @@ from gauss.linkages import table as of_cycle
 from gauss.rotors import RotorMotion
 from gauss.rotors import table as of_rotors
 from gauss.servo import Tracking
-from gauss.servo.effort_units import effort_units
 from gauss.simulation import Rollout, Trajectory
 from gauss.simulation.provenance import library
 from gauss.system import System, coordinate_units, rate_units
@@ -34,7 +33,7 @@ def of_motion(trajectory: Trajectory) -> dict[str, np.ndarray]:
 def of_tracking(tracking: Tracking) -> dict[str, np.ndarray]:
     """Columns of the motion; efforts, their work, residuals of the relations, and the hold of the efforts."""
     found, names = of_motion(tracking.motion), tracking.servo.efforts
-    efforts = zip(names, effort_units(tracking.servo), tracking.efforts.T, strict=True)
+    efforts = zip(names, tracking.servo.effort_units, tracking.efforts.T, strict=True)
     found |= {f"effort {name} [{unit}]": column for name, unit, column in efforts}
     found |= {f"work of {name} [J]": column for name, column in zip(names, tracking.work.T, strict=True)}
     held = zip(tracking.servo.held, tracking.residuals.T, strict=True)

@@ -10,7 +10,6 @@ from gauss.io.rotors import toml_text
 from gauss.rotations import AXIS_NAMES
 from gauss.rotors import RotorMotion
 from gauss.servo import Tracking
-from gauss.servo.effort_units import effort_units
 from gauss.simulation import Rollout, Trajectory
 from gauss.simulation.provenance import library, made_by, plain, provenance, scene_text, written
 from gauss.system.coordinate_names import axis_labels
@@ -71,7 +70,7 @@ def of_tracking(tracking: Tracking, joints=()):
     }
     found = found.assign(data).assign_coords(
         effort_name=list(servo.efforts),
-        effort_unit=("effort_name", list(effort_units(servo))),
+        effort_unit=("effort_name", list(servo.effort_units)),
         relation=list(servo.held),
     )
     return found.assign_attrs(title=f"motion of {servo.system.scene.name} under servos", verdict=str(tracking.verdict))

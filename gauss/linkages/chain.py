@@ -66,6 +66,11 @@ class Dyad:
         return self.i, self.j
 
     @property
+    def inners(self) -> tuple[LinkJoint, ...]:
+        """Inner joints: one."""
+        return (self.inner,)
+
+    @property
     def links(self) -> tuple[PlanarLink, ...]:
         """Links of the group."""
         return self.i.link, self.j.link
@@ -166,8 +171,7 @@ class Chain:
         """All joints, in the order of the groups."""
         found = [self.pivot]
         for group in self.groups:
-            inner = (group.inner,) if isinstance(group, Dyad) else group.inners
-            found += [group.legs[0].joint, *inner, *(leg.joint for leg in group.legs[1:])]
+            found += [group.legs[0].joint, *group.inners, *(leg.joint for leg in group.legs[1:])]
         return tuple(found)
 
     @property

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.arguments import real_array
 from gauss.dynamics.laws.sampled_laws import sampled_times
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.errors import SimulationError
@@ -38,9 +37,9 @@ def motor_times(motor: Callable, start, duration: float, breaks=()) -> Timetable
     duration : float
         Duration [s].
     breaks : sequence of float
-        Further switching times [s].
+        Further switching times, ascending [s].
     """
-    given = Timetable(np.unique(real_array(breaks, "breaks", "times [s]")), np.zeros(0))
+    given = Timetable(np.asarray(breaks, dtype=float), np.zeros(0))
     return sampled_times(lambda t, _: motor(t, *start), None, 0.0, duration, "the law of the motor").join(given)
 
 

@@ -69,6 +69,24 @@ def closing_ranges(chain: Chain) -> list[tuple[float, float]]:
     return [(a, ends[ends > a].min() if (ends > a).any() else ends.min() + 2 * np.pi) for a in starts]
 
 
+def named_ranges(chain: Chain) -> str:
+    """These ranges in words; empty if there are none."""
+    return " and ".join(f"from {degrees(low)} to {degrees(high)}" for low, high in closing_ranges(chain))
+
+
+def degrees(angle: float) -> str:
+    """Angle in both units, for messages."""
+    return f"{angle:.6g} rad ({np.degrees(angle):.4g}°)"
+
+
+def required_ranges(chain: Chain) -> list[tuple[float, float]]:
+    """Ranges of :func:`closing_ranges`; LinkageError if there are none."""
+    ranges = closing_ranges(chain)
+    if not ranges:
+        raise LinkageError(f"{chain.name} closes at no crank angle: check the lengths.")
+    return ranges
+
+
 def sweep(chain: Chain, steps: int) -> np.ndarray:
     """Crank angles (steps + 1,) of a turn from the start of the cycle, in the sense of its motion, both ends included.
 
@@ -80,9 +98,7 @@ def sweep(chain: Chain, steps: int) -> np.ndarray:
     LinkageError
         If the linkage closes nowhere.
     """
-    ranges = closing_ranges(chain)
-    if not ranges:
-        raise LinkageError(f"{chain.name} closes at no crank angle: check the lengths.")
+    ranges = required_ranges(chain)
     if ranges == [FULL]:
         return np.linspace(chain.driver.start, end_of_turn(chain), steps + 1)
     start, sense = chain.driver.start, -1 if chain.driver.speed < 0 else 1

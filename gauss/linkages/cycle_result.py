@@ -7,9 +7,8 @@ import numpy as np
 
 from gauss.errors import LinkageError, did_you_mean
 from gauss.linkages.chain import Chain, Dyad
-from gauss.linkages.conditioning import conditions
 from gauss.linkages.elements import LinkJoint
-from gauss.linkages.motion import LinkageKinematics
+from gauss.linkages.motion import LinkageKinematics, conditions
 from gauss.linkages.placed import LinkMotion
 from gauss.linkages.plane import angle, dot, left
 

@@ -4,24 +4,26 @@ Near singular positions, where accelerations and reactions lose three times the 
 equations run in twice the precision.
 """
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 
 from gauss.arguments import real_numbers
-from gauss.errors import LinkageError
-from gauss.linkages.assembly_checks import check_assembled, check_regular
-from gauss.linkages.chain import Chain
-from gauss.linkages.conditioning import conditions, loss
-from gauss.linkages.crank_ranges import near
+from gauss.errors import LinkageError, NearSingularWarning
+from gauss.linkages.chain import Chain, Dyad
+from gauss.linkages.crank_ranges import degrees, named_ranges, near
 from gauss.linkages.cycle_result import Cycle
-from gauss.linkages.extended import DOUBLE_EPSILON, FIELDS, extended
-from gauss.linkages.motion import move
+from gauss.linkages.extended import DOUBLE_EPSILON, FIELDS, extended, loss
+from gauss.linkages.motion import LinkageKinematics, conditions, move
 from gauss.linkages.placed import LinkMotion
 from gauss.linkages.plane import angle
 from gauss.linkages.reactions import react
 
 EXTENDED_CONDITION = 1e2  # condition number of a group from which twice the precision is used: doubles lose six digits
+WARNED_CONDITION = 1e3  # condition number of a group: some 0.1° from a singular position
+LARGEST_ERROR = 1e-6  # relative error above which a group counts as singular: fewer than six digits are left
+SINGULAR_CONDITION = 2.0**52  # condition number of a matrix that is singular in doubles
 
 
 def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float | None = None) -> Cycle:
@@ -61,9 +63,10 @@ def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float 
     array([-51.888,   6.133])
     """
     driver = chain.driver
-    angles = _numbers("angles", angles)
-    speed = _numbers("speed", driver.speed if speed is None else speed) + 0.0 * angles
-    acceleration = _numbers("acceleration", driver.acceleration if acceleration is None else acceleration) + 0.0 * angles
+    angles = crank_numbers("angles", angles)
+    speed = crank_numbers("speed", driver.speed if speed is None else speed) + 0.0 * angles
+    given = driver.acceleration if acceleration is None else acceleration
+    acceleration = crank_numbers("acceleration", given) + 0.0 * angles
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         motion = move(chain, angles, speed, acceleration, near(chain, angles))
         kappa = conditions(motion)
@@ -71,8 +74,8 @@ def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float 
         found = Cycle(motion, *react(motion), loss(kappa, DOUBLE_EPSILON))
         if delicate.size:
             found, kappa[:, delicate] = _extended(found, delicate, speed, acceleration)
-    check_assembled(found.motion)
-    check_regular(found, kappa)
+    _check_assembled(found.motion)
+    _check_regular(found, kappa)
     return found
 
 
@@ -103,11 +106,77 @@ def _pose(moving: LinkMotion) -> np.ndarray:
     return np.stack([moving.p.real, moving.p.imag, angle(moving.e)])
 
 
-def _numbers(what: str, given) -> np.ndarray:
+def crank_numbers(what: str, given) -> np.ndarray:
+    """Finite numbers (k,) of the crank; LinkageError if they are none."""
     numbers = real_numbers(given)
     if numbers is None:
         raise LinkageError(f"{what}: expected numbers, got {given!r}.")
     array = np.atleast_1d(numbers)
     if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-        raise LinkageError(f"{what}: expected one or more finite numbers in a row, got shape {array.shape}.")
+        raise LinkageError(f"{what}: expected one or more finite numbers in a row, got {given!r:.80}.")
     return array
+
+
+def _check_assembled(motion: LinkageKinematics) -> None:
+    """Check that all groups can be assembled at all crank angles.
+
+    LinkageError if one cannot; the message names it and the angles at which the linkage closes.
+    """
+    for group, slack in zip(motion.chain.groups, motion.slack, strict=True):
+        for words, value in slack.items():
+            bad = ~(np.broadcast_to(value, motion.crank_angle.shape) >= 0)
+            if bad.any():
+                raise LinkageError(_open(motion, group, words, value, bad))
+
+
+def _open(motion: LinkageKinematics, group, words: str, value, bad) -> str:
+    worst = np.flatnonzero(bad)[np.argmax(np.nan_to_num(-value[bad], nan=np.inf))]
+    amount = "" if isinstance(value[worst], float) and np.isnan(value[worst]) else f" by {-value[worst]:.6g} m"
+    amount = amount if isinstance(group, Dyad) else ""
+    ranges = named_ranges(motion.chain)
+    closing = f"It closes for crank angles {ranges}." if ranges else "It closes at no crank angle: check the lengths."
+    return (
+        f"{motion.chain.name}: the {group.name} does not close at crank angle {degrees(motion.crank_angle[worst])}: "
+        f"it is {words}{amount}. {closing}"
+    )
+
+
+def _check_regular(found: Cycle, kappa: np.ndarray) -> None:
+    """Refuse crank angles at which too few digits are left, and warn of nearly singular ones.
+
+    LinkageError if fewer than six digits are left.
+    """
+    if not kappa.size:
+        return
+    groups, nowhere = found.chain.groups, np.where(np.isfinite(found.error), found.error, np.inf)
+    worst = int(np.argmax(nowhere))
+    if not nowhere[worst] <= LARGEST_ERROR:
+        where = _where(found, kappa, groups, worst, "too near a singular position")
+        raise LinkageError(
+            f"{where}: lengths and angles, rounded to doubles, determine {_digits(nowhere[worst])} of torque, reactions or "
+            "accelerations. Leave this angle out."
+        )
+    highest = kappa.max(axis=0)
+    if highest.max() > WARNED_CONDITION:
+        worst = int(np.argmax(np.where(highest > WARNED_CONDITION, found.error, -1.0)))
+        where = _where(found, kappa, groups, worst, "nearly singular")
+        warnings.warn(
+            f"{where}: lengths and angles, rounded to doubles, determine {_digits(found.error[worst])} of torque, "
+            "reactions and accelerations there.",
+            NearSingularWarning,
+            stacklevel=3,
+        )
+
+
+def _where(found: Cycle, kappa: np.ndarray, groups, k: int, what: str) -> str:
+    which = int(np.argmax(np.nan_to_num(kappa[:, k], nan=np.inf, posinf=np.inf)))
+    what = what if np.isfinite(kappa[which, k]) and kappa[which, k] < SINGULAR_CONDITION else "singular"
+    return (
+        f"{found.chain.name}: the {groups[which].name} is {what} at crank angle {degrees(found.crank_angle[k])} "
+        f"(condition number {kappa[which, k]:.1e})"
+    )
+
+
+def _digits(error: float) -> str:
+    digits = int(-np.log10(max(error, np.finfo(float).tiny))) if error < 1.0 else 0
+    return {0: "no digit", 1: "one digit"}.get(digits, f"{digits} digits")

@@ -60,7 +60,7 @@ def decompose(
             raise LinkageError(_undecomposed(name, links, left, placed))
         groups.append(group)
         placed |= {link.name for link in group.links}
-        for used in _joints_of(group):
+        for used in (*group.inners, *(leg.joint for leg in group.legs)):
             del left[used.name]
     _check_not_rigid(left, placed)
     chain = Chain(name, gravity, driver, pivot, crank, tuple(groups), tuple(loads))
@@ -159,11 +159,6 @@ def _check_ternary(name: str, pins: list[LinkJoint], poses) -> None:
             f"link {name!r} belongs to a class III group, which is placed by Newton's method: give its pose "
             f"(x, y, angle) near the start of the cycle, e.g. linkage.pose({name!r}, (0.6, 0.2, 0.05))."
         )
-
-
-def _joints_of(group) -> tuple[LinkJoint, ...]:
-    inner = (group.inner,) if isinstance(group, Dyad) else group.inners
-    return *inner, *(leg.joint for leg in group.legs)
 
 
 def _undecomposed(name: str, links, left, placed) -> str:

@@ -1,22 +1,26 @@
 """Forward dynamics of a linkage in one coordinate, J_e θ̈ + b θ̇² = M1 + Q, by one compiled kernel."""
 
+import ctypes
+import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
 from gauss.arguments import real_array
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.errors import LinkageError, SimulationError, SwitchingWarning, user_level
-from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.chain import Chain
 from gauss.linkages.crank_motion import CrankMotion, motor_times, solved
-from gauss.linkages.crank_ranges import closing_ranges, follow, near
+from gauss.linkages.crank_ranges import degrees, follow, named_ranges, near
+from gauss.linkages.cycles import crank_numbers
 from gauss.linkages.elements import CrankMotor
 from gauss.linkages.kernels import inertia_terms, reduced_kernel
 from gauss.linkages.motion import move
-from gauss.scene.values import evaluated
+from gauss.scene.values import put
+from gauss.simulation.arguments import check_breaks, sample_times
 from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 DEFAULT_ATOL = 1e-12  # rad, and relative to the speed of the drive
@@ -38,6 +42,11 @@ class ReducedLinkage:
     added_inertia : float
         Further inertia on the crank, e.g. of rotor and flywheel [kg m²].
 
+    Raises
+    ------
+    LinkageError
+        If the inertia is no number ≥ 0.
+
     Examples
     --------
     >>> import gauss
@@ -49,18 +58,20 @@ class ReducedLinkage:
     """
 
     def __init__(self, chain: Chain, added_inertia: float = 0.0):
+        if not _is_number(added_inertia) or added_inertia < 0:
+            raise LinkageError(f"added_inertia: expected a number ≥ 0 in [kg m²], got {added_inertia!r}.")
         self.chain, self.added, self.kernel = chain, float(added_inertia), reduced_kernel(chain)
         self.branch = follow(chain) if chain.triads else None
 
     def terms(self, angle: float, speed: float) -> tuple[float, float, float]:
         """J_e, b, and Q of all loads at a crank angle and speed."""
-        inputs = np.array([angle, speed])
-        if self.branch is not None:
-            inputs = np.concatenate([inputs, *self.branch.at(angle).values()])
-        J_e, b, Q = self.kernel(inputs).tolist()
-        if not np.isfinite(J_e):
-            ranges = " and ".join(f"from {degrees(x)} to {degrees(y)}" for x, y in closing_ranges(self.chain))
-            raise SimulationError(f"{self.chain.name} does not close at crank angle {degrees(angle)}; it closes {ranges}.")
+        poses = () if self.branch is None else np.concatenate([*self.branch.at(angle).values()])
+        inputs, outputs = (ctypes.c_double * self.kernel.n_in)(angle, speed, *poses), (ctypes.c_double * 3)()
+        self.kernel.at(ctypes.addressof(inputs), ctypes.addressof(outputs))
+        J_e, b, Q = outputs
+        if not math.isfinite(J_e):
+            where = f"does not close at crank angle {degrees(angle)}; it closes {named_ranges(self.chain) or 'nowhere'}"
+            raise SimulationError(f"{self.chain.name} {where}.")
         return J_e + self.added, b, Q
 
     def acceleration(self, angle: float, speed: float, torque: float) -> float:
@@ -135,7 +146,7 @@ def run(
     added_inertia : float
         Further inertia on the crank [kg m²].
     times : array_like, optional
-        Samples [s]; 500 equal steps when not given.
+        Increasing samples [s]; 500 equal steps when not given.
     rtol : float
         Local error of angle and speed, relative to them.
     atol : float, optional
@@ -154,8 +165,8 @@ def run(
     ------
     SceneError
         If the law of the motor raises, or returns no finite number; the message has the time.
-    SimulationError
-        If the crank reaches an angle at which the linkage does not close, or the integrator fails.
+    LinkageError, SimulationError
+        If an argument makes no sense, the linkage does not close where the crank comes, or the integrator fails.
     KeyboardInterrupt
         After Ctrl-C; its ``trajectory`` is the motion so far.
 
@@ -173,22 +184,25 @@ def run(
     >>> round(float(motion.speed[-1]), 3)
     20.32
     """
-    _check_settings(duration, rtol, atol, step, added_inertia)
+    _check_settings(duration, rtol, atol, step)
     equation = ReducedLinkage(chain, added_inertia)
-    samples = np.linspace(0.0, duration, 501) if times is None else real_array(times, "times", "numbers [s]")
-    start = [chain.driver.start if angle is None else float(angle), float(speed)]
-
-    fastest = max(abs(float(speed)), abs(chain.driver.speed)) or 1.0 / duration
+    samples = np.linspace(0.0, duration, 501) if times is None else sample_times(times, 0.0, duration)
+    start = crank_numbers("angle and speed", [chain.driver.start if angle is None else angle, speed]).tolist()
+    fastest = max(abs(start[1]), abs(chain.driver.speed)) or 1.0 / duration
     absolute = [DEFAULT_ATOL, DEFAULT_ATOL * fastest] if atol is None else atol
 
-    def torque(t, angle, speed):
-        return float(evaluated(motor, (t, angle, speed), f"{chain.name}: motor", 1)[0])
+    value, what = np.zeros(1), f"{chain.name}: motor"
+
+    def torque(*state):
+        put(motor, state, what, 1, value, 0)
+        return value.item()
 
     def rates(t, y):
         return [y[1], equation.acceleration(y[0], y[1], torque(t, y[0], y[1]))]
 
     options = {"rtol": rtol, "atol": absolute, "largest": np.inf if step is None else float(step)}
-    switches = NO_TIMES if isinstance(motor, CrankMotor) else motor_times(motor, start, duration, breaks)
+    known_breaks = check_breaks(breaks, 0.0, duration)
+    switches = NO_TIMES if isinstance(motor, CrankMotor) else motor_times(motor, start, duration, known_breaks)
     try:
         found = solved(rates, start, samples, duration, switches, **options)
     except SimulationError as error:
@@ -213,11 +227,13 @@ def _warn_of_motor(chain: Chain, switches: Timetable, found: CrankMotion, durati
         warn_of_opaque(chain.name, "the motor", "step=")
 
 
-def _check_settings(duration: float, rtol: float, atol: float | None, step: float | None, added_inertia: float) -> None:
-    """Check the arguments of :func:`run`; SimulationError, LinkageError if one makes no sense."""
+def _check_settings(duration: float, rtol: float, atol: float | None, step: float | None) -> None:
+    """Check the arguments of :func:`run`; SimulationError if one makes no sense."""
     given = {name: value for name, value in (("atol", atol), ("step", step)) if value is not None}
     for what, value in {"duration": duration, "rtol": rtol, **given}.items():
-        if not np.isfinite(value) or value <= 0:
+        if not _is_number(value) or value <= 0:
             raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
-    if not np.isfinite(added_inertia) or added_inertia < 0:
-        raise LinkageError(f"added_inertia: expected a number ≥ 0 in [kg m²], got {added_inertia!r}.")
+
+
+def _is_number(value) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

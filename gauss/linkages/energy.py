@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.arguments import LARGEST_FLOAT, real_array
+from gauss.arguments import LARGEST_FLOAT
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, end_of_turn
 from gauss.linkages.cycle_result import Cycle
-from gauss.linkages.cycles import cycle
+from gauss.linkages.cycles import crank_numbers, cycle
 from gauss.linkages.loads import centre, given, load_power, power
 from gauss.linkages.motion import LinkageKinematics
 from gauss.linkages.plane import dot
@@ -142,6 +142,11 @@ def work(chain: Chain, angles) -> np.ndarray:
     ndarray, shape (k,)
         Work [J].
 
+    Raises
+    ------
+    LinkageError
+        If the angles are no finite numbers, or as of :func:`cycle`.
+
     Examples
     --------
     >>> import gauss
@@ -151,8 +156,8 @@ def work(chain: Chain, angles) -> np.ndarray:
     >>> bool(abs(work(bar.chain, np.linspace(0, 2 * np.pi, 181))[-1]) < 1e-9)  # a turn under a conservative load
     True
     """
-    angles = real_array(angles, "crank angles", "numbers [rad]")
-    return cumulative(lambda x: cycle(chain, x).torque, angles, _jumps(chain, angles[0], angles[-1]))
+    angles = crank_numbers("crank angles", angles)
+    return cumulative(lambda x: cycle(chain, x).torque, angles, _jumps(chain, angles.min(), angles.max()))
 
 
 def _jumps(chain: Chain, start: float, end: float) -> np.ndarray:

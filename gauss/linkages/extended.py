@@ -14,11 +14,10 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from gauss.linkages.chain import Chain, Dyad, Leg, Triad
-from gauss.linkages.conditioning import conditions, loss
 from gauss.linkages.doubled import Doubled
 from gauss.linkages.elements import LinkJoint
 from gauss.linkages.loads import acting, centre
-from gauss.linkages.motion import LinkageKinematics, move
+from gauss.linkages.motion import LinkageKinematics, conditions, move
 from gauss.linkages.placed import LinkMotion
 from gauss.linkages.plane import Cartesian, rounded, unit
 from gauss.linkages.reactions import inertial, react
@@ -66,6 +65,15 @@ class GivenJoint:
     def direction(self, link: str) -> Cartesian:
         """Direction of the guide in the frame of one of its links."""
         return self.directions[link]
+
+
+def loss(kappa: np.ndarray, rounding: float) -> np.ndarray:
+    """Bound (k,) of the relative error that rounding leaves in second derivatives of groups with condition numbers (n, k).
+
+    A position is a root, and each derivative of it loses the digits of the condition number once more; what is lost in one
+    group is magnified by the others.
+    """
+    return rounding * (1.0 + (kappa**2).sum(axis=0) * kappa.prod(axis=0))
 
 
 def extended(chain: Chain, angles, speed, acceleration, poses) -> Extended:

@@ -1,6 +1,6 @@
 """Four-bars as vectors of dimensions, traced for exact derivatives: coupler points and rocker angles of crank angles.
 
-The dyad of coupler and rocker is placed by the same closed form as in every linkage (:mod:`gauss.linkages.position`); here
+The dyad of coupler and rocker is placed by the same closed form as in every linkage (:mod:`gauss.linkages.dyad`); here
 lengths and pivots are symbols, too.
 """
 
@@ -14,11 +14,11 @@ from gauss.arguments import real_numbers
 from gauss.codegen import Kernel, forward, write
 from gauss.errors import ArgumentError
 from gauss.linkages.chain import Dyad, Leg
+from gauss.linkages.dyad import place
 from gauss.linkages.elements import PlanarLink
 from gauss.linkages.linkage import Linkage
 from gauss.linkages.placed import Pose
 from gauss.linkages.plane import Cartesian, unit
-from gauss.linkages.position import place
 from gauss.scene import GROUND
 
 DIMENSIONS = ("A_x", "A_y", "D_x", "D_y", "crank", "coupler", "rocker", "along", "across")

@@ -111,7 +111,7 @@ class Linkage:
         self.poses[name_of(link)] = values.vector(pose, f"pose of link {name_of(link)!r}", "m, m, rad", 3)
 
     def add(self, element):
-        """Add a Link, LinkJoint, Driver, Motor or Load and return it.
+        """Add a PlanarLink, LinkJoint, Driver, CrankMotor or Load and return it.
 
         Raises
         ------
@@ -134,7 +134,7 @@ class Linkage:
             self._require_link(element.link, "load", self.links)
             self.loads.append(element)
         else:
-            raise SceneError(f"expected a Link, LinkJoint, Driver, Motor or Load, got {element!r}.")
+            raise SceneError(f"expected a PlanarLink, LinkJoint, Driver, CrankMotor or Load, got {element!r}.")
         return element
 
     @staticmethod

@@ -8,9 +8,8 @@ from gauss import math
 from gauss.codegen import Expression
 from gauss.errors import LinkageError
 from gauss.linkages.elements import Here, Load
-from gauss.linkages.forces import Wrench
 from gauss.linkages.motion import LinkageKinematics
-from gauss.linkages.placed import Complex, Real
+from gauss.linkages.placed import Complex, Real, Wrench
 from gauss.linkages.plane import angle, dot, pair, rounded
 
 

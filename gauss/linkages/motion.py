@@ -1,4 +1,4 @@
-"""Kinematics of a chain of groups at given crank angles: forward, group after group."""
+"""Kinematics of a chain of groups at given crank angles: forward, group after group; condition numbers of the groups."""
 
 from dataclasses import dataclass
 
@@ -6,11 +6,10 @@ import numpy as np
 
 from gauss.codegen import Expression
 from gauss.linkages import dyad as dyads
-from gauss.linkages import position
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, Dyad
 from gauss.linkages.placed import FRAME, LinkMotion, PinFreedom, Pose, Real, moved
-from gauss.linkages.plane import Cartesian, conjugate, unit
+from gauss.linkages.plane import Cartesian, conjugate, rounded, unit
 from gauss.linkages.plane import angle as turned
 from gauss.scene import GROUND
 
@@ -62,7 +61,7 @@ def move(chain: Chain, angle, speed, acceleration, poses=None) -> LinkageKinemat
     for group, where in zip(chain.groups, found, strict=True):
         links: tuple[LinkMotion, ...]
         if isinstance(group, Dyad):
-            assert isinstance(where, position.DyadPoses)
+            assert isinstance(where, dyads.DyadPoses)
             of_dyad = dyads.freedoms_of(group, moving, (where.i, where.j))
             links = dyads.move(of_dyad, (where.i, where.j))
             every.append(of_dyad)
@@ -97,11 +96,11 @@ def _place_all(chain: Chain, angle, poses):
     placed: dict[str, Pose] = {GROUND: frame}
     placed[chain.crank.name] = Pose(_pivot(chain, frame) - chain.pivot.point(chain.crank.name) * e, e)
     slack: list[dict] = []
-    found: list[position.DyadPoses | triads.Placed] = []
+    found: list[dyads.DyadPoses | triads.Placed] = []
     for group in chain.groups:
         links: tuple[Pose, ...]
         if isinstance(group, Dyad):
-            dyad = position.place(group, placed)
+            dyad = dyads.place(group, placed)
             slack.append(dyad.slack)
             links = dyad.i, dyad.j
             found.append(dyad)
@@ -125,3 +124,19 @@ def _frame(angle) -> LinkMotion:
     nought, unity = angle.graph.constant(0.0), angle.graph.constant(1.0)
     zero, one = Cartesian(nought, nought), Cartesian(unity, nought)
     return LinkMotion(zero, one, zero, 0.0, zero, 0.0)
+
+
+def conditions(motion: LinkageKinematics) -> np.ndarray:
+    """Condition numbers (n, k) of the matrices of all groups, lengths made free of units; infinite or nan where singular."""
+    size = np.shape(rounded(motion.crank_angle))
+    pairs = zip(motion.chain.groups, motion.freedoms, strict=True)
+    return np.array([np.broadcast_to(_condition(*pair), size) for pair in pairs]).reshape(-1, *size)
+
+
+def _condition(group, freedoms) -> np.ndarray:
+    """Condition number (k,) of the matrix of a group at its inner joints."""
+    if isinstance(group, Dyad):  # of two unit rows at this angle: cot(angle / 2)
+        quality = rounded(freedoms.quality)
+        return (abs(quality) + quality.real) / quality.imag
+    matrix = triads.matrix(freedoms)
+    return np.where(np.isfinite(matrix).all((1, 2)), np.linalg.cond(np.nan_to_num(matrix)), np.inf)

@@ -1,7 +1,7 @@
-"""Planar kinematics of links: poses, velocities, accelerations, and the freedom that an outer joint leaves."""
+"""Planar mechanics of single links: poses, velocities, accelerations, wrenches, freedoms of outer joints."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from gauss.linkages.plane import cross, left
 
@@ -152,3 +152,22 @@ def moved(pose: Pose, free: PinFreedom | SlideFreedom, rate, acceleration) -> Li
 def moment(x: Complex, force: Complex, about: Complex) -> Real:
     """Moment about a point of a force at x."""
     return cross(x - about, force)
+
+
+class Wrench(NamedTuple):
+    """Force and moment about a point."""
+
+    x: Complex  # the point [m]
+    force: Complex  # force [N]
+    moment: Real  # moment about x [N m]
+
+    def about(self, x: Complex) -> "Wrench":
+        """Return the same wrench about another point."""
+        return Wrench(x, self.force, self.moment + moment(self.x, self.force, x))
+
+    def __add__(self, other: "Wrench") -> "Wrench":  # type: ignore[override]  # a sum, not a longer tuple
+        other = other.about(self.x)
+        return Wrench(self.x, self.force + other.force, self.moment + other.moment)
+
+    def __neg__(self) -> "Wrench":
+        return Wrench(self.x, -self.force, -self.moment)

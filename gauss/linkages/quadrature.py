@@ -16,11 +16,11 @@ def cumulative(function, points: np.ndarray, breaks=()) -> np.ndarray:
     function : callable
         Takes angles (n,) and returns values (n,).
     points : ndarray, shape (k,)
-        Increasing or decreasing angles.
+        Angles.
     breaks : array_like
         Angles where the function jumps: no panel reaches across.
     """
-    low, high = min(points[0], points[-1]), max(points[0], points[-1])
+    low, high = points.min(), points.max()
     inside = [b for b in np.ravel(breaks) if low < b < high]
     coarse = np.unique(np.concatenate([points, inside]))
     counts = np.maximum(1, np.ceil(np.diff(coarse) / PANEL).astype(int))

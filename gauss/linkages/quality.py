@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, Dyad
-from gauss.linkages.crank_ranges import FULL, closing_ranges, near
+from gauss.linkages.crank_ranges import FULL, near, required_ranges
 from gauss.linkages.cycle_result import transmission_angles
 from gauss.linkages.cycles import cycle
 from gauss.linkages.motion import move
@@ -95,7 +95,7 @@ def dead_centres(chain: Chain, output: str) -> np.ndarray:
     Raises
     ------
     LinkageError
-        If there is neither.
+        If there is neither, or the linkage closes nowhere.
     """
     joints = {joint.name: joint for joint in chain.joints if joint.kind == "prismatic"}
     links = [link.name for link in chain.links]
@@ -106,7 +106,7 @@ def dead_centres(chain: Chain, output: str) -> np.ndarray:
         found = cycle(chain, angles, speed=1.0)
         return found.slide(output).speed if output in joints else found.link(output).omega + np.zeros(len(found))
 
-    ranges = closing_ranges(chain)
+    ranges = required_ranges(chain)
     if ranges == [FULL]:
         start = chain.driver.start
         return np.unique(zeros(speed, start, start + 2 * np.pi))
@@ -116,16 +116,15 @@ def dead_centres(chain: Chain, output: str) -> np.ndarray:
 
 def least_transmission(chain: Chain) -> dict[str, tuple[float, float]]:
     """Least transmission angle of each dyad over a turn, or over the angles that close, and the crank angle where [rad]."""
-    ranges = closing_ranges(chain)
-    if not ranges:
-        raise LinkageError(f"{chain.name} closes at no crank angle: check the lengths.")
+    ranges = required_ranges(chain)
     inset = 0.0 if ranges == [FULL] else END
-    angles = np.concatenate([np.linspace(a + inset, b - inset, SAMPLES) for a, b in ranges])
-    spacing = max(b - a for a, b in ranges) / SAMPLES
+    rows = np.array([np.linspace(a + inset, b - inset, SAMPLES) for a, b in ranges])
     found = {}
-    for name, mu in transmission(chain, angles).items():
-        best = angles[np.argmin(mu)]
-        low, high = max(best - spacing, angles[0]), min(best + spacing, angles[-1])
+    for name, mu in transmission(chain, rows.ravel()).items():
+        row, column = np.unravel_index(np.argmin(mu), rows.shape)
+        best, (start, end) = rows[row, column], rows[row, [0, -1]]
+        spacing = (end - start) / SAMPLES
+        low, high = max(best - spacing, start), min(best + spacing, end)
         for _ in range(REFINEMENTS):
             closer = np.linspace(low, high, 41)
             mu = transmission(chain, closer)[name]

@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from gauss.linkages import dyad as dyads
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Dyad
-from gauss.linkages.forces import Wrench, reaction
+from gauss.linkages.elements import LinkJoint
 from gauss.linkages.loads import acting, centre
 from gauss.linkages.motion import LinkageKinematics
-from gauss.linkages.placed import Complex, Real
+from gauss.linkages.placed import Complex, Pose, Real, Wrench
+from gauss.linkages.plane import dot, left, pair
 from gauss.scene import GROUND
 
 
@@ -29,7 +30,7 @@ def react(motion: LinkageKinematics) -> tuple[dict[str, Complex], Real]:
 
     def pass_on(leg, outer: Wrench) -> None:
         on_child = outer if leg.joint.child == leg.name else -outer
-        found[leg.joint.name] = reaction(leg.joint, motion.links[leg.joint.child], on_child)
+        found[leg.joint.name] = _reaction(leg.joint, motion.links[leg.joint.child], on_child)
         if leg.carrier != GROUND:
             required[leg.carrier] += outer
 
@@ -54,3 +55,12 @@ def inertial(motion: LinkageKinematics, link) -> Wrench:
     """Inertial wrench of a link less its weight."""
     moving, G = motion.links[link.name], centre(motion, link)
     return Wrench(G, link.mass * (moving.acceleration(G) - motion.chain.gravity), link.inertia * moving.alpha)
+
+
+def _reaction(joint: LinkJoint, child: Pose, on_child: Wrench) -> Complex:
+    """Reaction of a joint as R_x + i R_y at a pin, R_n + i R_m at a slide, from its wrench on the child."""
+    if joint.kind == "revolute":
+        return on_child.force
+    at = on_child.about(child.point(joint.point(joint.child)))
+    normal = left(joint.direction(joint.child) * child.e)
+    return pair(dot(normal, at.force), at.moment)

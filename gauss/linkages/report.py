@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.balancing import shaking
-from gauss.linkages.crank_ranges import FULL
+from gauss.linkages.crank_ranges import FULL, degrees
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.energy import power_balance
 from gauss.linkages.linkage import Linkage

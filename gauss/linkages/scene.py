@@ -91,11 +91,10 @@ def _spanning_first(chain: Chain) -> list[LinkJoint]:
     """
     joints = [chain.pivot]
     for group in chain.groups:
-        inner = [group.inner] if isinstance(group, Dyad) else list(group.inners)
         outer = [leg.joint for leg in group.legs]
         light = [leg.joint for leg in group.legs if isinstance(group, Dyad) and not _inertia_about(leg)]
         first = [joint for joint in outer if joint not in light[:1]]
-        joints += first + inner + light[:1]
+        joints += [*first, *group.inners, *light[:1]]
     return joints
 
 

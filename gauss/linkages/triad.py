@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.linkages.chain import Triad
-from gauss.linkages.forces import Wrench
-from gauss.linkages.placed import Complex, LinkMotion, PinFreedom, Pose, Real, SlideFreedom, freedom, moved
+from gauss.linkages.placed import Complex, LinkMotion, PinFreedom, Pose, Real, SlideFreedom, Wrench, freedom, moved
 from gauss.linkages.plane import cross, dot, left, pair, rounded, unit
 
 STEPS = 5  # of Newton's method from a neighbour on the cycle: quadratic convergence

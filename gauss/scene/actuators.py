@@ -16,16 +16,22 @@ ECCENTRIC = 1.4  # largest force of a lengthening muscle, in isometric ones
 CURVATURE = 0.25  # of Hill's force–velocity curve, a/F₀
 
 
-def _signal(signal) -> Callable:
+def _signal(signal, what: str, unit: str) -> Callable:
     """Law (t, motion) of a number, or of a law of one or two arguments."""
     if not callable(signal):
-        return lambda t, motion: signal
+        value = number(signal, what, unit)
+        return lambda t, motion: value
     return signal if arguments(signal) > 1 else lambda t, motion: signal(t)
 
 
 def _positive(what: str, **given: float):
     for name, value in given.items():
         number(value, f"{what}: {name}", "SI units", positive=True)
+
+
+def _numbers(what: str, **given: float):
+    for name, value in given.items():
+        number(value, f"{what}: {name}", "SI units")
 
 
 def dc_motor(
@@ -66,7 +72,8 @@ def dc_motor(
     """
     what = f"motor {text(name, 'name of a motor')!r}"
     _positive(what, resistance=resistance, inductance=inductance, constant=constant)
-    joint, current, law = name_of(joint), f"{name} current", _signal(voltage)
+    _numbers(what, ratio=ratio)
+    joint, current, law = name_of(joint), f"{name} current", _signal(voltage, f"{what}: voltage", "V")
 
     def rate(t, motion):
         back = constant * ratio * motion.rate(joint)
@@ -111,13 +118,15 @@ def pi_controller(
     >>> round(float(gauss.simulate(scene, 2.0, rtol=1e-8).coordinate("A")[-1]), 2)
     0.49
     """
-    joint, stored, law = name_of(joint), f"{name} integral", _signal(target)
+    what = f"controller {text(name, 'name of a controller')!r}"
+    _numbers(what, proportional=proportional, integral=integral, derivative=derivative)
+    joint, stored, law = name_of(joint), f"{name} integral", _signal(target, f"{what}: target", "rad or m")
 
     def effort(t, motion):
         error = law(t, motion) - motion.coordinate(joint)
         return proportional * error + integral * motion.rate(stored) - derivative * motion.rate(joint)
 
-    scene.require_joint(joint, f"controller {text(name, 'name of a controller')!r}")
+    scene.require_joint(joint, what)
     scene.state(stored, lambda t, motion: law(t, motion) - motion.coordinate(joint))
     return scene.drive(joint, torque=effort, limit=limit, name=name)
 
@@ -143,8 +152,9 @@ def low_pass(scene: Scene, name: str, signal, time: float, start: float = 0.0) -
     StateLaw
         Law of the state.
     """
-    _positive(f"filter {text(name, 'name of a filter')!r}", time=time)
-    law = _signal(signal)
+    what = f"filter {text(name, 'name of a filter')!r}"
+    _positive(what, time=time)
+    law = _signal(signal, f"{what}: signal", "its unit")
     return scene.state(name, lambda t, motion: (law(t, motion) - motion.rate(name)) / time, start)
 
 
@@ -199,6 +209,7 @@ def muscle(
     """
     what = f"muscle {text(name, 'name of a muscle')!r}"
     _positive(what, force=force, optimal_length=optimal_length, fastest=fastest, activation_time=activation_time)
+    _numbers(what, arm=arm)
     joint, active = name_of(joint), f"{name} activation"
 
     def effort(t, motion):
@@ -268,6 +279,7 @@ def lugre_friction(
     """
     what = f"friction {text(name, 'name of a friction')!r}"
     _positive(what, coulomb=coulomb, static=static, stribeck=stribeck, stiffness=stiffness)
+    _numbers(what, damping=damping, viscous=viscous)
     joint, bristle = name_of(joint), f"{name} bristle"
 
     def rate(t, motion):
@@ -349,8 +361,9 @@ def hydraulic_cylinder(
     """
     what = f"cylinder {text(name, 'name of a cylinder')!r}"
     _positive(what, area=area, rod_area=rod_area, volume=volume, bulk_modulus=bulk_modulus, flow=flow)
+    _numbers(what, supply=supply, tank=tank, leakage=leakage)
     _positive(what, supply=supply - tank)
-    joint, head, rod, law = name_of(joint), f"{name} pressure", f"{name} rod pressure", _signal(valve)
+    joint, head, rod, law = name_of(joint), f"{name} pressure", f"{name} rod pressure", _signal(valve, f"{what}: valve", "1")
     smooth = (1e-6 * supply) ** 2
 
     def through(u, drop):

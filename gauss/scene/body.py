@@ -57,8 +57,8 @@ class Body:
     inertia_as_given: bool = False
 
     def __post_init__(self):
-        """Check every value and keep plain tuples."""
         what = f"body {values.text(self.name, 'name of a body')!r}"
+        values.text(self.on, f"{what}: on")
         keep = {
             "mass": values.number(self.mass, f"{what}: mass", "kg", non_negative=True),
             "com": values.vector(self.com, f"{what}: com", "m"),
@@ -109,7 +109,6 @@ class Frame:
     rotation: tuple = (0.0, 0.0, 0.0)
 
     def __post_init__(self):
-        """Check every value and keep plain tuples."""
         what = f"frame {values.text(self.name, 'name of a frame')!r}"
         values.keep(self, position=values.vector(self.position, f"{what}: position", "m"))
         values.keep(self, rotation=values.rotation(self.rotation, f"{what}: rotation"))

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import TypeVar
 
+import numpy as np
+
 from gauss import scene as elements
 from gauss.errors import SceneError
 from gauss.scene import values
@@ -89,6 +91,8 @@ class ConstraintBuilder(SceneBuilder):
 
     def linear_coupling(self, name: str, terms: Mapping[str, float], constant: float = 0.0) -> "elements.LinearCoupling":
         """Keep a sum of joint coordinates, coefficients by joint, at a constant; see :class:`gauss.scene.LinearCoupling`."""
+        if not isinstance(terms, Mapping):
+            raise SceneError(f"linear coupling {name!r}: terms: expected coefficients by joint, got {terms!r:.80}.")
         return self.add(elements.LinearCoupling(name, tuple(map(name_of, terms)), tuple(terms.values()), constant))
 
     def transmission(self, name: str, driven, driver, ratio) -> "elements.Transmission":
@@ -123,5 +127,9 @@ class ConstraintBuilder(SceneBuilder):
 
 
 def name_of(thing) -> str:
-    """Name of an element, or the name itself."""
-    return thing if isinstance(thing, str) else getattr(thing, "name", thing)
+    """Name of an element, or the name itself; SceneError of lists and arrays, which are neither."""
+    if isinstance(thing, str):
+        return thing
+    if isinstance(thing, list | np.ndarray):
+        raise SceneError(f"expected an element of the scene or its name, got {thing!r:.80}.")
+    return getattr(thing, "name", thing)

@@ -69,7 +69,6 @@ class Clutch(JointLink):
     kind: ClassVar[str] = "clutch"
 
     def __post_init__(self):
-        """Check every value."""
         self._check()
         for key in ("torque", "hold"):
             value = getattr(self, key)
@@ -105,7 +104,6 @@ class Freewheel(JointLink):
     one_way: ClassVar[bool] = True
 
     def __post_init__(self):
-        """Check every value."""
         self._check()
 
     def bounds(self, t):

@@ -34,7 +34,6 @@ class Collider:
     kind: ClassVar[str] = "shape"
 
     def __post_init__(self):
-        """Check every value."""
         values.text(self.name, f"name of a {self.kind}")
         values.keep(self, at=values.vector(self.at, f"{self.what}: at", "m"))
 
@@ -81,7 +80,6 @@ class Sphere(Collider):
     kind: ClassVar[str] = "sphere"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         self._keep_length("radius", positive=True)
 
@@ -112,7 +110,6 @@ class Capsule(Collider):
     kind: ClassVar[str] = "capsule"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         self._keep_length("radius", positive=True)
         self._keep_length("length", positive=True)
@@ -148,7 +145,6 @@ class Box(Collider):
     kind: ClassVar[str] = "box"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, size=values.vector(self.size, f"{self.what}: size", "m"))
         values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
@@ -193,7 +189,6 @@ class Points(Collider):
     kind: ClassVar[str] = "points"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         try:
             points = tuple(values.vector(point, f"{self.what}: points", "m") for point in self.points)
@@ -225,7 +220,6 @@ class HalfSpace(Collider):
     kind: ClassVar[str] = "half-space"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))
 

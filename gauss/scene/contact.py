@@ -43,7 +43,6 @@ class Contact(Unilateral):
     shapes: ClassVar[tuple[str, ...]] = ("shape", "other")
 
     def __post_init__(self):
-        """Check every value."""
         values.text(self.name, "name of a contact")
         if self.shape == self.other:
             raise SceneError(f"{self.what}: a shape does not touch itself; name two.")

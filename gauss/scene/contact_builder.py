@@ -76,10 +76,14 @@ class ContactBuilder(SceneBuilder):
         SceneError
             If a name of ``exclude`` is none of a shape or body.
         """
-        excluded = {frozenset(map(name_of, pair)) for pair in exclude}
+        try:
+            excluded = {frozenset(map(name_of, pair)) for pair in exclude}
+        except TypeError:
+            expected = "pairs of names of shapes or bodies"
+            raise SceneError(f"contacts_all: exclude: expected {expected}, got {exclude!r:.80}.") from None
         known = self.shapes.keys() | self.bodies.keys() | {elements.GROUND}
-        for name in sorted(set().union(*excluded) - known):
-            raise SceneError(f"contacts_all: exclude: no shape or body {name!r}. {did_you_mean(name, known)}")
+        for name in sorted(set().union(*excluded) - known, key=str):
+            raise SceneError(f"contacts_all: exclude: no shape or body {name!r}. {did_you_mean(str(name), known)}")
         excluded |= {frozenset((contact.shape, contact.other)) for contact in self._contacts_of_shapes()}
         joints = [joint for joint in self.joints.values() if joint.parent != elements.GROUND]
         excluded |= {frozenset((joint.parent, joint.child)) for joint in joints}

@@ -83,13 +83,7 @@ def _box(half: np.ndarray) -> Polytope:
 
 
 class SolidPair:
-    """Contact points of two solids.
-
-    Parameters
-    ----------
-    first, second : Solid or None
-        The solids; the second may be a half-space, None.
-    """
+    """Contact points of two solids; the second may be a half-space, None."""
 
     farthest = inf  # distance at which points are found [m]
 
@@ -108,15 +102,7 @@ class SolidPair:
         return dist(one, other) <= self.size + reach
 
     def points(self, one: SolidPose, other: SolidPose, reach: float) -> list[ContactPoint]:
-        """At most :data:`SLOTS` contact points nearer than ``reach`` [m].
-
-        Parameters
-        ----------
-        one, other : SolidPose
-            Poses of the two solids.
-        reach : float
-            Distance [m].
-        """
+        """At most :data:`SLOTS` contact points nearer than ``reach`` [m], of the poses of the two solids."""
         if self.second is None:
             assert isinstance(self.first, Polytope)
             return spread(_below(self.first.vertices, one, other, reach))

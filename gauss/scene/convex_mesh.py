@@ -1,5 +1,6 @@
 """Collision shape of points: their convex hull, with the faces of a mesh where these are given."""
 
+from collections.abc import Sized
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import ClassVar
@@ -38,7 +39,6 @@ class ConvexMesh(ConvexCollider):
     kind: ClassVar[str] = "mesh"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
         points = _table(self.vertices, f"{self.what}: vertices", "points [m]", float)
@@ -50,10 +50,14 @@ class ConvexMesh(ConvexCollider):
             raise SceneError(
                 f"{self.what}: its {len(points)} vertices lie in one plane, line or point; a solid needs four that do not."
             )
-        faces = _table(self.faces, f"{self.what}: faces", "triples of numbers of vertices", int) if len(self.faces) else None
+        faces = _table(self.faces, f"{self.what}: faces", "triples of numbers of vertices", int) if self._has_faces else None
         if faces is not None:
             self._require_closed(faces, len(points))
             values.keep(self, faces=tuple(map(tuple, faces.tolist())))
+
+    @property
+    def _has_faces(self) -> bool:
+        return not isinstance(self.faces, Sized) or len(self.faces) > 0
 
     def _require_closed(self, faces: np.ndarray, count: int):
         """Refuse faces without area, of vertices that do not exist, or that leave holes."""
@@ -159,7 +163,7 @@ def _table(entries, what: str, of: str, kind: type) -> np.ndarray:
     """Array (k, 3) of what was given."""
     try:
         found: np.ndarray = np.array(entries, dtype=kind)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = np.zeros(0)
     if found.ndim != 2 or found.shape[1] != 3 or (kind is int and not np.array_equal(found, np.array(entries))):
         raise SceneError(f"{what} are a list of {of}, each with three entries, got {_short(entries)}.")

@@ -64,7 +64,6 @@ class Ellipsoid(ConvexCollider):
     kind: ClassVar[str] = "ellipsoid"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, radii=values.vector(self.radii, f"{self.what}: radii", "m"))
         values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
@@ -91,7 +90,6 @@ class _Turned(ConvexCollider):
     axis: tuple = (0.0, 0.0, 1.0)
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         self._keep_length("radius", positive=True)
         self._keep_length("length", positive=True)

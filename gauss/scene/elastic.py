@@ -84,7 +84,6 @@ class ElasticLink(Elastic):
     joints: ClassVar[tuple[str, ...]] = ("driven", "driver")
 
     def __post_init__(self):
-        """Check every value."""
         values.text(self.name, "name of an elastic link")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: driven and driver are both {self.driven!r}; a link joins two joints.")

@@ -9,16 +9,9 @@ LARGEST_FILE = 20_000_000  # bytes
 
 
 def contents(path: Path, largest: int = LARGEST_FILE) -> bytes:
-    """Bytes of a file.
+    """Bytes of a file, at most ``largest``; pipes and devices, from which reading may not end, are no files.
 
     FileError if there is none, it is no file, it is larger, or it cannot be read.
-
-    Parameters
-    ----------
-    path : Path
-        The file; pipes and devices, from which reading may not end, are none.
-    largest : int
-        Number of bytes that it may have.
     """
     try:
         found = path.stat()

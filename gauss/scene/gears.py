@@ -43,7 +43,6 @@ class Gear(Between):
     kind: ClassVar[str] = "gear"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         teeth = values.vector(self.teeth, f"{self.what}: teeth", "1", 2)
         if min(teeth) <= 0 or (self.internal and teeth[0] == teeth[1]):
@@ -133,7 +132,6 @@ class Rack(Between):
     kind: ClassVar[str] = "rack"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
         values.keep(self, along=values.direction(self.along, f"{self.what}: along"))

@@ -38,7 +38,6 @@ class Between(Relation):
     kind: ClassVar[str] = "constraint"
 
     def __post_init__(self):
-        """Check every value."""
         what = self.what
         values.text(self.name, f"name of a {self.kind}")
         if self.body == self.other:
@@ -94,7 +93,6 @@ class Distance(Between):
     kind: ClassVar[str] = "distance"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         if self.length is not None:
             values.keep(self, length=values.smooth_law(self.length, f"{self.what}: length", "m"))
@@ -125,7 +123,6 @@ class OnPlane(Between):
     kind: ClassVar[str] = "point on plane"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))
 
@@ -149,7 +146,6 @@ class OnLine(Between):
     kind: ClassVar[str] = "point on line"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
 
@@ -175,7 +171,6 @@ class OnCurve(Between):
     kind: ClassVar[str] = "point on curve"
 
     def __post_init__(self):
-        """Check that there is a curve."""
         super().__post_init__()
         if not callable(self.curve):
             raise SceneError(f"{self.what}: curve must be a function of a point (x, y, z), got {self.curve!r}.")
@@ -207,7 +202,6 @@ class Angle(Between):
     kind: ClassVar[str] = "angle"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
         values.keep(self, other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))

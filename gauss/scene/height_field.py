@@ -39,7 +39,6 @@ class HeightField(BoundedCollider):
     kind: ClassVar[str] = "height field"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
         values.keep(self, size=values.vector(self.size, f"{self.what}: size", "m", 2))

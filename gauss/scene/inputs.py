@@ -9,6 +9,7 @@ Computer-Controlled Systems, 3rd ed., 2.3); its effort is u itself, or a law of 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf
+from numbers import Real
 
 from gauss.errors import SceneError, did_you_mean, listed
 from gauss.scene import values
@@ -70,12 +71,11 @@ class Input:
     forces: tuple[Force, ...] = ()
 
     def __post_init__(self):
-        """Check every value."""
         what = f"input {values.text(self.name, 'name of an input')!r}"
         self._check_what_it_acts_on(what)
         if self.limits is None:
             return
-        if isinstance(self.limits, int | float):
+        if isinstance(self.limits, Real):
             values.keep(self, limits=values.number(self.limits, f"{what}: limits", "N m or N", positive=True))
             return
         low, high = values.vector(self.limits, f"{what}: limits", "N m or N", 2)
@@ -156,9 +156,8 @@ class Output:
     relative_to: str = ""
 
     def __post_init__(self):
-        """Check every value."""
         what = f"output {values.text(self.name, 'name of an output')!r}"
-        if self.kind not in SENSORS:
+        if not isinstance(self.kind, str) or self.kind not in SENSORS:
             raise SceneError(f"{what}: no kind {self.kind!r}. {did_you_mean(str(self.kind), SENSORS)}")
         values.text(self.of, f"{what}: of")
         if self.relative_to != "":

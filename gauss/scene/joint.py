@@ -65,10 +65,9 @@ class Joint:
     limits: tuple | None = None
 
     def __post_init__(self):
-        """Check every value and keep plain tuples."""
         what = f"joint {values.text(self.name, 'name of a joint')!r}"
-        if self.kind not in PAIRS:
-            raise SceneError(f"{what}: unknown type {self.kind!r}. {did_you_mean(self.kind, PAIRS)}")
+        if not isinstance(self.kind, str) or self.kind not in PAIRS:
+            raise SceneError(f"{what}: unknown type {self.kind!r}. {did_you_mean(str(self.kind), PAIRS)}")
         if self.parent == self.child:
             raise SceneError(f"{what}: parent and child are both {self.child!r}; a joint binds two bodies.")
         keep = {
@@ -154,7 +153,6 @@ class Coupling:
     offset: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"coupling {values.text(self.name, 'name of a coupling')!r}"
         values.keep(self, ratio=values.number(self.ratio, f"{what}: ratio", "1"))
         values.keep(self, offset=values.number(self.offset, f"{what}: offset", "rad or m"))

@@ -1,18 +1,31 @@
-"""Builder methods of a scene for drives, forces, springs and starts."""
+"""Builder methods of a scene for drives, forces, springs, starts, and states of one's own.
 
-from gauss.errors import SceneError
+A state ẋ = f(t, motion) is the rate of a body with a moment of inertia of 1 kg m² that acts on nothing: the compulsion gains
+½ (ẋ − f)², the least of which is the law. So whatever moves mechanisms moves states.
+"""
+
+import warnings
+from math import pi, radians
+
+import numpy as np
+
+from gauss.errors import SceneError, StartWarning, user_level
 from gauss.scene import values
+from gauss.scene.body import Body
 from gauss.scene.builder import SceneBuilder, name_of
-from gauss.scene.degrees import warn_of_start
 from gauss.scene.elastic import ElasticLink
-from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
+from gauss.scene.joint import Joint
+from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start, StateLaw
 from gauss.scene.motions import Prescribed
 from gauss.scene.names import GROUND
 from gauss.scene.set_valued import LimitedDrive
 
+ANGULAR_COORDINATES = {"revolute": (0,), "screw": (0,), "cylindrical": (0,), "universal": (0, 1), "planar": (2,)}
+LARGEST_ANGLE = 4 * pi  # rad: more than two turns are mostly degrees
+
 
 class LoadBuilder(SceneBuilder):
-    """Builder methods for loads, prescribed motions and starts; each adds one element and returns it."""
+    """Builder methods for loads, prescribed motions, starts and states; each adds one element and returns it."""
 
     def drive(
         self,
@@ -96,6 +109,50 @@ class LoadBuilder(SceneBuilder):
         """
         return self.add(Start(name_of(joint), position, rate))
 
+    def state(self, name: str, rate, start: float = 0.0, breaks=()) -> StateLaw:
+        """Add a state x of your own with the law ẋ = rate: a controller, a current, a muscle, a bristle.
+
+        Laws read it as ``motion.rate(name)``, and its integral over time as ``motion.coordinate(name)``; a trajectory,
+        outputs of the kind "rate" and linear models have it under its name. It is integrated with the motion, by every
+        method and on every route. An input that acts on it, ``scene.input("u", {name: factor})``, adds factor · u to ẋ.
+
+        Parameters
+        ----------
+        name : str
+            Name of the state; no joint has it.
+        rate : float or callable
+            Its time derivative: a constant, law(t) or law(t, motion), as of a drive.
+        start : float
+            Value at the start.
+        breaks : sequence of float
+            Times at which the law switches [s], for one that cannot be traced.
+
+        Returns
+        -------
+        StateLaw
+            What was added, the law of a joint of this name: gauss integrates x as the rate of a body with a moment of
+            inertia of 1 kg m² beside the mechanism, which acts on nothing. Energies leave it out.
+
+        Examples
+        --------
+        >>> import gauss
+        >>> scene = gauss.load("pendulum")
+        >>> scene.state("filtered", lambda t, at: (at.rate("A") - at.rate("filtered")) / 0.1).joint
+        'filtered'
+        """
+        law = StateLaw(f"rate of {values.text(name, 'name of a state')}", name, rate, None, breaks)
+        self._require_new(name, "state", self.joints | self.couplings | self._constraints)
+        self._require_new(law.name, "state", self.loads | self._constraints | self.inputs)
+        body = self.add(Body(f"state {name}", 0.0, (1.0, 1.0, 1.0), inertia_as_given=True))
+        self.add(Joint(name, "revolute", GROUND, body.name))
+        self.add(Start(name, rate=values.number(start, f"state {name!r}: start", "1")))
+        return self.add(law)
+
+    @property
+    def states(self) -> dict[str, StateLaw]:
+        """States of one's own by name, see :meth:`state`."""
+        return {load.joint: load for load in self.loads.values() if isinstance(load, StateLaw)}
+
     def _place_load(self, load):
         what = f"{values.kind(load)} {load.name!r}"
         self._require_new(load.name, "load", self.loads | self._constraints | self.inputs)
@@ -125,3 +182,32 @@ class LoadBuilder(SceneBuilder):
                 raise SceneError(f"start of joint {start.joint!r}: {key} needs {count} numbers, got {value!r}.")
         warn_of_start(start, self.joints[start.joint])
         self.starts[start.joint] = start
+
+
+def warn_of_start(start: Start, joint: Joint):
+    """Warn of a start beyond the limits of its joint, which is moved to them, and of an angle of more than two turns.
+
+    Warns
+    -----
+    StartWarning
+        With what the number would be in degrees.
+    """
+    if start.position is None:
+        return
+    position = np.ravel(start.position)
+    what, angles = f"start of joint {joint.name!r}", ANGULAR_COORDINATES.get(joint.kind, ())
+    if joint.limits is not None and not joint.limits[0] <= position[0] <= joint.limits[1]:
+        low, high = joint.limits
+        unit = "rad" if angles else "m"
+        hint = f" {_in_radians(position[0])}" if angles and low <= radians(position[0]) <= high else ""
+        said = f"{what}: {position[0]:g} {unit} is beyond its limits, {low:g} to {high:g} {unit}, where it starts instead."
+        warnings.warn(said + hint, StartWarning, stacklevel=user_level())
+        return
+    for k in angles:
+        if position.size > k and abs(position[k]) > LARGEST_ANGLE:
+            said = f"{what}: {position[k]:g} rad are {position[k] / (2 * pi):.3g} turns. {_in_radians(position[k])}"
+            warnings.warn(said, StartWarning, stacklevel=user_level())
+
+
+def _in_radians(degrees: float) -> str:
+    return f"If degrees were meant: np.deg2rad({degrees:g}) = {radians(degrees):.6g}."

@@ -8,6 +8,8 @@ from collections.abc import Callable, Sized
 from dataclasses import dataclass
 from typing import cast
 
+import numpy as np
+
 from gauss.errors import SceneError
 from gauss.scene import values
 
@@ -35,7 +37,6 @@ class Drive:
     breaks: tuple = ()
 
     def __post_init__(self):
-        """Check every value."""
         what = f"drive {values.text(self.name, 'name of a drive')!r}"
         effort = self.effort
         if isinstance(effort, (list, tuple)) or getattr(effort, "ndim", False):
@@ -95,7 +96,6 @@ class Force:
     breaks: tuple = ()
 
     def __post_init__(self):
-        """Check every value."""
         what = f"force {values.text(self.name, 'name of a force')!r}"
         values.keep(self, force=values.law(self.force, f"{what}: force", "N", 3))
         values.keep(self, moment=values.law(self.moment, f"{what}: moment", "N m", 3))
@@ -129,7 +129,6 @@ class JointSpring:
     rest: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"joint spring {values.text(self.name, 'name of a spring')!r}"
         _check_spring(self, what)
         values.keep(self, rest=values.number(self.rest, f"{what}: rest", "rad or m"))
@@ -163,7 +162,6 @@ class Spring:
     length: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"spring {values.text(self.name, 'name of a spring')!r}"
         _check_spring(self, what)
         values.keep(self, length=values.number(self.length, f"{what}: length", "m", non_negative=True))
@@ -200,16 +198,12 @@ class Start:
     rate: float | tuple = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"start of joint {values.text(self.joint, 'name of a joint')!r}"
         for key, unit in (("position", "rad or m"), ("rate", "rad/s or m/s")):
             value = getattr(self, key)
             if value is None:
                 continue
-            scalar = isinstance(value, (int, float, str))
-            checked = (
-                values.number(value, f"{what}: {key}", unit)
-                if scalar
-                else values.vector(value, f"{what}: {key}", unit, len(value))
-            )
+            is_one = not np.asarray(value, dtype=object).ndim
+            what_of = f"{what}: {key}"
+            checked = values.number(value, what_of, unit) if is_one else values.vector(value, what_of, unit, len(value))
             values.keep(self, **{key: checked})

@@ -84,7 +84,6 @@ class LossyGear(Relation):
     joints: ClassVar[tuple[str, ...]] = ("driven", "driver")
 
     def __post_init__(self):
-        """Check every value."""
         values.text(self.name, "name of a lossy gear")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: joint {self.driven!r} cannot drive itself.")

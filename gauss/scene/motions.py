@@ -41,7 +41,6 @@ class Prescribed(Relation):
     joints: ClassVar[tuple[str, ...]] = ("joint",)
 
     def __post_init__(self):
-        """Check the law."""
         what = f"drive {values.text(self.name, 'name of a drive')!r}"
         if (self.position is None) == (self.speed is None):
             raise SceneError(f"{what}: give either a position or a speed.")
@@ -87,9 +86,9 @@ class Guided(Relation):
     frames: ClassVar[tuple[str, ...]] = ("body",)
 
     def __post_init__(self):
-        """Check every value."""
         what = f"guide {values.text(self.name, 'name of a guide')!r}"
-        along = tuple(values.direction(row, f"{what}: along") for row in self.along)
+        rows = self.along if np.iterable(self.along) else (self.along,)
+        along = tuple(values.direction(row, f"{what}: along") for row in rows)
         values.keep(
             self,
             at=values.vector(self.at, f"{what}: at", "m"),

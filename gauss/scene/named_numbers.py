@@ -46,10 +46,7 @@ def scene_of(scene: Scene | Callable[..., Scene], values: Mapping[str, float]) -
 def changed(scene: Scene, name: str, value: float) -> Scene:
     """Scene with another value of one number: "BODY.mass", "BODY.com.x", "JOINT.at[0]", "JOINT.rate", "gravity.y".
 
-    Raises
-    ------
-    SceneError
-        If there is no such number; the message says what there is.
+    SceneError if there is no such number; the message says what there is.
     """
     path, index = parsed(name)
     if path == "gravity":

@@ -19,7 +19,6 @@ class Profile:
     """Law of time. Every field is a number, or a list of numbers."""
 
     def __post_init__(self):
-        """Check every value."""
         what = f"profile {self.kind!r}"
         for field in fields(self):
             value = getattr(self, field.name)

@@ -75,7 +75,6 @@ class Constraint(Relation):
     velocity: Callable | None = None
 
     def __post_init__(self):
-        """Check that there is a residual."""
         what = f"constraint {values.text(self.name, 'name of a constraint')!r}"
         if self.position is None and self.velocity is None:
             raise SceneError(f"{what}: give position= or velocity=, a function that returns what must be zero.")

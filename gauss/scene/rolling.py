@@ -50,7 +50,6 @@ class Rolling(Between):
     kind: ClassVar[str] = "rolling contact"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(
             self,
@@ -142,7 +141,6 @@ class KnifeEdge(Between):
     kind: ClassVar[str] = "knife edge"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, edge=values.direction(self.edge, f"{self.what}: edge"))
         values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 from gauss.arguments import named_arguments, named_methods
 from gauss.errors import SceneError
-from gauss.scene import builder, contact_builder, inputs, load_builder, state_builder, values
+from gauss.scene import builder, contact_builder, inputs, load_builder, values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, Element, name_of
 from gauss.scene.collision import Collider
@@ -19,7 +19,6 @@ from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.names import GROUND, SceneNames
 from gauss.scene.relation import Relation
 from gauss.scene.set_valued import SetValued
-from gauss.scene.state_builder import StateBuilder
 from gauss.scene.unilateral import Unilateral
 from gauss.versions import FormerAttribute
 
@@ -31,7 +30,7 @@ LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
 
 
 @dataclass(frozen=True)
-class Scene(ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputBuilder):
+class Scene(ConstraintBuilder, ContactBuilder, LoadBuilder, InputBuilder):
     """Mechanism and its surroundings.
 
     Parameters
@@ -74,7 +73,6 @@ class Scene(ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputB
     source: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self):
-        """Check the name and gravity."""
         values.text(self.name, "name of the scene")
         values.keep(self, gravity=values.vector(self.gravity, "gravity", "m/s²"))
 
@@ -245,10 +243,10 @@ class Scene(ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputB
     changing = FormerAttribute("nonsmooth")
 
 
-_MODULES = builder, contact_builder, load_builder, state_builder, inputs
+_MODULES = builder, contact_builder, load_builder, inputs
 _HERE = (*(value for module in _MODULES for value in vars(module).values()), *list(globals().values()))
 _KINDS = {kind for kind in _HERE if isinstance(kind, type) and kind.__module__.startswith("gauss.scene.")}
 for _kind in _KINDS:
     named_arguments(_kind)
-for _builder in (Scene, SceneNames, ConstraintBuilder, ContactBuilder, LoadBuilder, StateBuilder, InputBuilder):
+for _builder in (Scene, SceneNames, ConstraintBuilder, ContactBuilder, LoadBuilder, InputBuilder):
     named_methods(_builder)

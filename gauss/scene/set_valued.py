@@ -82,7 +82,6 @@ class JointDryFriction(SetValued):
     joints: ClassVar[tuple[str, ...]] = ("joint",)
 
     def __post_init__(self):
-        """Check every value."""
         values.text(self.name, f"name of a {self.kind}")
         if not callable(self.limit):
             values.keep(self, limit=values.number(self.limit, f"{self.what}: limit", "N m or N", positive=True))
@@ -128,7 +127,6 @@ class LimitedDrive(JointDryFriction):
     lossy: ClassVar[bool] = False
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         values.keep(self, speed=values.smooth_law(self.speed, f"{self.what}: speed", "rad/s or m/s"))
 
@@ -159,7 +157,6 @@ class Slipping:
     power_flow: int = 0
 
     def __post_init__(self):
-        """Check the sign."""
         if self.sign not in (-1, 1):
             raise SceneError(f"slipping {self.name!r}: its sign is −1 or 1, got {self.sign!r}.")
 

@@ -11,18 +11,7 @@ LIBRARIES = ("builtins", "gauss", "numpy", "scipy")  # whose objects keep no sta
 
 
 class PreservedState:
-    """Copy of the state of a law.
-
-    Parameters
-    ----------
-    law : callable
-        The law.
-
-    Attributes
-    ----------
-    changed : bool
-        Whether calls had changed the state when it was restored.
-    """
+    """Copy of the state of a law; ``changed`` says whether calls had changed the state when it was restored."""
 
     def __init__(self, law):
         laws = _called(law)

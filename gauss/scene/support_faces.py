@@ -36,13 +36,7 @@ def sides_of(points: np.ndarray, following: np.ndarray, normals: np.ndarray) -> 
 
 
 class Polytope:
-    """Hull of points.
-
-    Parameters
-    ----------
-    vertices, loops, normals
-        As of :attr:`gauss.scene.ConvexMesh.hull`.
-    """
+    """Hull of points: vertices, loops and normals as of :attr:`gauss.scene.ConvexMesh.hull`."""
 
     def __init__(self, vertices: np.ndarray, loops: list[np.ndarray], normals: np.ndarray):
         self.vertices, self.normals = vertices, normals
@@ -117,15 +111,7 @@ class Oval:
 
 
 class Revolved:
-    """Cylinder or cone: flat ends, and an edge of its side.
-
-    Parameters
-    ----------
-    radius, half : float
-        Of its ends, and half its length [m].
-    pointed : bool
-        Whether its end on the positive side is an apex.
-    """
+    """Cylinder or cone: flat ends, and an edge of its side; a pointed one has its apex on the positive side."""
 
     def __init__(self, radius: float, half: float, pointed: bool):
         self.radius, self.half, self.pointed, self.size = radius, half, pointed, float(np.hypot(radius, half))

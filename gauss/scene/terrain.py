@@ -98,14 +98,9 @@ class Terrain:
     def has_normal(
         self, corners: np.ndarray, points: np.ndarray, normal: np.ndarray, place: np.ndarray, direction: np.ndarray
     ) -> bool:
-        """Whether a direction is one of the normals of the surface at a place of a triangle.
+        """Whether a direction (3,), a unit vector, is one of the normals of the surface at a place (3,) of a triangle [m].
 
-        Parameters
-        ----------
-        corners, points, normal : ndarray, shape (3,), (3, 3), (3,)
-            Numbers of its vertices, these vertices, and its normal.
-        place, direction : ndarray, shape (3,)
-            The place [m], and a unit vector.
+        The triangle by numbers of its vertices (3,), these vertices (3, 3), and its normal (3,).
         """
         if direction @ normal >= 1.0 - 0.5 * ALIGNED**2:
             return True

@@ -104,13 +104,7 @@ def from_tables(data: dict) -> Scene:
 
 
 def check_sections(data: dict, sections: list[str]):
-    """Refuse a section that is none of these.
-
-    Raises
-    ------
-    SceneError
-        Naming it, and the nearest that exist.
-    """
+    """Refuse a section that is none of these; SceneError naming it, and the nearest that exist."""
     for key in data:
         if key not in sections:
             raise SceneError(f"unknown section {key!r}. {did_you_mean(key, sections)}")

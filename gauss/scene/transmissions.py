@@ -30,7 +30,6 @@ class Cam(Relation):
     joints: ClassVar[tuple[str, ...]] = ("cam", "follower")
 
     def __post_init__(self):
-        """Check the profile."""
         what = f"cam {values.text(self.name, 'name of a cam')!r}"
         if not callable(self.profile):
             raise SceneError(f"{what}: profile must be a function or a spline, got {self.profile!r}.")
@@ -64,7 +63,6 @@ class LinearCoupling(Relation):
     joints: ClassVar[tuple[str, ...]] = ("coupled",)
 
     def __post_init__(self):
-        """Check every value."""
         what = f"linear coupling {values.text(self.name, 'name of a linear coupling')!r}"
         if isinstance(self.coupled, str) or not all(isinstance(joint, str) for joint in self.coupled):
             raise SceneError(f"{what}: coupled must be names of joints, got {self.coupled!r}.")
@@ -108,7 +106,6 @@ class Transmission(Relation):
     joints: ClassVar[tuple[str, ...]] = ("driven", "driver")
 
     def __post_init__(self):
-        """Check that there is a ratio."""
         what = f"transmission {values.text(self.name, 'name of a transmission')!r}"
         if not callable(self.ratio):
             raise SceneError(f"{what}: ratio must be a function of a view, got {self.ratio!r}; use couple for a constant.")

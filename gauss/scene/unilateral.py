@@ -112,7 +112,6 @@ class Stop(Unilateral):
     joints: ClassVar[tuple[str, ...]] = ("joint",)
 
     def __post_init__(self):
-        """Check every value."""
         values.text(self.name, "name of a stop")
         for key in ("lowest", "highest"):
             if getattr(self, key) is not None:
@@ -163,7 +162,6 @@ class OneSidedConstraint(Unilateral):
     restitution: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         values.text(self.name, "name of a one-sided constraint")
         if not callable(self.gap):
             raise SceneError(f"{self.what}: gap must be a function of a view of the mechanism, got {self.gap!r}.")
@@ -200,7 +198,6 @@ class Rope(Between, Unilateral):
     kind: ClassVar[str] = "rope"
 
     def __post_init__(self):
-        """Check every value."""
         super().__post_init__()
         if self.length is not None:
             values.keep(self, length=values.number(self.length, f"{self.what}: length", "m", positive=True))

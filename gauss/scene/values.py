@@ -62,7 +62,7 @@ def vector(value, what: str, unit: str, size: int = 3) -> tuple[float, ...]:
 
 def times(value, what: str) -> tuple[float, ...]:
     """Tuple of finite times, in order."""
-    if isinstance(value, str) or np.ndim(value) != 1:
+    if isinstance(value, str) or np.asarray(value, dtype=object).ndim != 1:
         raise SceneError(f"{what}: expected times in [s], as [5.0, 6.0]; got {value!r}.")
     return tuple(sorted(vector(value, what, "s", len(value)))) if len(value) else ()
 
@@ -155,20 +155,9 @@ def _finite(entries: np.ndarray, given: tuple, what: str, size: int) -> np.ndarr
 
 
 def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
-    """Value of a law (size,): floats, or objects where it is traced.
+    """Value of a law (size,), called with arguments of which the first is the time: floats, or objects where it is traced.
 
     SceneError if it raises, or returns something else; the message names the law and the time.
-
-    Parameters
-    ----------
-    law : callable
-        A law of the user's.
-    given : tuple
-        Its arguments, the time first.
-    what : str
-        Its name in messages.
-    size : int
-        Number of values that it must return.
     """
     return _checked(_asked(law, given, what), given, what, size)
 

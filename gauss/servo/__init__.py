@@ -10,7 +10,6 @@ P. Appell, Traité de mécanique rationnelle, vol. II; H. Béghin, Étude théor
 """
 
 from gauss.servo.actuators import AuxiliarySupport, Cable, Motor, Thruster
-from gauss.servo.energy import ServoEnergy, energy
 from gauss.servo.equilibrium import Equilibrium, equilibrium
 from gauss.servo.explain import explain
 from gauss.servo.lagrange import LagrangeSolution, lagrange, without_multipliers
@@ -22,7 +21,7 @@ from gauss.servo.saddle import ServoSolution
 from gauss.servo.servo import Servo
 from gauss.servo.simulate import simulate
 from gauss.servo.solve import solve
-from gauss.servo.tracking import Tracking
+from gauss.servo.tracking import ServoEnergy, Tracking, energy
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.versions import current_name
 

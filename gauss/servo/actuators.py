@@ -9,6 +9,7 @@ from functools import singledispatch
 
 import numpy as np
 
+from gauss.arguments import name_list
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError, did_you_mean
@@ -33,7 +34,6 @@ class Motor:
     coordinate: str
 
     def __post_init__(self):
-        """Check the names."""
         values.text(self.coordinate, f"motor {values.text(self.name, 'name of an actuator')!r}: coordinate")
 
 
@@ -68,7 +68,6 @@ class Thruster:
     axes: str = "world"
 
     def __post_init__(self):
-        """Check every value."""
         what = f"thruster {values.text(self.name, 'name of an actuator')!r}"
         for key, unit in (("force", "N"), ("moment", "N m"), ("at", "m")):
             object.__setattr__(self, key, values.vector(getattr(self, key), f"{what}: {key}", unit))
@@ -107,7 +106,6 @@ class Cable:
     slack: float = 0.0
 
     def __post_init__(self):
-        """Check every value."""
         what = f"cable {values.text(self.name, 'name of an actuator')!r}"
         object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m"))
         object.__setattr__(self, "other_at", values.vector(self.other_at, f"{what}: other_at", "m"))
@@ -142,9 +140,8 @@ class AuxiliarySupport:
     joints: tuple[str, ...]
 
     def __post_init__(self):
-        """Check the names."""
         what = f"support {values.text(self.name, 'name of an actuator')!r}"
-        joints = (self.joints,) if isinstance(self.joints, str) else tuple(self.joints)
+        joints = name_list(self.joints, f"{what}: joints", "names of joints")
         if not joints:
             raise SceneError(f"{what}: needs at least one joint.")
         object.__setattr__(self, "joints", tuple(values.text(joint, f"{what}: joint") for joint in joints))
@@ -225,6 +222,19 @@ def _(actuator: AuxiliarySupport, system: System):
 @push.register
 def _(actuator: AuxiliarySupport, number: int, motion: Kinematics, applied: Applied):
     applied.P[_columns(actuator, motion.system)[number]] += 1.0
+
+
+def unit_of_effort(actuator, number: int, system: System) -> str:
+    """Unit of one effort of an actuator; see :attr:`gauss.servo.Servo.effort_units`."""
+    if isinstance(actuator, AuxiliarySupport):
+        column = _columns(actuator, system)[number]
+    elif isinstance(actuator, Motor):
+        column = system.coordinates.index(actuator.coordinate)
+    else:
+        return "N" if isinstance(actuator, Cable) else "1"
+    joint = next(joint for joint in system.joints if joint.v.start <= column < joint.v.stop)
+    E_omega, _ = joint.pair.subspace(np.array(joint.pair.reference))
+    return "N m" if np.any(E_omega[:, column - joint.v.start]) else "N"
 
 
 def _columns(actuator: AuxiliarySupport, system: System) -> list[int]:

@@ -17,18 +17,9 @@ class SlackError(SimulationError):
 
 
 def allocate(instant: ServoInstant, servo: Servo, t: float) -> np.ndarray:
-    """Efforts u (j,) with S u = b, least Σ weight (u − reference)², and u ≥ least.
+    """Efforts u (j,) with S u = b, S of full row rank, least Σ weight (u − reference)², and u ≥ least.
 
-    SlackError if a bound is violated; the message names time and efforts.
-
-    Parameters
-    ----------
-    instant : ServoInstant
-        S of rank r, and b.
-    servo : Servo
-        Weights, preloads and lower bounds (−∞ for none) of the efforts, and their names.
-    t : float
-        Time [s], for messages.
+    SlackError if a bound is violated; the message names the time [s] and efforts.
     """
     u, rounding = _least_norm(instant, servo)
     if (u >= servo.least - rounding).all():

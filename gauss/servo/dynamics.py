@@ -40,20 +40,7 @@ SERVOS = RuleTable(
 
 
 class ServoEngine(Engine):
-    """Engine of one servo-controlled motion.
-
-    Parameters
-    ----------
-    plan : RelationPlan
-        Rows by which its relations are held.
-
-    Attributes
-    ----------
-    route : gauss.Plan
-        Plan of the motion.
-    evaluations : int
-        Number of evaluations of the accelerations.
-    """
+    """Engine of one servo-controlled motion, by the rows that hold its relations; ``route`` is the plan of the motion."""
 
     evaluations, rescued = 0, 0
 

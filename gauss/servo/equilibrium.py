@@ -20,8 +20,8 @@ from gauss.servo.instant import DEPENDENT
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.lagrange import contact_scalars, generalised_forces, loop_constraints, require_written
 from gauss.servo.project import first_accepted, sizes_of
-from gauss.servo.rows import rows
-from gauss.servo.servo import Servo
+from gauss.servo.relation import rows
+from gauss.servo.servo import Servo, state_of
 from gauss.shapes import Shaped
 from gauss.system import State, retract
 
@@ -80,9 +80,9 @@ def equilibrium(servo: Servo, state: State | None = None) -> Equilibrium:
     >>> servo.equilibrium(crane).efforts.round(6)  # the tension carries the load
     array([ 0.  , 19.62])
     """
-    system = servo.system
+    state, system = state_of(servo, state, "servo.equilibrium"), servo.system
     require_written(system)
-    state = system.initial_state() if state is None else state
+    servo.follow_laws()
     form = servo.made((_Form,), lambda: _Form(servo))
     state = State(state.t, state.q, np.zeros(system.n_v))
     unknown = np.zeros(form.n_contacts + len(servo.efforts))

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.servo.plan import direct
 from gauss.servo.realisable import realisable
 from gauss.servo.saddle import is_ideal
-from gauss.servo.servo import Servo
+from gauss.servo.servo import Servo, state_of
 from gauss.servo.solve import saddle
 from gauss.servo.verdict import UnrealisableError
 from gauss.system import State
@@ -34,7 +34,7 @@ def explain(servo: Servo, state: State | None = None) -> str:
     >>> print(servo.explain(crane).splitlines()[0])
     servo on scene 'overhead crane'
     """
-    state = servo.system.initial_state() if state is None else state
+    state = state_of(servo, state, "servo.explain")
     verdict = realisable(servo, state)
     kinds = {relation.name: relation for relation in servo.relations}
     lines = [f"servo on scene {servo.system.scene.name!r}"]

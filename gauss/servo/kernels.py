@@ -12,19 +12,13 @@ from gauss.dynamics.traced_system import applied_loads
 from gauss.servo.actuators import push
 from gauss.servo.instant import ServoInstant
 from gauss.servo.observed import MotionSymbols, body_inputs, body_symbols
-from gauss.servo.rows import ScalarRelation, ServoRows, rows, scalars
+from gauss.servo.relation import ScalarRelation, ServoRows, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.system import State, System
 
 
 class ShapedKernel:
-    """Machine code of arrays of expressions.
-
-    Parameters
-    ----------
-    inputs : sequence of Expression
-        Symbols.
-    """
+    """Machine code of arrays of expressions of symbols."""
 
     def __init__(self, inputs, outputs):
         flat = [entry for output in outputs for entry in np.ravel(np.asarray(output, dtype=object))]

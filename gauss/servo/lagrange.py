@@ -16,13 +16,12 @@ from gauss.dynamics.coupling_constraints import Couplings
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied
-from gauss.errors import SceneError
+from gauss.errors import SceneError, require
 from gauss.rotations import cross
 from gauss.servo.instant import DEPENDENT
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.observed import MotionSymbols
-from gauss.servo.relation import as_relations
-from gauss.servo.rows import ScalarRelation, rows, scalars
+from gauss.servo.relation import ScalarRelation, as_relations, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, System, whole
@@ -154,6 +153,9 @@ def free_displacements(blocked: np.ndarray) -> np.ndarray:
 
 
 def _terms(servo: Servo, state: State) -> Terms:
+    require(servo, (Servo,), "servo.lagrange")
+    require(state, (State,), "servo.lagrange: state")
+    servo.follow_laws()
     return servo.made((LagrangeForm,), lambda: LagrangeForm(servo))(state)
 
 

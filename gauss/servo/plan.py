@@ -15,7 +15,7 @@ from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SceneError
 from gauss.servo.kernels import ShapedKernel, accelerations, directions
-from gauss.servo.rows import ScalarRelation, rows
+from gauss.servo.relation import DERIVATIVES, ScalarRelation, rows
 from gauss.servo.servo import Servo
 from gauss.system import State, retract
 
@@ -40,7 +40,6 @@ class RelationPlan(NamedTuple):
 
 
 HIDDEN = "hidden in "
-DERIVATIVES = {"position": 2, "velocity": 1, "acceleration": 0}
 
 
 class NoReductionError(SceneError):
@@ -71,10 +70,8 @@ def neighbours(servo: Servo, state: State) -> list[State]:
 def reduced(servo: Servo, state: State) -> RelationPlan:
     """Plan with hidden relations, found near a state.
 
-    Raises
-    ------
-    NoReductionError
-        If the equations of motion cannot be differentiated, or no effort ever acts on a relation; the message says why.
+    NoReductionError if the equations of motion cannot be differentiated, or no effort ever acts on a relation; the message
+    says why.
     """
     _check(servo)
     samples, table = neighbours(servo, state), list(servo.scalars)

@@ -14,11 +14,11 @@ import numpy as np
 
 from gauss.dynamics.assembly_search import NEWTON_STEPS
 from gauss.dynamics.consistent_states import project
-from gauss.errors import StateError
+from gauss.errors import StateError, require
 from gauss.servo.kernels import tree_rows
 from gauss.servo.plan import RelationPlan
 from gauss.servo.realisable import contact_responses, instant, planned
-from gauss.servo.rows import ServoRows
+from gauss.servo.relation import ServoRows
 from gauss.servo.servo import Servo
 from gauss.system import State, System, retract
 
@@ -61,6 +61,7 @@ def initial_state(servo: Servo, state: State | None = None) -> State:
     >>> state.t, state.q.round(6)
     (0.0, array([0., 0.]))
     """
+    require(servo, (Servo,), "servo.initial_state")
     state = servo.system.initial_state() if state is None else servo.system.projected(state)
     plan = planned(servo, state)
     state = projected(servo, plan, state, NEWTON_STEPS)
@@ -165,17 +166,7 @@ def _correction(servo: Servo, plan: RelationPlan, state: State, residual, level:
 
 
 def first_accepted(trial_at: Callable[[float], Trial], accepted: Callable[[Trial], bool], smallest: float) -> Trial | None:
-    """First accepted trial; None if there is none down to the smallest share.
-
-    Parameters
-    ----------
-    trial_at : callable
-        Share of the step → trial.
-    accepted : callable
-        Whether a trial lowers the residual.
-    smallest : float
-        Smallest share of the step.
-    """
+    """First accepted trial of a share of a step, halved down to the smallest one; None if there is none."""
     share = 1.0
     while share >= smallest:
         trial = trial_at(share)

@@ -11,7 +11,7 @@ from gauss.servo.instant import ServoInstant
 from gauss.servo.kernels import responses, tree_rows, untraced
 from gauss.servo.plan import NoReductionError, RelationPlan, direct, neighbours, reduced
 from gauss.servo.saddle import Saddle
-from gauss.servo.servo import Servo
+from gauss.servo.servo import Servo, state_of
 from gauss.servo.verdict import UnrealisableError, Verdict, verdict_of
 from gauss.system import State
 
@@ -36,7 +36,8 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
     Verdict
         True if they can be held; else with the reason.
     """
-    state = servo.system.initial_state() if state is None else state
+    state = state_of(servo, state, "servo.realisable")
+    servo.follow_laws()
     plan = direct(servo)
     verdict = verdict_of(instant(servo, state, plan), servo.held, servo.efforts)
     if verdict.outcome != "rank lost":
@@ -76,12 +77,8 @@ def planned(servo: Servo, state: State) -> RelationPlan:
 def instant(servo: Servo, state: State, plan: RelationPlan) -> ServoInstant:
     """Instant at a state on the contacts, by machine code where the dynamics can be traced.
 
-    Raises
-    ------
-    UnrealisableError
-        If a number is not finite: an actuator has no direction, or the state is singular.
-    StateError
-        If a loop that cannot move has another pose than in the scene.
+    UnrealisableError if a number is not finite: an actuator has no direction, or the state is singular. StateError if a loop
+    that cannot move has another pose than in the scene.
     """
     if untraced(servo):
         found = Saddle(servo, state).instant

@@ -26,7 +26,7 @@ from gauss.errors import BackendError, SimulationError
 from gauss.servo.allocate import allocate
 from gauss.servo.instant import ServoInstant, number
 from gauss.servo.kernels import body_directions, body_rows
-from gauss.servo.rows import ServoRows
+from gauss.servo.relation import ServoRows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State
@@ -84,23 +84,11 @@ class ServoSolution:
 
 
 class Saddle:
-    """Saddle system of a servo in one state, with its contacts factored.
+    """Saddle system of a servo in a consistent state, with its contacts factored.
 
-    Parameters
-    ----------
-    state : State
-        Consistent state.
-    load : array_like, shape (n_v,), optional
-        Generalised forces added to those of the scene.
-    hidden : ServoRows, optional
-        Rows on the coordinates that replace those of the relations, from index reduction.
-
-    Attributes
-    ----------
-    compulsion : Compulsion
-        Gauss's problem without servos.
-    instant : ServoInstant
-        Rows, directions and responses in maximal coordinates.
+    ``load`` (n_v,): generalised forces added to those of the scene; ``hidden``: rows on the coordinates that replace those
+    of the relations, from index reduction. ``compulsion``: Gauss's problem without servos; ``instant``: rows, directions and
+    responses in maximal coordinates.
     """
 
     def __init__(self, servo: Servo, state: State, load=None, hidden: ServoRows | None = None):

@@ -1,21 +1,22 @@
 """Servo: a system, servo-constraints, and the actuators that hold them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gauss.arguments import table
 from gauss.dynamics import compile_scene
+from gauss.dynamics.laws.traced_laws import present_laws
 from gauss.dynamics.store import Store
 from gauss.errors import ArgumentError, SceneError, did_you_mean, require
 from gauss.scene import Scene, values
-from gauss.servo.actuators import Cable, efforts
+from gauss.servo.actuators import Cable, efforts, unit_of_effort
 from gauss.servo.observed import MotionSymbols, tree_symbols
-from gauss.servo.relation import ServoRelation, as_relations
-from gauss.servo.rows import ScalarRelation, scalars
-from gauss.system import System
+from gauss.servo.relation import ScalarRelation, ServoRelation, as_relations, scalars
+from gauss.system import State, System
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ class Servo:
 
     def _of_efforts(self, key: str, unit: str, positive: bool) -> dict[str, float]:
         """Checked numbers by the names of efforts."""
-        given = dict(getattr(self, key)).items()
+        given = table(getattr(self, key), f"Servo: {key}", "numbers by the names of efforts").items()
         found = {name: values.number(value, f"{key} of {name!r}", unit, positive=positive) for name, value in given}
         for name in found:
             if name not in self.efforts:
@@ -109,9 +110,22 @@ class Servo:
         """Pairs (actuator, number of the effort in it), one for each of the j efforts."""
         return tuple((a, k) for a in self.actuators for k in range(len(efforts(a, self.system))))
 
+    @property
+    def effort_units(self) -> tuple[str, ...]:
+        """Unit of each effort: "N", "N m", or "1" of a thruster, whose effort multiplies a force and a moment."""
+        return tuple(unit_of_effort(actuator, number, self.system) for actuator, number in self.each_effort)
+
     @cached_property
     def _made(self) -> Store:
         return Store()
+
+    @cached_property
+    def _stores(self) -> dict[Hashable, Store]:
+        return {}
+
+    def follow_laws(self):
+        """Use what was made for the laws of the loads as they are now, which may have changed since it was made."""
+        vars(self)["_made"] = self._stores.setdefault(present_laws(self.system).key, Store())
 
     def made(self, key: tuple, make: Callable):
         """Result of ``make``, kept under a key: machine code, index reduction."""
@@ -152,3 +166,12 @@ class Servo:
     def least(self) -> np.ndarray:
         """Least values (j,) of the efforts: slack tensions of cables, −∞ for the others."""
         return np.array([a.slack if isinstance(a, Cable) else -np.inf for a, _ in self.each_effort])
+
+
+def state_of(servo: Servo, state: State | None, function: str) -> State:
+    """State, that of the start of the scene when not given; ArgumentError if the servo or the state is none."""
+    require(servo, (Servo,), function)
+    if state is None:
+        return servo.system.initial_state()
+    require(state, (State,), f"{function}: state")
+    return state

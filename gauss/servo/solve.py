@@ -1,5 +1,6 @@
 """Solution of one instant: accelerations, reactions of contacts, efforts of servos."""
 
+from gauss.errors import require
 from gauss.servo.kernels import tree_rows
 from gauss.servo.plan import RelationPlan
 from gauss.servo.realisable import planned
@@ -44,6 +45,8 @@ def solve(servo: Servo, state: State, load=None, backend: str = "auto") -> Servo
     >>> dict(zip(now.names, now.efforts.round(6).tolist()))
     {'motor': 0.0}
     """
+    require(servo, (Servo,), "servo.solve")
+    require(state, (State,), "servo.solve: state")
     return saddle(servo, state, planned(servo, state), load).solve(backend)
 
 

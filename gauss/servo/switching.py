@@ -12,7 +12,7 @@ from gauss.dynamics.laws.switching_times import timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.servo.instant import number
 from gauss.servo.plan import RelationPlan
-from gauss.servo.rows import rows
+from gauss.servo.relation import rows
 from gauss.servo.servo import Servo
 from gauss.system import State
 
@@ -26,18 +26,9 @@ class _RelationLaws(NamedTuple):
 
 
 def servo_switching(servo: Servo, plan: RelationPlan, start: State, end: float, breaks) -> Switching:
-    """Switching times and functions that the steps of a motion under servos resolve.
+    """Switching times and functions that the steps of a motion under servos resolve, up to its end [s].
 
-    Parameters
-    ----------
-    plan : RelationPlan
-        Rows by which its relations are held.
-    start : State
-        Initial state.
-    end : float
-        Final time [s].
-    breaks : ndarray
-        Further switching times [s].
+    ``breaks``: further switching times [s].
     """
     loads = switching(servo.system, Laws(servo.system), start, end, breaks)
     laws = _relation_laws(servo, plan)

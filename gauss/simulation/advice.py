@@ -13,19 +13,7 @@ TIGHT = 1e-10  # rtol below which a tighter one does not help
 
 
 def advice(system: System, settings: dict, events=(), stepped: bool = False) -> str:
-    """Likely cause and remedy, in words.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    settings : dict
-        Integrator, step, rtol and atol, as far as known.
-    events : sequence of Event
-        Events of the motion.
-    stepped : bool
-        Whether the integrator is time stepping.
-    """
+    """Likely cause and remedy, in words, by the settings that are known; ``stepped``: of time stepping."""
     laws, said = Laws(system), [_method(settings, stepped)]
     impacts = sum(event.kind == "impact" for event in events)
     if impacts:

@@ -4,7 +4,6 @@ What a scene does not have is not asked for: a plain system (:attr:`gauss.System
 changed, nothing that switches, and takes every method.
 """
 
-from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -12,9 +11,10 @@ import numpy as np
 from gauss import integrators
 from gauss.arguments import real_numbers
 from gauss.backends import Backend, ready
+from gauss.dynamics.initial_states import given_starts
 from gauss.dynamics.laws.switching import NO_SWITCHING, Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
-from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws, present_laws
 from gauss.dynamics.rules import named
 from gauss.dynamics.scene_compilation import compile_scene
 from gauss.dynamics.stabilisation import Baumgarte, drift
@@ -31,6 +31,7 @@ from gauss.simulation.tolerances import check_tolerances, shares_of_scale, toler
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System, refuse_changed
 
+FITTING_NUMBERS = 1e6  # in memory of any machine
 SAMPLE_NUMBERS = 6  # in memory for each sample of a motion, beside coordinates and rates: times, steps and work
 LEAST_CONTROLLED_RTOL = 1e-7  # of time stepping by error control: gaps are rounded, and its order is low
 
@@ -68,7 +69,7 @@ def checked_problem(
     samples = sample_times(times, start.t, duration)
     known_breaks = check_breaks(breaks, start.t, duration)
     _refuse_beyond_memory(system, method, duration, step, samples)
-    constraint_drift, laws, end = drift(system, stabilisation, start), _laws(system), start.t + duration
+    constraint_drift, laws, end = drift(system, stabilisation, start), present_laws(system), start.t + duration
     problem = Problem(
         system,
         laws,
@@ -106,9 +107,9 @@ def _refuse_beyond_memory(system: System, method: Integrator, duration: float, s
     asked = "times"
     if samples is None and step is not None and isinstance(method, FixedStep):
         count, asked = duration / step, f"step: each step of {step:.3g} s"
-    if not count:
-        return
     numbers = count * (SAMPLE_NUMBERS + system.n_q + system.n_v)
+    if numbers <= FITTING_NUMBERS:
+        return
     refuse_beyond_memory(
         numbers, f"{asked}: {count:.3g} samples of {system.scene.name!r}", f"give fewer times=, or {SHORTER}"
     )
@@ -143,11 +144,6 @@ def described(problem: Problem, duration: float, integrator: str | Integrator, r
     }
 
 
-def _laws(system: System) -> Laws:
-    """Loads of a system: traced anew, for their functions may have changed; cached where they have none."""
-    return cached(system, (Laws,), partial(Laws, system)) if system.is_plain else Laws(system)
-
-
 def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.ndarray) -> Switching:
     """Switching of a motion, cached for motions over the same time; opaque laws are sampled anew."""
     if system.is_plain and not breaks.size:
@@ -162,7 +158,7 @@ def _start(system: System, state: State | None) -> State:
     """Consistent initial state: that of the scene, cached, or a given one, projected."""
     if system.written:
         refuse_changed(system)
-    return cached(system, (_start,), system.initial_state) if state is None else system.projected(state)
+    return cached(system, (_start, given_starts(system)), system.initial_state) if state is None else system.projected(state)
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:

@@ -12,21 +12,9 @@ NO_STEP = float("inf")  # of an interpolation without a result: bisection is tak
 
 
 def brent(function: Callable[[float], float], begin: float, end: float, xtol: float, rtol: float) -> float:
-    """Root between two points, within xtol + rtol |root|.
+    """Root of a continuous function between two points, within xtol + rtol |root|.
 
-    Parameters
-    ----------
-    function : callable
-        Continuous function of a number.
-    begin, end : float
-        Points at which it has different signs, or is zero.
-    xtol, rtol : float
-        Absolute and relative tolerance of the root.
-
-    Raises
-    ------
-    ValueError
-        If the signs are equal, or a value is NaN.
+    ValueError if the signs there are equal, or a value is NaN.
     """
 
     def value(x: float) -> float:

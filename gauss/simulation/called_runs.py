@@ -39,15 +39,7 @@ NEVER = np.array([np.inf])  # samples of a step that has none [s]
 
 
 class CalledRun(CompiledRun):
-    """One motion in machine code that calls opaque laws.
-
-    Parameters
-    ----------
-    problem : Problem
-        Initial value problem.
-    dynamics : str
-        Of its plan, from which the functions of the system come.
-    """
+    """One motion in machine code that calls opaque laws; the dynamics of its plan give the functions of the system."""
 
     def __init__(self, problem: Problem, dynamics: str = "callbacks"):
         super().__init__(problem, dynamics)
@@ -71,10 +63,7 @@ class CalledRun(CompiledRun):
     def _called(self, run: Callable[[], None]):
         """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`.
 
-        Raises
-        ------
-        SimulationError
-            If a law raises, returns no finite numbers, or chatters; its ``trajectory`` holds the motion so far.
+        SimulationError if a law raises, returns no finite numbers, or chatters; its ``trajectory`` holds the motion so far.
         """
         try:
             with self.receiver:
@@ -115,27 +104,13 @@ class CalledFixedRun(CalledRun, CompiledFixedRun):
 
 
 class CalledSteps:
-    """Steps of a run in machine code that calls opaque laws; a law that raises leaves the state as it was before.
-
-    Parameters
-    ----------
-    run : CalledFixedRun
-        The run, whose ``arrays`` the steps change.
-    entry : EntryPoint
-        Machine code of the steps.
-    """
+    """Steps of a run in machine code, whose ``arrays`` they change; a law that raises leaves the state as it was before."""
 
     def __init__(self, run: CalledFixedRun, entry: EntryPoint):
         self.run, self.entry = run, entry
 
     def call(self, *given):
-        """Make steps.
-
-        Raises
-        ------
-        SimulationError
-            If a law raises, or returns no finite numbers.
-        """
+        """Make steps; SimulationError if a law raises, or returns no finite numbers."""
         control, before = self.run.control, [array.copy() for array in self.run.reached]
         record = bytes(control)
         try:

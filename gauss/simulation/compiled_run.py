@@ -96,7 +96,7 @@ class CompiledRun:
     @property
     def checks_bodies(self) -> bool:
         """Whether accelerations are checked body by body, which joints that close loops do not allow."""
-        return not self.system.has_closures and self.program.checks_bodies
+        return not self.system.has_closures and program_of(self.dynamics).checks_bodies
 
     def run(self):
         """Run until the end, or a status of :data:`UNTRUSTED`."""

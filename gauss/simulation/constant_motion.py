@@ -20,12 +20,8 @@ from gauss.system import System
 def constant(problem: Problem) -> Trajectory:
     """Constant trajectory of a system with n_v = 0, at the samples of a motion.
 
-    A fixed-step method samples every step, another one the start and the end.
-
-    Raises
-    ------
-    SimulationError
-        If the gap of a rheonomic unilateral constraint becomes negative.
+    A fixed-step method samples every step, another one the start and the end. SimulationError if the gap of a rheonomic
+    unilateral constraint becomes negative.
     """
     system, start, end, samples = problem.system, problem.start, problem.end, problem.samples
     began = time.perf_counter()

@@ -20,7 +20,7 @@ from gauss.dynamics.laws.switching_functions import constraint_watch
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import GaussError, SimulationError
 from gauss.simulation.brent import brent
-from gauss.simulation.motion_records import Event
+from gauss.simulation.motion_records import Event, joined_stats
 from gauss.simulation.prescribed import booked, of_impact
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
@@ -53,10 +53,7 @@ class ModeMotion(NamedTuple):
 def across_surfaces(problem: Problem, drive: Drive) -> Trajectory:
     """Motion of a problem, by ``drive`` from problem to trajectory; in one piece where no constraint jumps.
 
-    Raises
-    ------
-    SimulationError
-        If a position residual jumps where the motion crosses a surface, or the next mode drives the motion back.
+    SimulationError if a position residual jumps where the motion crosses a surface, or the next mode drives the motion back.
     """
     modes = constraint_modes(problem.system)
     if modes is None:
@@ -243,9 +240,6 @@ class _Pieces:
         def joined(of: Callable[[ModeMotion], np.ndarray]) -> np.ndarray:
             return np.concatenate([of(part)[int(repeated) :] for part, repeated in zip(parts, repeats, strict=True)])
 
-        stats = [part.motion.stats for part in parts]
-        sums = ("evaluations", "steps", "rejected", "factorisations", "wall_time", "rescued", "unseen")
-        total = last.stats._replace(**{name: sum(getattr(one, name) for one in stats) for name in sums})
         events = sorted(chain(self.events, *(part.motion.events for part in parts)), key=lambda event: event.t)
         return replace(
             last,
@@ -254,6 +248,6 @@ class _Pieces:
             q=joined(lambda part: part.motion.q),
             v=joined(lambda part: part.motion.v),
             work=joined(lambda part: part.motion.work + part.work),
-            stats=total,
+            stats=joined_stats([part.motion.stats for part in parts]),
             events=tuple(events),
         )

@@ -6,6 +6,7 @@ from gauss.arguments import named_arguments
 from gauss.dynamics.contact.friction_problem import FrictionProblem
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.errors import StateError, require
+from gauss.simulation.tolerances import check_tolerances
 from gauss.system import State, System
 
 
@@ -33,10 +34,13 @@ def friction_problem(system: System, state: State | None = None, *, step: float)
 
     Raises
     ------
+    SimulationError
+        If the step is no positive number.
     StateError
         If no contact is near, or set-valued elements are beside them: the form has no place for these.
     """
     require(system, (System,), "friction_problem")
+    check_tolerances(step=step)
     if system.scene.set_valued:
         names = ", ".join(map(repr, system.scene.set_valued))
         raise StateError(f"the contact problem has contacts only, and the scene has joint friction as well: {names}.")

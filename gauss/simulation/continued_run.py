@@ -8,7 +8,7 @@ from gauss.codegen.kernels import LoopStatus
 from gauss.errors import SimulationError
 from gauss.integrators import Point
 from gauss.simulation.compiled_run import CompiledRun
-from gauss.simulation.motion_records import Stats
+from gauss.simulation.motion_records import joined_stats
 from gauss.simulation.step_limits import unsolved
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
@@ -17,10 +17,7 @@ from gauss.system import State
 def continued(run: CompiledRun, fallback: Callable[[State, np.ndarray | None], Trajectory]) -> Trajectory:
     """Trajectory of a run, continued by ``fallback(start, samples)``.
 
-    Raises
-    ------
-    SimulationError
-        If the motion cannot continue; its ``trajectory`` holds the motion so far.
+    SimulationError if the motion cannot continue; its ``trajectory`` holds the motion so far.
     """
     first = run.trajectory()
     if run.control.status == LoopStatus.UNSOLVED:
@@ -48,21 +45,13 @@ def _joined(first: Trajectory, rest: Trajectory, begin: Point, repeated: bool) -
     """Concatenation of two trajectories, the second from a point on; it may repeat the last sample of the first."""
     skip = slice(1 if repeated else 0, None)
     t, q, v = (np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v"))
-    one, two = first.stats, rest.stats
-    method = two.method
+    last = rest.stats
+    method = last.method
     if len(rest):
-        method = f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion is too inaccurate there"
-    stats = Stats(
-        one.evaluations + two.evaluations,
-        one.steps + two.steps,
-        one.rejected + two.rejected,
-        one.factorisations + two.factorisations,
-        one.wall_time + two.wall_time,
-        two.worst_error,
-        method,
-        two.rescued,
-        unseen=one.unseen + two.unseen,
-        opaque=two.opaque,
+        method = f"{last.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion is too inaccurate there"
+    stats = joined_stats([first.stats, last])._replace(
+        worst_error=last.worst_error,  # that of the first part has been found out
+        method=method,
         handed_over=float(first.t[-1]) if len(first) else begin.state.t,
     )
     whole_work = np.concatenate([first.work, rest.work[skip] + begin.work])

@@ -66,7 +66,7 @@ def energy(trajectory: Trajectory) -> Energy:
     )
     of_states = _energy_of_states(trajectory)
     kinetic, potential = both.T
-    drives, loads, dissipated = trajectory.work.T
+    drives, loads, dissipated = trajectory.work.T.copy()  # the user may write to them
     return Energy(kinetic - of_states, potential, drives - (of_states - of_states[:1]), loads, dissipated)
 
 

@@ -21,7 +21,7 @@ from gauss.dynamics.store import cached_on_disk
 from gauss.errors import BalanceWarning, require, user_level
 from gauss.simulation.advice import advice
 from gauss.simulation.motion_records import EnergyRecord
-from gauss.simulation.trajectory import MANY, Trajectory
+from gauss.simulation.trajectory import LEAST_COMPILED_SAMPLES, Trajectory
 from gauss.system import State, System, coordinate_units, rate_units
 
 WRONG = 1e-3  # residual relative to the largest energy above which a motion is taken to be wrong
@@ -71,19 +71,9 @@ def imbalances() -> Iterator[list[Imbalance]]:
 
 
 def watch_balance(trajectory: Trajectory, start: State):
-    """Check the energy balance of a simulated motion.
+    """Check the energy balance of a simulated motion from its initial state, whether or not among the samples.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-        Motion with its settings.
-    start : State
-        Initial state, whether or not among the samples.
-
-    Warns
-    -----
-    BalanceWarning
-        With the residual, its time, and advice.
+    BalanceWarning with the residual, its time, and advice.
     """
     record, collected = trajectory.energies or energy_record(_some(trajectory, start, FEW_SAMPLES)), _COLLECTED.get()
     if collected is None and record.off <= WRONG * record.kinetic:  # the usual case, quickly
@@ -124,19 +114,21 @@ def warn_of_balance(trajectory: Trajectory):
         _warn(trajectory, found)
 
 
+def balance_in_words(trajectory: Trajectory) -> str:
+    """Residual of the energy balance of a motion, as its loop recorded it or by a few samples, in one line."""
+    if not len(trajectory):
+        return "energy balance: no samples"
+    record = trajectory.energies or energy_record(_some(trajectory, trajectory.state(0), FEW_SAMPLES))
+    if np.isnan(record.off):
+        return "energy balance: unknown"
+    return f"energy balance: off by {record.off:.3g} J, largest energy {record.scale:.3g} J"
+
+
 def shares(system: System, energies: EnergyRecord, starts: np.ndarray, samples: np.ndarray, duration: float) -> np.ndarray:
     """Imbalance (batch,) of a batch of motions relative to their largest energies; zero at rest.
 
-    Parameters
-    ----------
-    system : System
-        The system, or the first of systems that differ in numbers only.
-    energies : EnergyRecord
-        Energies (batch,).
-    starts, samples : ndarray, shape (n_q + n_v, batch), (batch, k, n_q + n_v)
-        Initial states, and states at samples.
-    duration : float
-        Duration of the motions [s].
+    Initial states are (n_q + n_v, batch), samples (batch, k, n_q + n_v); the system may be the first of several that differ
+    in numbers only.
     """
     scale = np.maximum(
         energies.scale, (ROUNDING_SHARE / WRONG) * np.maximum(energies.magnitude, RESTING * system.scale.energy)
@@ -150,23 +142,9 @@ def shares(system: System, energies: EnergyRecord, starts: np.ndarray, samples: 
 
 
 def warn_of_many(system: System, share: np.ndarray, name: Callable[[int], str], settings: dict):
-    """Warn of the motions of a batch whose imbalance exceeds the tolerance; the worst are named.
+    """Warn of the motions of a batch whose imbalances (batch,) by :func:`shares` exceed the tolerance; the worst are named.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    share : ndarray, shape (batch,)
-        Imbalances by :func:`shares`.
-    name : callable
-        Index of a motion → its name.
-    settings : dict
-        Integrator, step, rtol and atol.
-
-    Warns
-    -----
-    BalanceWarning
-        With the names of the worst, their imbalance, and advice.
+    BalanceWarning with their names by their indices, their imbalance, and advice by the settings.
     """
     stepped = settings["integrator"] == TIME_STEPPING
     wrong = np.flatnonzero(share > (FIRST_ORDER if stepped else WRONG))  # NaN: it failed
@@ -240,7 +218,7 @@ def _energies(trajectory: Trajectory) -> np.ndarray:
     if system.dynamics is not None:
         seen = system.dynamics.on_demand((_energies,), lambda: [0])
         seen[0] += len(trajectory)
-        if seen[0] >= MANY:
+        if seen[0] >= LEAST_COMPILED_SAMPLES:
             kernel = cached_on_disk(system, (_kernel,), lambda: _kernel(system))
             return kernel(np.concatenate([trajectory.t[None], trajectory.q.T, trajectory.v.T, work.T])).T
     states = (trajectory.state(k) for k in range(len(trajectory)))

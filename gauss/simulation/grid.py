@@ -1,4 +1,4 @@
-"""Time grid of a fixed-step method."""
+"""Ends of fixed steps: the time grid of a motion, and those of one call of a stepping object."""
 
 import numpy as np
 
@@ -10,20 +10,16 @@ from gauss.simulation.memory_limit import SHORTER, refuse_beyond_memory
 
 EQUAL_TIMES = 1e-9  # relative to the step: closer times are one
 STEP_NUMBERS = 4  # in memory for each step of a motion
+CALL_NUMBERS = 6  # the same of a call of a stepping object
+FEW_STEPS = 16  # of a call: so many times are written one by one in less time than as arrays
 SHORTEST_CONTACT_STEP = 1e-3  # relative to the step: the rounding of a gap over the step is a velocity error
 
 
 def grid(begin: float, end: float, step: float, samples, switching: Timetable = NO_TIMES) -> np.ndarray:
-    """Pairs (end of a step, :class:`gauss.codegen.kernels.Due` there), in order.
+    """Pairs (end of a step [s], :class:`gauss.codegen.kernels.Due` there), in order.
 
-    Parameters
-    ----------
-    begin, end, step : float
-        Interval and step [s]; the last step is shortened to meet the end.
-    samples : ndarray or None
-        Times to return [s]; the end of every step when None.
-    switching : Timetable
-        Switching times, just before and just after which a step ends.
+    The last step is shortened to meet the end. ``samples`` are times to return [s]; the end of every step when None. A step
+    ends just before and just after each switching time.
     """
     pairs = _even(begin, end, step, samples)
     if not switching.switches.size:
@@ -77,25 +73,10 @@ def _with_ends(pairs: np.ndarray, movable: np.ndarray, afters: list[float], begi
 
 
 def with_samples(pairs: np.ndarray, times: np.ndarray, step: float, rows: bool) -> tuple[np.ndarray, dict[int, int]]:
-    """Pairs with steps that end at the samples of a control law, too, and the sample that begins after so many pairs.
+    """Pairs (n, 2) with steps that end at samples of a control law, too; and number of pairs before a sample → its number.
 
-    Parameters
-    ----------
-    pairs : ndarray, shape (m, 2)
-        Pairs as of :func:`grid`.
-    times : ndarray, shape (k,)
-        Samples after the start [s], ascending.
-    step : float
-        Step [s].
-    rows : bool
-        Whether every end of a step is a row of the trajectory.
-
-    Returns
-    -------
-    pairs : ndarray, shape (n, 2)
-        Pairs; a step that nearly ends at a sample serves it.
-    begins : dict of int to int
-        Number of pairs before a sample → its number, the first of ``times`` being 1.
+    ``times`` (k,) are the samples after the start [s], ascending, numbered from 1; a step that nearly ends at one serves it.
+    ``rows``: whether every end of a step is a row of the trajectory.
     """
     equal = np.maximum(EQUAL_TIMES * step, 4.0 * APART * np.abs(times))
     ends = pairs[pairs[:, 1] != Due.OFF_GRID_SAMPLE, 0]
@@ -108,13 +89,7 @@ def with_samples(pairs: np.ndarray, times: np.ndarray, step: float, rows: bool) 
 
 
 def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
-    """Pairs of an equidistant grid.
-
-    Raises
-    ------
-    SimulationError
-        If they do not fit into memory.
-    """
+    """Pairs of an equidistant grid; SimulationError if they do not fit into memory."""
     steps = (end - begin) / step
     refuse_beyond_memory(STEP_NUMBERS * steps, f"step: {steps:.3g} steps of {step:.3g} s over {end - begin:.3g} s", SHORTER)
     count = max(1, int(np.ceil((end - begin) / step * (1 - EQUAL_TIMES))))
@@ -139,3 +114,30 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
         return pairs
     pairs = np.concatenate([pairs, np.column_stack([off_grid, np.full(off_grid.size, float(Due.OFF_GRID_SAMPLE))])])
     return pairs[np.argsort(pairs[:, 0], kind="stable")]
+
+
+class StepEnds:
+    """Ends of the steps of one call, of one length [s], in an array that machine code reads.
+
+    ``grid`` (room, 2): times [s], and :attr:`Due.UNCHECKED`, as steps are checked every few ones, not where a call ends;
+    ``times`` (room,): the times, a view.
+    """
+
+    def __init__(self, step: float):
+        self.step = step
+        self.make_room(1)
+
+    def make_room(self, n: int):
+        """Hold the ends of n steps; SimulationError if they do not fit into memory."""
+        refuse_beyond_memory(CALL_NUMBERS * n, f"n: the times of {n:.3g} steps", "give fewer steps a call")
+        self.grid = np.column_stack([np.zeros(n), np.full(n, float(Due.UNCHECKED))])
+        self.times, self._numbers = self.grid[:, 0], self.grid.data.cast("B").cast("d")
+
+    def write(self, begin: float, first: int, n: int):
+        """Write the ends of n steps of a motion that began at a time [s], from step ``first`` on."""
+        h, last = self.step, first + n
+        if n > FEW_STEPS:
+            self.times[:n] = begin + h * np.arange(first, last)
+        else:
+            for k in range(n):
+                self._numbers[2 * k] = begin + h * (first + k)

@@ -20,38 +20,20 @@ EQUAL_SAMPLES = 1e-9  # relative to the time from one sample to the next: closer
 
 
 class HeldInputs:
-    """Inputs of one motion.
+    """Inputs of one motion, from a start to an end [s], of a system whose scene has inputs.
 
-    Parameters
-    ----------
-    system : System
-        System whose scene has inputs.
-    control : callable or array_like, shape (k, n_u)
-        Law (t, q, v) → values (n_u,) of the inputs in the order of the scene, called once for each sample; or a table of
-        them, one row for each sample.
-    rate : float
-        Samples in a second [Hz]; the first is at the start.
-    start, end : float
-        Interval of the motion [s].
-
-    Attributes
-    ----------
-    times : ndarray, shape (k,)
-        Samples [s].
-    values : list of ndarray
-        Values of the inputs at the samples so far, (n_u,) each.
-
-    Raises
-    ------
-    SimulationError
-        If the scene has no inputs, or an argument is invalid.
+    ``control`` is a law (t, q, v) → values (n_u,) of the inputs in the order of the scene, called once for each sample, or a
+    table (k, n_u) of them. ``times`` (k,) are the samples [s], ``rate`` of them in a second [Hz], the first at the start;
+    ``values`` those of the inputs so far, (n_u,) each. SimulationError if the scene has no inputs, or an argument is
+    invalid.
     """
 
     def __init__(self, system: System, control, rate: float | None, start: float, end: float):
         self.system, self.names = system, tuple(system.scene.inputs)
         if not self.names:
             raise SimulationError(f"control: scene {system.scene.name!r} has no inputs; declare some with scene.input.")
-        if not isinstance(rate, int | float) or not 0.0 < rate <= LARGEST_FLOAT:
+        rate = rate.item() if isinstance(rate, np.number) else rate
+        if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate <= LARGEST_FLOAT:
             raise SimulationError(f"rate: expected a positive number of samples in a second [Hz], got {rate!r}.")
         asked = (end - start) * rate
         refuse_beyond_memory(SAMPLE_NUMBERS * asked, f"rate: {rate:.3g} Hz are {asked:.2g} samples that", SHORTER)
@@ -76,10 +58,7 @@ class HeldInputs:
     def at(self, k: int, t: Scalar, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Values (n_u,) of sample k; the law is called on the first request.
 
-        Raises
-        ------
-        SimulationError
-            If the law raises an exception, or does not return a finite number for each input.
+        SimulationError if the law raises an exception, or does not return a finite number for each input.
         """
         if k == len(self.values):
             try:
@@ -102,13 +81,7 @@ class HeldInputs:
 
 
 class RecordedInput:
-    """Piecewise constant law of time.
-
-    Parameters
-    ----------
-    times, values : ndarray, shape (k,)
-        Times [s] from which each value holds; the first holds before, too.
-    """
+    """Piecewise constant law of time: each value holds from its time (k,) [s] on, the first one before, too."""
 
     def __init__(self, times: np.ndarray, values: np.ndarray):
         self.times, self.values = times, values
@@ -127,10 +100,7 @@ def driven_as(system: System, laws: dict[str, Callable]) -> System:
 def checked_inputs(value, names: tuple[str, ...], t: Scalar) -> np.ndarray:
     """Values (n_u,) of inputs as a control law returned them, or as they were given to a step.
 
-    Raises
-    ------
-    SimulationError
-        If they are not a finite number for each input.
+    SimulationError if they are not a finite number for each input.
     """
     if type(value) is np.ndarray and value.dtype is FLOAT and value.shape == (len(names),):
         if isfinite(sum(value.tolist())):
@@ -155,13 +125,7 @@ def numbers_in_words(numbers: np.ndarray | None) -> str:
 
 
 def _called(law: Callable) -> Callable:
-    """Law (t, q, v).
-
-    Raises
-    ------
-    SimulationError
-        If it cannot be called with three arguments.
-    """
+    """Law (t, q, v); SimulationError if it cannot be called with three arguments."""
     try:
         inspect.signature(law).bind(0.0, (), ())
     except TypeError:

@@ -9,25 +9,17 @@ from gauss.codegen import Scalar
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.simulation.held_inputs import EQUAL_SAMPLES, HeldInputs, driven_as
+from gauss.simulation.motion_records import joined_stats
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
 
 def held_motion(problem: Problem, drive: Callable[[Problem], Trajectory]) -> Trajectory:
-    """Motion whose inputs are drives of constant effort from one sample to the next.
+    """Motion whose inputs are drives of constant effort from one sample to the next; it may begin between two samples.
 
-    Parameters
-    ----------
-    problem : Problem
-        Initial value problem with held inputs; it may begin between two samples.
-    drive : callable
-        Initial value problem without held inputs → its trajectory.
-
-    Raises
-    ------
-    SimulationError
-        If the motion cannot continue; its ``trajectory`` holds the motion so far.
+    ``drive``: problem without held inputs → trajectory. SimulationError if the motion cannot continue; its ``trajectory``
+    holds the motion so far.
     """
     held, state = problem.held, problem.start
     pieces: list[Trajectory] = []
@@ -77,10 +69,7 @@ def _asked(piece: Trajectory, samples: np.ndarray | None, later: bool) -> Trajec
 
 def _joined(pieces: list[Trajectory]) -> Trajectory:
     """Concatenation of pieces."""
-    stats, last = [piece.stats for piece in pieces], pieces[-1]
-    sums = ("evaluations", "steps", "rejected", "factorisations", "wall_time", "rescued", "unseen")
-    whole = last.stats._replace(**{name: sum(getattr(one, name) for one in stats) for name in sums})
-    whole = whole._replace(worst_error=max(one.worst_error for one in stats))
+    whole = joined_stats([piece.stats for piece in pieces])
     t, q, v, work = (np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("t", "q", "v", "work"))
     events = tuple(event for piece in pieces for event in piece.events)
-    return replace(last, stats=whole, events=events, energies=None, t=t, q=q, v=v, work=work)
+    return replace(pieces[-1], stats=whole, events=events, energies=None, t=t, q=q, v=v, work=work)

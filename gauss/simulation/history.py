@@ -20,13 +20,7 @@ COMPARED_SAMPLES = 5  # of a motion, at which a law is called with both states
 
 
 class History:
-    """State of the opaque laws of a system before a motion.
-
-    Parameters
-    ----------
-    laws : Laws
-        Loads of the system.
-    """
+    """State of the opaque laws of a system before a motion."""
 
     def __init__(self, laws: Laws):
         own = [(str(getattr(bound.load, "name", "")), law) for bound in laws.called for law in bound.laws]
@@ -35,10 +29,8 @@ class History:
     def refuse_random(self, system: System, start: State):
         """Refuse random laws in adaptive steps: no step is short enough for their error.
 
-        Raises
-        ------
-        SimulationError
-            If a law has other values in a second call with the same state of the mechanism and of its own; with its name.
+        SimulationError if a law has other values in a second call with the same state of the mechanism and of its own; with
+        its name.
         """
         motion = Kinematics(system, start)
         for name, law, before in self.kept:
@@ -50,13 +42,7 @@ class History:
                 )
 
     def warn(self, trajectory: Trajectory):
-        """Warn of laws whose values depend on what calls during the motion have changed.
-
-        Warns
-        -----
-        SwitchingWarning
-            With the names of the loads, and a remedy.
-        """
+        """Warn of laws whose values depend on what calls during the motion have changed, by the names of their loads."""
         names = dict.fromkeys(name for name, law, before in self.kept if _depends(law, before, trajectory))
         if names:
             warnings.warn(

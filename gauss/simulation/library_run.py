@@ -61,19 +61,8 @@ def certified_rates(system: System, engine: Engine) -> Callable:
 def library_run(problem: Problem, derivative: Callable, project_state: Callable[[State], State]) -> Trajectory:
     """Trajectory by an integrator of another library; the returned states are projected onto the constraints.
 
-    Parameters
-    ----------
-    problem : Problem
-        Initial value problem, whose method is a :class:`gauss.integrators.Library`.
-    derivative : callable
-        (t, y) → y'.
-    project_state : callable
-        Projection onto the constraints.
-
-    Raises
-    ------
-    SimulationError
-        If the library fails, or its accelerations at the end are not those of the certified recursion.
+    ``derivative``: (t, y) → y'. SimulationError if the library fails, or its accelerations at the end are not those of the
+    certified recursion.
     """
     began, system, method, samples = time.perf_counter(), problem.system, problem.method, problem.samples
     start, end, switching, n_q, n_v = problem.start, problem.end, problem.switching, system.n_q, system.n_v
@@ -117,14 +106,7 @@ def library_run(problem: Problem, derivative: Callable, project_state: Callable[
 def _with_doubts(stats: Stats, problem: Problem, asked: np.ndarray) -> Stats:
     """Stats that say where laws of the state may switch undetected: libraries locate no such event.
 
-    Parameters
-    ----------
-    stats : Stats
-        Those of the motion.
-    problem : Problem
-        Its problem.
-    asked : ndarray
-        Times at which opaque laws of the state were called, ascending, from the start to the end [s].
+    ``asked``: times at which opaque laws of the state were called, ascending, from the start to the end [s].
     """
     switching = problem.switching
     if switching.watch is not None:

@@ -12,21 +12,9 @@ SHORTER = "continue a longer motion with state=motion.state(-1)"  # a remedy
 
 
 def refuse_beyond_memory(numbers: float, what: str, remedy: str):
-    """Refuse results that need more memory than the machine has.
+    """SimulationError if results, a number of doubles, need more memory than the machine has.
 
-    Parameters
-    ----------
-    numbers : float
-        Number of doubles.
-    what : str
-        What they are, with the argument that asks for them.
-    remedy : str
-        What to do.
-
-    Raises
-    ------
-    SimulationError
-        With the memory asked for and that of the machine.
+    ``what`` says what they are, with the argument that asks for them.
     """
     asked, there = NUMBER_BYTES * min(numbers, MOST_NUMBERS), machine_memory()
     if asked > there:

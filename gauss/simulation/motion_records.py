@@ -1,5 +1,6 @@
 """What is recorded of a motion besides its samples: statistics, events, energies."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -69,6 +70,8 @@ class Stats(NamedTuple):
         Time from which the fallback of the plan continued [s]; None if it was not needed.
     sleep : SleepRecord or None
         Which bodies slept, of a motion with ``sleeping=``.
+    law_error : float or None
+        Largest residual of the laws of contact and friction in time stepping, relative; None of other motions.
     """
 
     evaluations: int
@@ -85,12 +88,24 @@ class Stats(NamedTuple):
     plan: Plan | None = None
     handed_over: float | None = None
     sleep: SleepRecord | None = None
+    law_error: float | None = None
 
     def __repr__(self):
         rejected = f" and {self.rejected} rejected" if self.rejected else ""
         plan = "" if self.plan is None else f", {self.plan.driver}, {self.plan.dynamics} dynamics"
         sleep = "" if self.sleep is None else f", {self.sleep}"
-        return f"Stats({self.steps} steps{rejected}, {self.evaluations} evaluations, {self.wall_time:.3g} s{plan}{sleep})"
+        laws = "" if self.law_error is None else f", laws of contact met to {self.law_error:.0e}"
+        cost = f"{self.steps} steps{rejected}, {self.evaluations} evaluations, {self.wall_time:.3g} s"
+        return f"Stats({cost}{plan}{laws}{sleep})"
+
+
+SUMMED = "evaluations", "steps", "rejected", "factorisations", "wall_time", "rescued", "unseen"
+
+
+def joined_stats(parts: Sequence[Stats]) -> Stats:
+    """Statistics of a motion in parts: sums of counts and times, the worst error, and the rest as of the last part."""
+    sums = {name: sum(getattr(part, name) for part in parts) for name in SUMMED}
+    return parts[-1]._replace(**sums, worst_error=max(part.worst_error for part in parts))
 
 
 @dataclass(frozen=True)

@@ -14,19 +14,7 @@ HEAD = ("coordinate", "start", "end", "least", "greatest", "")
 
 
 def html_table(system: System, t: np.ndarray, q: np.ndarray, title: str) -> str:
-    """Table of a motion.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    t : ndarray, shape (k,)
-        Times [s].
-    q : ndarray, shape (k, n_q)
-        Coordinates.
-    title : str
-        Text above the table.
-    """
+    """Table of a motion, of times (k,) [s] and coordinates (k, n_q), below a title."""
     units = list(coordinate_units(system).items()) if len(t) else []
     least = {"m": NOISE * system.scale.length}
     rows = [

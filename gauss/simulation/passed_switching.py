@@ -28,25 +28,9 @@ RESOLVING_STEPS = 2.0  # steps that a feature of a law of time must last
 
 
 def smooth_timetable(system: System, laws: Laws, start: State, end: float, remedy: str = CONTINUOUS) -> Timetable:
-    """Switching times and mesh of laws of time, for steps without impacts.
+    """Switching times and mesh of laws of time up to an end [s], for steps without impacts.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    laws : Laws
-        Its loads.
-    start : State
-        State at the start.
-    end : float
-        End of the steps [s].
-    remedy : str, optional
-        What to do about a jump.
-
-    Raises
-    ------
-    SimulationError
-        If a prescribed position or velocity jumps.
+    SimulationError, with a remedy, if a prescribed position or velocity jumps.
     """
     times, jumps = timed_switching(system, laws, start, end)
     if jumps:
@@ -73,30 +57,11 @@ def examine_steps(
     method: FixedStep | None = None,
     warned_of: set[str] | None = None,
 ):
-    """Refuse or warn of switching of laws of time in fixed steps that pass over it; parameters of :func:`smooth_timetable`.
+    """Refuse or warn of switching of laws of time in fixed steps from a start to an end [s] that pass over it.
 
-    Parameters
-    ----------
-    system, laws, start, end
-        See :func:`smooth_timetable`; a step begins at the start.
-    step : float
-        Step [s].
-    remedy : str
-        What to do about it.
-    method : FixedStep, optional
-        Method of the steps; an explicit Runge–Kutta method when not given.
-    warned_of : set of str, optional
-        What was warned of before, and is not again; what is warned of here is added.
-
-    Warns
-    -----
-    SwitchingWarning
-        With the scene and the time of the first feature that is shorter than steps resolve, or of the first jump.
-
-    Raises
-    ------
-    SimulationError
-        If a prescribed position or velocity jumps.
+    Without a method they are steps of an explicit Runge–Kutta method. SimulationError if a prescribed position or velocity
+    jumps. SwitchingWarning with the scene and the time of the first feature that is shorter than steps resolve, or of the
+    first jump; what is in ``warned_of`` is not warned of again, what is warned of is added.
     """
     name, times = system.scene.name, smooth_timetable(system, laws, start, end, remedy)
     said = set() if warned_of is None else warned_of
@@ -135,21 +100,7 @@ def _ends_of_steps(times: np.ndarray, begin: float, step: float) -> np.ndarray:
 class StepsAhead:
     """Time ahead of a stepping object in which switching has been looked for; a feature and a jump are warned of once.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    laws : Laws
-        Its loads.
-    step : float
-        Step [s].
-    method : FixedStep
-        Method of the steps.
-
-    Raises
-    ------
-    SimulationError
-        If a constraint jumps at a condition on the state.
+    SimulationError if a constraint jumps at a condition on the state.
     """
 
     def __init__(self, system: System, laws: Laws, step: float, method: FixedStep):

@@ -169,13 +169,7 @@ class PreparedMotion:
 
 
 def _put(room: Any, given):
-    """Write numbers to memory.
-
-    Raises
-    ------
-    ValueError
-        If they are none, or of another shape.
-    """
+    """Write numbers to memory; ValueError if they are none, or of another shape."""
     try:
         room[:] = given if type(given) is np.ndarray else real_numbers(given)
     except (TypeError, ValueError):  # of another type, or where doubles do not begin

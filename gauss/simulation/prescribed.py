@@ -24,19 +24,7 @@ class AfterJump(NamedTuple):
 
 
 def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> AfterJump | None:
-    """Impact of a motion at a switching time; None if no prescribed velocity jumps there.
-
-    Parameters
-    ----------
-    jumps : Jumps
-        Possible jumps of prescribed velocities.
-    state : State
-        State just before.
-    work : ndarray
-        Quadratures up to then [J].
-    after : float
-        Time just after it [s].
-    """
+    """Impact of a motion at a switching time, up to just after it [s]; None if no prescribed velocity jumps there."""
     found = jumps.crossed(state, after)
     if found is None:
         return None
@@ -60,18 +48,8 @@ def of_impact(t: float, names, happened: Impact) -> Event:
 def beside_jumps(switching: Switching, start: State, end: float, samples, made: Callable) -> Trajectory:
     """Motion whose laws jump at its start, at its end or at samples; samples at a jump are those just after it.
 
-    Parameters
-    ----------
-    switching : Switching
-        With the possible jumps of prescribed velocities.
-    start : State
-        Initial state.
-    end : float
-        Final time [s]; where a law switches there, steps end just before it.
-    samples : ndarray or None
-        Times to return [s].
-    made : callable
-        (start, end, samples) → trajectory, without samples at a jump.
+    ``made``: (start, end, samples) → trajectory, without samples at a jump. Where a law switches at the end [s], steps end
+    just before it.
     """
     last = switching.times.last_end(start.t, end)
     if not switching.jumps and last == end:

@@ -7,18 +7,10 @@ SLOW = 1.0  # a bar appears on runs longer than this [s]
 
 
 class Progress:
-    """Progress bar that appears on slow runs, in a terminal.
+    """Progress bar that appears on slow runs, in a terminal, where it may.
 
-    Parameters
-    ----------
-    total : float
-        Total: duration [s], unless something else is counted.
-    shown : bool
-        Whether a bar may appear.
-    counted : str
-        Unit of the total.
-    began : float, optional
-        When the run began, by :func:`time.perf_counter`; now when not given.
+    The total is a duration [s], unless something else is counted; the run began at a time of :func:`time.perf_counter`, now
+    when not given.
     """
 
     def __init__(self, total: float, shown: bool, counted: str = "s simulated", began: float | None = None):

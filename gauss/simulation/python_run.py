@@ -56,26 +56,10 @@ SLIDING_PROGRESS = 1e-3  # relative to the duration, per PROGRESS_TRIALS, below 
 
 
 class PythonRun:
-    """One motion, stepped in Python.
+    """One motion, stepped in Python with the accelerations of an engine.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    method : Integrator
-        Integrator.
-    solver : Engine
-        Engine: source of accelerations.
-    tolerance : Tolerance
-        Of an adaptive method.
-    step : float or None
-        Step of a fixed-step method, largest step of an adaptive one [s].
-    end : float
-        Final time [s].
-    projects : bool
-        Whether states are projected onto the constraints after each step.
-    switching : Switching
-        Switching times and functions, and jumps of prescribed velocities.
+    ``step`` [s] is that of a fixed-step method, the largest one of an adaptive method. ``projects``: whether states are
+    projected onto the constraints after each step.
     """
 
     def __init__(

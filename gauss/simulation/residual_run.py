@@ -18,13 +18,7 @@ MULTIPLIER_TOLERANCE = 1e10  # absolute: multipliers have no error control
 
 
 class ResidualEquations:
-    """Residual F of one system as machine code.
-
-    Raises
-    ------
-    SimulationError
-        If a constraint binds velocities only.
-    """
+    """Residual F of one system as machine code; SimulationError if a constraint binds velocities only."""
 
     def __init__(self, program: Program):
         self.mechanics, self.system = MomentumForm(program), program.system

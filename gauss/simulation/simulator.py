@@ -7,6 +7,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
+from sys import maxsize
 from typing import Any, NoReturn
 
 import numpy as np
@@ -18,6 +19,7 @@ from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
 from gauss.dynamics.plan import plan_of
+from gauss.dynamics.projection import within_limits
 from gauss.dynamics.rigid_loops import refuse_other_pose
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, require
@@ -26,12 +28,12 @@ from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, random_changes
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.drivers import fixed_run
+from gauss.simulation.grid import StepEnds
 from gauss.simulation.held_inputs import FLOAT, HeldInputs, checked_inputs
 from gauss.simulation.integrators import usual_fixed_step
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.pair_kernel_steps import PairKernelSteps
 from gauss.simulation.simulator_state import SimulatorState
-from gauss.simulation.step_ends import StepEnds
 from gauss.simulation.step_limits import steps_per_check
 from gauss.simulation.step_watch import StepWatch
 from gauss.simulation.tolerances import check_tolerances, checked_count
@@ -185,7 +187,7 @@ class Simulator:
         if seed is not None:
             change = random_changes(seed, spread, (2, self.system.n_v))
             start = State(start.t, retract(self.system, start.q, change[0]), start.v + change[1])
-            start = run.separated(self.system.projected(start))
+            start = run.separated(self.system.projected(within_limits(self.system, start)))
         refuse_other_pose(self.system, start.q)
         self._u[:] = 0.0
         run.inputs = self._u
@@ -221,7 +223,7 @@ class Simulator:
             If a value is not finite, a prescribed motion jumps, or a step fails; the message says why. After a failed step
             the state is one before it.
         """
-        if type(n) is not int or n < 1:
+        if type(n) is not int or not 0 < n <= maxsize:
             n = checked_count("n", n)
         if u is not None:
             self._set(u)

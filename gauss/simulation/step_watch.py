@@ -13,32 +13,10 @@ from gauss.system import State, System
 
 
 class StepWatch:
-    """Looks at the motion of a stepping object, and warns.
+    """Looks at the motion of a stepping object, its first step here, and warns.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    laws : Laws
-        Its loads.
-    start : State
-        State at the start, whose first step is looked at here.
-    step : float
-        Step [s].
-    method : FixedStep
-        Method of the steps.
-
-    Attributes
-    ----------
-    seen : float
-        Steps of the motion in which switching of laws of time has been looked for.
-    has_pairs : bool
-        Whether shapes could pass through each other.
-
-    Raises
-    ------
-    SimulationError
-        If a constraint jumps, by time or at a condition on the state.
+    ``seen``: steps of the motion in which switching of laws of time has been looked for; ``has_pairs``: whether shapes could
+    pass through each other. SimulationError if a constraint jumps, by time or at a condition on the state.
     """
 
     def __init__(self, system: System, laws: Laws, start: State, step: float, method: FixedStep):

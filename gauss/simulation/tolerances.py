@@ -18,25 +18,14 @@ SCALARS = (float, int)  # exact types that need no array to be checked
 
 
 def tolerance(system: System, rtol: float, atol) -> Tolerance:
-    """Tolerance of a system.
+    """Tolerance of a system, of ``atol`` as for :func:`gauss.simulate`.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    rtol : float
-        Relative to the coordinate or rate.
-    atol : float, pair or mapping
-        As for :func:`gauss.simulate`.
-
-    Raises
-    ------
-    SimulationError
-        If there is no such joint, or a number is not positive.
+    SimulationError if there is no such joint, or a number is not positive.
     """
     if atol is None:
         make = lambda: _default(system, rtol)  # noqa: E731
-        return make() if system.dynamics is None else system.dynamics.on_demand((_default, rtol), make)
+        key = _default, rtol, system.scale.length, system.scale.time
+        return make() if system.dynamics is None else system.dynamics.on_demand(key, make)
     if not isinstance(atol, Mapping):
         return Tolerance(rtol, *_pair(atol, "atol"))
     own = _units(system)
@@ -80,14 +69,9 @@ def check_tolerances(**numbers):
 
 
 def step_count(duration, step, what: str) -> int:
-    """Return the number of equal steps of a duration [s], for the function ``what``.
+    """Number of equal steps of a duration [s], for the function ``what``.
 
-    Raises
-    ------
-    SimulationError
-        If either is not a positive number.
-    ArgumentError
-        If the duration is no whole number of steps.
+    SimulationError if either is not a positive number; ArgumentError if the duration is no whole number of steps.
     """
     check_tolerances(duration=duration, step=step)
     count = round(duration / step)
@@ -118,13 +102,7 @@ def _is_positive(value) -> bool:
 
 
 def checked_count(name: str, value) -> int:
-    """A positive whole number.
-
-    Raises
-    ------
-    SimulationError
-        If it is none.
-    """
-    if not isinstance(value, Integral) or not 1 <= int(value) <= sys.maxsize:
+    """A positive whole number; SimulationError if it is none."""
+    if not isinstance(value, Integral) or isinstance(value, bool) or not 1 <= int(value) <= sys.maxsize:
         raise SimulationError(f"{name}: expected a positive whole number, got {value!r:.80}.")
     return int(value)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from importlib import import_module
-from numbers import Integral
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,7 @@ from gauss.system import State, System
 
 LOOKED_AT = 20  # samples of a recorded motion whose loops are looked at: noise is in all of them
 RECORDED_RESIDUAL = 1e-6  # of loop constraints, relative to their scales: above that of any integrator
-MANY = 300  # samples above which machine code is compiled: numpy takes about as long for so many
+LEAST_COMPILED_SAMPLES = 300  # samples above which machine code is compiled: numpy takes about as long for so many
 
 
 @dataclass(frozen=True)
@@ -149,6 +148,11 @@ class Trajectory:
         span = f"{self.t[0]:.6g} … {self.t[-1]:.6g} s" if len(self) else "empty"
         return f"Trajectory({self.system.scene.name!r}, {len(self)} samples, {span})"
 
+    def __str__(self):
+        from gauss.simulation.energy_balance import balance_in_words  # which is about trajectories
+
+        return f"{self!r}\n{self.stats!r}\n{balance_in_words(self)}"
+
     def _repr_html_(self) -> str:
         from gauss.simulation.notebook import html_table  # notebooks alone need it
 
@@ -196,7 +200,7 @@ class Trajectory:
         StateError
             If there is no such sample.
         """
-        if not isinstance(index, Integral) or not -len(self) <= index < len(self):
+        if not is_index(index, len(self)):
             raise StateError(f"state: expected the index of a sample, from {-len(self)} to {len(self) - 1}, got {index!r}.")
         return State(float(self.t[index]), self.q[index], self.v[index])
 
@@ -245,7 +249,7 @@ class Trajectory:
         function : callable
             Takes a :class:`Kinematics`, returns a vector of numbers, or of expressions if it is traced.
         """
-        if len(self) < MANY:
+        if len(self) < LEAST_COMPILED_SAMPLES:
             return np.array([function(motion) for motion in self.motions], dtype=float)
         system = self.system
 
@@ -269,7 +273,7 @@ class Trajectory:
             If the scene has no such output.
         """
         outputs = self.system.scene.outputs
-        if name not in outputs:
+        if not isinstance(name, str) or name not in outputs:
             raise StateError(f"no output {name!r}. {did_you_mean(name, outputs)}")
         output = outputs[name]
         if output.kind in FORCES:
@@ -296,6 +300,11 @@ class Trajectory:
         return columns[:, 0] if columns.shape[1] == 1 else columns
 
 
+def is_index(value, count: int) -> bool:
+    """Whether a value is the index of one of several things, from the last one where it is negative; no truth value is."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and bool(-count <= value < count)
+
+
 def spline_rates(system: System, t: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Rates (k, n_v) of a cubic spline through coordinates (k, n_q); of a quaternion ω = 2 Q̄ ∘ Q̇, of either sign."""
     from scipy.interpolate import make_interp_spline  # a slow import
@@ -320,10 +329,7 @@ def spline_rates(system: System, t: np.ndarray, q: np.ndarray) -> np.ndarray:
 def _recorded_samples(system: System, t, q) -> tuple[np.ndarray, np.ndarray]:
     """Times (k,) and coordinates (k, n_q) of the user, checked but for their size and units.
 
-    Raises
-    ------
-    StateError
-        If they are no numbers, do not fit, or times do not increase.
+    StateError if they are no numbers, do not fit, or times do not increase.
     """
     times, samples = real_numbers(t), real_numbers(q)
     if times is None or samples is None:

@@ -32,17 +32,10 @@ def defect_times(begin: float, h: float) -> np.ndarray:
 
 
 def defect_is_large(samples: Iterable[Sample], h: float, allowed: np.ndarray) -> bool:
-    """Whether the defect of v' at a place in a step exceeds :data:`LARGEST_DEFECT` times the tolerance.
+    """Whether the defect of v' at a place in a step of length h [s] exceeds LARGEST_DEFECT times the tolerance (n_v,).
 
-    Parameters
-    ----------
-    samples : iterable of tuple
-        For each place, the :func:`defect_times` there, the rates of the dense output at these, and the accelerations at the
-        middle one by the equations of motion; later places are not asked for after a large defect.
-    h : float
-        Length of the step [s].
-    allowed : ndarray, shape (n_v,)
-        Tolerance of the rates.
+    Samples give, for each place, the :func:`defect_times` there, the rates of the dense output at these, and the
+    accelerations at the middle one by the equations of motion; later places are not asked for after a large defect.
     """
     for (before, _, after), (v, _, v_after), accelerations in samples:
         if (h * np.abs((v_after - v) / (after - before) - accelerations) > LARGEST_DEFECT * allowed).any():
@@ -51,13 +44,7 @@ def defect_is_large(samples: Iterable[Sample], h: float, allowed: np.ndarray) ->
 
 
 def warn_of_switching(trajectory: Trajectory, method: Integrator):
-    """Warn where a law may have switched between two evaluations.
-
-    Warns
-    -----
-    SwitchingWarning
-        With the scene, the number of steps, and a remedy.
-    """
+    """Warn where a law may have switched between two evaluations, with the number of steps and a remedy."""
     stats, name = trajectory.stats, trajectory.system.scene.name
     if stats.unseen and isinstance(method, Library):
         text = f"integrator {method.name!r} does not locate switching events of loads whose laws depend on the state"
@@ -69,13 +56,7 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator):
 
 
 def warn_of_undetected(scene: str, where: str):
-    """Warn of laws that may have switched undetected within fixed steps.
-
-    Parameters
-    ----------
-    scene, where : str
-        Name of the scene, and the steps.
-    """
+    """Warn of laws that may have switched undetected within fixed steps of a scene, ``where`` in words."""
     remedy = "shorten the step, or use 'dop853'"
     warnings.warn(
         f"{scene!r}: {where} a law may have switched, peaked or oscillated undetected; {remedy}.",
@@ -85,40 +66,20 @@ def warn_of_undetected(scene: str, where: str):
 
 
 def warn_of_opaque(scene: str, laws: str, option: str):
-    """Warn of opaque laws that were evaluated at few points.
-
-    Parameters
-    ----------
-    scene, laws : str
-        Names of the scene, and of the loads with opaque laws.
-    option : str
-        Option that limits the step.
-    """
+    """Warn of opaque laws, by the names of their loads, that were evaluated at few points; the option limits the step."""
     text = f"the law of {laws} cannot be traced and was evaluated at few points of the motion"
     remedy = f"a short pulse may be missed: give breaks=[...] [s] or {option} [s], or write it with gauss.math"
     warnings.warn(f"{scene!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=user_level())
 
 
 def warn_of_times(system: System, times: Timetable):
-    """Warn of features of laws of time that steps do not resolve.
-
-    Warns
-    -----
-    SwitchingWarning
-        With the scene, and the number of features.
-    """
+    """Warn of features of laws of time that steps do not resolve."""
     for text in times.limitations:
         warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
 
 
 def warn_of_passages(system: System, unseen: np.ndarray, method: str):
-    """Warn where motions of a fixed-step batch (batch,) may hold undetected switching events.
-
-    Warns
-    -----
-    SwitchingWarning
-        With the numbers of the motions.
-    """
+    """Warn of the motions of a fixed-step batch (batch,) that may hold undetected switching events."""
     which = np.flatnonzero(unseen > 0.0)
     if which.size:
         warn_of_undetected(system.scene.name, f"in motions {listed(which)}, within a step of {method!r},")

@@ -21,17 +21,9 @@ def verified(motion: Trajectory, problem: Problem, again: Callable[..., Trajecto
     """Motion with an estimate of its global error in its statistics.
 
     A fixed step is halved, and the order of the method gives the error. Other methods repeat the motion with a hundredth of
-    the tolerances and steps that end at other times and are at most half as long; the difference is the error. It is no
-    less than accumulated rounding, and infinite where the repetition fails.
-
-    Parameters
-    ----------
-    motion : Trajectory
-        Motion.
-    problem : Problem
-        Its initial value problem, with integrator, step and local error.
-    again : callable
-        (step, tolerance, times, mesh) → repetition, with steps that end at the times of the mesh.
+    the tolerances and steps that end at other times and are at most half as long; the difference is the error. It is no less
+    than accumulated rounding, and infinite where the repetition fails. ``again``: (step, tolerance, times, mesh) →
+    repetition, with steps that end at the times of the mesh.
     """
     method, step, tolerance = problem.method, problem.step, problem.tolerance
     times, rows = np.unique(motion.t, return_index=True)

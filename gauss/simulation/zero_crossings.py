@@ -6,7 +6,7 @@ from numbers import Real
 import numpy as np
 
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.errors import GaussError, SimulationError
+from gauss.errors import GaussError, SimulationError, require
 from gauss.simulation.brent import brent
 from gauss.simulation.simulate import simulate
 from gauss.simulation.tolerances import shares_of_scale
@@ -38,21 +38,23 @@ def crossings(trajectory: Trajectory, function: Callable[[Kinematics], float], *
 
     Raises
     ------
+    ArgumentError
+        If the first argument is no trajectory.
     SimulationError
         If ``direction`` is none of these, or the function raises or gives no finite number.
     """
-    if direction not in (-1, 0, 1):
+    require(trajectory, (Trajectory,), "crossings")
+    if not isinstance(direction, int | np.integer) or direction not in (-1, 0, 1):
         raise SimulationError(f"direction: expected -1, 0 or 1, got {direction!r}.")
     system = trajectory.system
     values = np.array([_value(function, motion) for motion in trajectory.motions])
     found = []
     for k in range(len(trajectory) - 1):
         before, after = values[k], values[k + 1]
+        if direction and direction * (after - before) <= 0.0:
+            continue
         if before == 0.0 and k == 0:
             found.append(trajectory.state(0))
-        rises = after > before
-        if direction and rises != (direction > 0):
-            continue
         if after == 0.0:
             found.append(trajectory.state(k + 1))
         elif before * after < 0.0:

@@ -1,6 +1,5 @@
 from gauss.system.build import build
-from gauss.system.contact_gaps import guards, sides
-from gauss.system.contact_mode import FREE, ContactMode, phase_scene
+from gauss.system.contact_mode import FREE, ContactMode, guards, phase_scene, sides
 from gauss.system.coordinate_names import coordinate_units, rate_units
 from gauss.system.frozen_functions import refuse_changed
 from gauss.system.manifold import (
@@ -19,12 +18,11 @@ from gauss.system.manifold import (
     turned,
     velocity_lead,
 )
-from gauss.system.named_access import View
 from gauss.system.passes import Stage
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.relations import Relations
 from gauss.system.scale import Scale
-from gauss.system.state import State
+from gauss.system.state import State, View
 from gauss.system.subsystem import Subsystem, whole
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
 

@@ -9,7 +9,7 @@ from gauss.errors import SceneError
 from gauss.scene import GROUND, Drive, Force, Joint, OneSidedConstraint, Scene, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
-from gauss.system.contact_gaps import sides
+from gauss.system.contact_mode import sides
 from gauss.system.frozen_functions import written_laws
 from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.relations import place_relations
@@ -114,11 +114,9 @@ def _frames(scene: Scene, index) -> dict[str, PlacedFrame]:
 
 
 def _bind(load) -> BoundLoad:
-    if isinstance(load, Drive):
+    if isinstance(load, Drive | Slipping):
         return BoundLoad(load, (as_function(load.effort),))
-    if isinstance(load, Force):
-        return BoundLoad(load, (as_function(load.force), as_function(load.moment)))
-    return BoundLoad(load, (as_function(load.effort),)) if isinstance(load, Slipping) else BoundLoad(load)
+    return BoundLoad(load, (as_function(load.force), as_function(load.moment)) if isinstance(load, Force) else ())
 
 
 def _check_inertia(system: System):
@@ -158,10 +156,7 @@ def spanning_tree(scene: Scene) -> list[tuple[str, str, str]]:
 
     Joints are taken in the order in which the scene names them: of the joints of a loop the last one is cut.
 
-    Raises
-    ------
-    SceneError
-        If no chain of joints leads from the ground to some body.
+    SceneError if no chain of joints leads from the ground to some body.
     """
     reached, edges = {GROUND}, []
     waiting = sorted(scene.joints.values(), key=lambda joint: joint.child_frame is not None)  # these close loops

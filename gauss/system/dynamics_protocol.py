@@ -52,6 +52,9 @@ class Dynamics(Protocol):
     def candidate_pairs(self, system: "System"):
         """Pairs of shapes that a step of time stepping looks at: numbers of parts and pairs, and whether by a grid."""
 
+    def time_step(self, system: "System"):
+        """Plan of time stepping, and what a step takes at the start; an error with the reason where there is none."""
+
     def sleepers(self, system: "System"):
         """Bodies that may sleep in time stepping, and those that never do; where none may, the error with the reason."""
 

@@ -60,10 +60,7 @@ def central(scene: Scene, body: str) -> Pose:
 def joint_frames(scene: Scene, joint: Joint) -> tuple[Pose, Pose]:
     """Joint frame in the principal central frames of its parent and its child.
 
-    Raises
-    ------
-    SceneError
-        If the joint point is given on both bodies and the two do not meet at the reference configuration.
+    SceneError if the joint point is given on both bodies and the two do not meet at the reference configuration.
     """
     given = (joint.axes(), np.array(joint.at))
     parent, child = invert(central(scene, joint.parent)), invert(central(scene, joint.child))

@@ -43,7 +43,7 @@ def _fields(kind: type) -> tuple[str, ...]:
 def _text(system, relation) -> str:
     view = Symbols(system, Graph())
     try:
-        residuals = np.ravel(np.array([*relation.positions(view), *relation.velocities(view), None], dtype=object))[:-1]
+        residuals = np.ravel(np.concatenate(view.residuals(relation)))
     except Exception as error:  # a function that has changed may fail in any way
         return f"{type(error).__name__}: {error}"
     return Function("law", [], list(residuals)).text()

@@ -5,10 +5,13 @@ is multiplied by exp(θ) from the right. Any Runge–Kutta method in θ keeps it
 (Munthe-Kaas 1999; Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.8).
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from gauss import rotations
 from gauss.shapes import Shaped
+from gauss.system.scale import turning
 from gauss.system.system import System
 
 
@@ -39,9 +42,8 @@ def displacement(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
         return moved - q
     found = theta.copy()
     for joint in system.joints:
-        plain = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
-        here = slice(joint.q.start, joint.q.start + plain)
-        found[joint.v.start : joint.v.start + plain] = moved[here] - q[here]
+        here = slice(joint.q.start, joint.q.start + joint.n_plain)
+        found[joint.v][: joint.n_plain] = moved[here] - q[here]
     return found
 
 
@@ -51,12 +53,10 @@ def rounded(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
     About a quaternion Q it is what Q ∘ (exp(θ) − 1), a small sum with few roundings, has more than the numbers moved by.
     """
     lost = theta - displacement(system, q, moved, theta)
-    for joint in system.joints:
-        k = joint.pair.quaternion
-        if k is not None:
-            place, (here, there) = slice(joint.v.start + k, joint.v.stop), (x[joint.q][k:] for x in (q, moved))
-            more = rotations.multiply(here, rotations.exponential_lead(theta[place])) - (there - here)
-            lost[place] = 2.0 * rotations.multiply(rotations.conjugate(there), more)[1:]
+    for own, place in _quaternions(system):
+        here, there = q[own], moved[own]
+        more = rotations.multiply(here, rotations.exponential_lead(theta[place])) - (there - here)
+        lost[place] = 2.0 * rotations.multiply(rotations.conjugate(there), more)[1:]
     return lost
 
 
@@ -96,22 +96,25 @@ def _turned(system: System, q, vector, which) -> Shaped[np.ndarray, " nv"]:
     if system.is_flat:
         return vector
     found = vector.copy()
-    for joint in system.joints:
-        k = joint.pair.quaternion
-        if k is not None:
-            place = slice(joint.v.start + k, joint.v.stop)
-            found[place] = rotations.rotate(which(q[joint.q][k:]), vector[place])
+    for own, place in _quaternions(system):
+        found[place] = rotations.rotate(which(q[own]), vector[place])
     return found
 
 
 def _about_quaternions(system: System, theta, vector, function) -> Shaped[np.ndarray, " nv"]:
     """Function of the parts of two vectors (n_v,) that belong to quaternions; zero along plain coordinates."""
     found = np.zeros_like(vector)
+    for _, place in _quaternions(system):
+        found[place] = function(theta[place], vector[place])
+    return found
+
+
+def _quaternions(system: System) -> Iterator[tuple[slice, slice]]:
+    """Places of each quaternion in q, and of the angular velocity that belongs to it in v."""
     for joint in system.joints:
         if joint.pair.quaternion is not None:
-            place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
-            found[place] = function(theta[place], vector[place])
-    return found
+            k = joint.pair.quaternion
+            yield slice(joint.q.start + k, joint.q.stop), slice(joint.v.start + k, joint.v.stop)
 
 
 def along_rates(
@@ -146,10 +149,8 @@ def chart_velocity(
     if system.is_flat:
         return rate
     v = rate.copy()
-    for joint in system.joints:
-        if joint.pair.quaternion is not None:
-            place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
-            v[place] = rotations.rotation_vector_velocity(theta[place], rate[place])
+    for _, place in _quaternions(system):
+        v[place] = rotations.rotation_vector_velocity(theta[place], rate[place])
     return v
 
 
@@ -159,9 +160,7 @@ def sizes(system: System, q: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " 
         return np.abs(q)
     size = np.ones(system.n_v).astype(q.dtype)
     for joint in system.joints:
-        k = joint.pair.quaternion
-        plain = joint.pair.n_v if k is None else k
-        size[joint.v.start : joint.v.start + plain] = np.abs(q[joint.q.start : joint.q.start + plain])
+        size[joint.v][: joint.n_plain] = np.abs(q[joint.q][: joint.n_plain])
     return size
 
 
@@ -179,10 +178,6 @@ def random_state(system: System, rng: "np.random.Generator", spread: float = np.
     speed : float
         Standard deviation of the rates [rad/s, m/s].
     """
-    theta = rng.uniform(-1.0, 1.0, system.n_v)
-    for joint in system.joints:
-        E_omega, _ = joint.pair.subspace(np.array(joint.pair.reference))
-        turns = np.abs(E_omega).sum(axis=0) > 0
-        theta[joint.v] *= np.where(turns, spread, slide)
+    theta = rng.uniform(-1.0, 1.0, system.n_v) * np.where(turning(system), spread, slide)
     q = retract(system, system.reference.q, theta)
     return system.state(q, speed * rng.standard_normal(system.n_v))

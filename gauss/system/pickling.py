@@ -16,10 +16,7 @@ FUNCTIONS_BY_VALUE = ("copy", "cloudpickle", "dill")  # modules that take functi
 def rebuilding(system) -> tuple:
     """Reduction of a system for pickle: to its scene; machine code and computed properties are not pickled.
 
-    Raises
-    ------
-    UnpicklableError
-        If its scene has been changed since, or holds a law that pickle cannot take.
+    UnpicklableError if its scene has been changed since, or holds a law that pickle cannot take.
     """
     build = import_module("gauss.system.build").build  # which makes systems
     check_laws(system.scene)
@@ -41,10 +38,7 @@ def _made_of(system):
 def check_laws(scene):
     """Refuse laws that pickle cannot take, by their names.
 
-    Raises
-    ------
-    UnpicklableError
-        If there is one, and the caller takes functions by their names only.
+    UnpicklableError if there is one, and the caller takes functions by their names only.
     """
     if _takes_functions():
         return

@@ -17,44 +17,31 @@ from gauss.codegen import Function, Graph, Kernel, as_number, forward, from_disk
 from gauss.codegen.expression import reachable
 from gauss.errors import GaussError, SceneError, SimulationError
 from gauss.scene.values import is_scalar
-from gauss.system.named_access import View
-from gauss.system.symbolic_mechanism import Symbols
+from gauss.system.state import View
+from gauss.system.symbolic_mechanism import Symbols, symbols_of
 
 
 class Rows(NamedTuple):
-    """Rows of one relation.
+    """Rows of one relation."""
 
-    Attributes
-    ----------
-    A : tuple of ndarray, shape (m, 6)
-        Blocks of its bodies.
-    B : tuple of ndarray, shape (m, k)
-        Blocks of its joints.
-    C, D, gap : ndarray, shape (m,)
-        Right-hand sides, and position residuals; 0 for velocity rows.
-    """
-
-    A: tuple
-    B: tuple
-    C: np.ndarray
+    A: tuple  # (m, 6) block of each body
+    B: tuple  # (m, k) block of each joint
+    C: np.ndarray  # C, D (m,): right-hand sides
     D: np.ndarray
-    gap: np.ndarray
+    gap: np.ndarray  # (m,) position residuals; 0 for velocity rows
 
 
 @dataclass(frozen=True)
 class PlacedRelation:
-    """A relation: bodies, joints, its number of rows, that of nonholonomic ones, and whether C may differ from zero.
+    """A relation on a system."""
 
-    The last entry tells whether its residuals depend on time.
-    """
-
-    name: str
-    bodies: tuple[int, ...]
+    name: str  # its name
+    bodies: tuple[int, ...]  # bodies, joints: those that its rows depend on
     joints: tuple[int, ...]
-    size: int
-    velocities: int
-    moves: bool
-    is_timed: bool
+    size: int  # number of rows
+    velocities: int  # number of nonholonomic ones, the last
+    moves: bool  # whether C may differ from zero
+    is_timed: bool  # whether its residuals depend on time
 
 
 @dataclass(frozen=True)
@@ -139,17 +126,9 @@ NO_RELATIONS = Relations((), None, (), ())
 def place_relations(system, relations) -> Relations:
     """Relations of a scene on its system.
 
-    Parameters
-    ----------
-    system : System
-        Bodies, frames and joints.
-    relations : iterable of Relation
-        The relations, of any scene on it.
+    ``relations``: the relations, of any scene on it.
 
-    Raises
-    ------
-    SceneError
-        If a residual cannot be traced, or binds nothing.
+    SceneError if a residual cannot be traced, or binds nothing.
     """
     graph, placed, outputs = Graph(), list[PlacedRelation](), list[object]()
     bodies: dict[int, tuple] = {}
@@ -175,9 +154,7 @@ def place_residuals(system, relations) -> Relations:
 
 def bound_relations(graph: Graph, placed, bodies: dict, joints: dict, outputs) -> Relations:
     """Relations of placed rows over the symbols of bodies and joints of one graph."""
-    inputs = [symbol for parts in bodies.values() for part in parts for symbol in np.ravel(part)]
-    inputs += [symbol for parts in joints.values() for part in parts for symbol in part]
-    inputs.append(graph.symbol("t"))
+    inputs = symbols_of(bodies, joints, graph.symbol("t"))
     return Relations(tuple(placed), Function("relations", inputs, outputs), tuple(bodies), tuple(joints))
 
 
@@ -220,14 +197,10 @@ def _moves(rate: np.ndarray, velocities) -> bool:
 def _traced_residuals(relation, view: Symbols) -> tuple[np.ndarray, np.ndarray]:
     """Position and velocity residuals of a relation as expressions.
 
-    Raises
-    ------
-    SceneError
-        If its function cannot be traced, or returns something else than numbers.
+    SceneError if its function cannot be traced, or returns something else than numbers.
     """
     try:
-        c = np.array([*relation.positions(view), None], dtype=object)[:-1]
-        g = np.array([*relation.velocities(view), None], dtype=object)[:-1]
+        c, g = view.residuals(relation)
     except GaussError as error:
         if repr(relation.name) in str(error):
             raise

@@ -81,16 +81,11 @@ class Scale:
 
 
 def scale_of(system) -> Scale:
-    """Scale of a system.
-
-    Parameters
-    ----------
-    system : System
-        With its scene.
-    """
+    """Scale of a system."""
     turns = turning(system)
     length = _length(system, turns)
     coordinates = np.where(turns, 1.0, length)
+    coordinates.flags.writeable = False  # kept with the system, and shown to the user
     mass = _mass(system, length)
     return Scale(length, _time(system, length, mass, coordinates), mass, coordinates)
 

@@ -15,27 +15,27 @@ import numpy as np
 from gauss.backends.structure import GROUND, Edge
 from gauss.errors import StateError
 from gauss.scene import Coupling
-from gauss.system.elimination_cost import joints_shared_in_kernels, loop_elimination_work, shared_joints
+from gauss.system import elimination_cost
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
 from gauss.versions import FormerAttribute
 
 
 class Train(NamedTuple):
-    """Gear train, joints with one coordinate: q of each is its ratio times that of the first, plus its offset."""
+    """Gear train: joints with one coordinate."""
 
-    joints: tuple[int, ...]
-    ratios: tuple[float, ...]
-    offsets: tuple[float, ...]
+    joints: tuple[int, ...]  # indices of the joints, the first one leading
+    ratios: tuple[float, ...]  # q of each is its ratio times that of the first,
+    offsets: tuple[float, ...]  # plus its offset
 
 
 @dataclass(frozen=True)
 class BoundRelation:
-    """A relation in a subsystem: its index in the system, its bodies there, names of its joints, number of rows."""
+    """A relation in a subsystem."""
 
-    index: int
-    bodies: tuple[int, ...]
-    joints: tuple[str, ...]
-    size: int
+    index: int  # its index in the system
+    bodies: tuple[int, ...]  # its bodies there
+    joints: tuple[str, ...]  # names of its joints
+    size: int  # number of rows
 
 
 @dataclass(frozen=True)
@@ -124,20 +124,9 @@ class Subsystem:
         others = len(self.couplings) + sum(relation.size for relation in self.relations)
         return loops + others - sum(i in self.loop_joints for i, _ in self.redundant)
 
-    @cached_property
-    def loop_elimination_work(self) -> int:
-        """Operations that eliminating the loop constraints takes, roughly."""
-        return loop_elimination_work(self)
-
-    @cached_property
-    def shared_joints(self) -> int:
-        """Pairs of loops that share a joint of the tree, summed over the joints."""
-        return shared_joints(self)
-
-    @cached_property
-    def joints_shared_in_kernels(self) -> int:
-        """The same where kernels eliminate loops that stand on each other one after the other."""
-        return joints_shared_in_kernels(self)
+    loop_elimination_work = cached_property(elimination_cost.loop_elimination_work)
+    shared_joints = cached_property(elimination_cost.shared_joints)
+    joints_shared_in_kernels = cached_property(elimination_cost.joints_shared_in_kernels)
 
     def has(self, name: str) -> bool:
         """Whether it has a joint of this name."""
@@ -204,13 +193,8 @@ def kept_joints(subsystem: Subsystem, joints) -> Subsystem:
 def spanning_tree(joints, preference=None) -> tuple[Edge, ...]:
     """Edges from the ground to every body, inner bodies first.
 
-    Parameters
-    ----------
-    joints : sequence of PlacedJoint
-        Joints.
-    preference : callable, optional
-        Joints of the least value are taken first; among equals those whose outer body turns with the fewest joints, then
-        those near the ground. Without it, joints are taken in their order.
+    ``preference``: joints of the least value are taken first; among equals those whose outer body turns with the fewest
+    joints, then those near the ground. Without it, joints are taken in their order.
     """
     at: dict[int, list[int]] = {}
     for index, joint in enumerate(joints):

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.codegen import Graph
 from gauss.rotations import skew
-from gauss.system.named_access import View
+from gauss.system.state import View
 
 
 class Symbols(View):
@@ -58,10 +58,22 @@ class Symbols(View):
             rates += list(self.system.joints[index].pair.coordinate_rate(q, v))
         return moving, rates
 
+    def residuals(self, relation) -> tuple[np.ndarray, np.ndarray]:
+        """Position and velocity residuals of a relation as expressions."""
+        found = relation.positions(self), relation.velocities(self)
+        c, g = (np.array([*part, None], dtype=object)[:-1] for part in found)  # numbers beside expressions stay as they are
+        return c, g
+
     def velocities(self) -> list:
         """Symbols of all velocities."""
         parts = [part for _, _, W, u in self.bodies.values() for part in (W, u)]
         return [symbol for part in (*parts, *(v for _, v in self.joints.values())) for symbol in part]
+
+
+def symbols_of(bodies: dict, joints: dict, clock) -> list:
+    """Symbols of bodies and joints of a view, and the time."""
+    found = [symbol for parts in bodies.values() for part in parts for symbol in np.ravel(part)]
+    return [*found, *(symbol for parts in joints.values() for part in parts for symbol in part), clock]
 
 
 class _OfBodies:

@@ -11,20 +11,19 @@ from math import isfinite
 
 import numpy as np
 
-from gauss.arguments import real_numbers
+from gauss.arguments import name_list, real_numbers
 from gauss.backends.structure import Structure
 from gauss.codegen import IS_CONTENT, Scalar
 from gauss.errors import StateError, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
-from gauss.system.contact_gaps import sides, slips
+from gauss.system.contact_mode import sides, slips
 from gauss.system.dynamics_protocol import Dynamics
 from gauss.system.explain import explain
 from gauss.system.frozen_functions import refuse_changed
-from gauss.system.named_places import NamedPlaces
 from gauss.system.passes import Stage, reduction
 from gauss.system.pickling import rebuilding
-from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.placed_elements import BoundLoad, NamedPlaces, PlacedFrame, PlacedJoint
 from gauss.system.relations import NO_RELATIONS, Relations, place_relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
@@ -256,7 +255,7 @@ class System(NamedPlaces, StateFunctions):
             Guess of the coordinates and rates; the start of the scene when neither is given.
         t : float
             Time [s].
-        keep : sequence of str, optional
+        keep : str or sequence of str, optional
             Joints, or single rates such as "U.angle1", whose coordinates and rates must not change.
         least_violation : bool
             With inconsistent constraints, return the state of least residual instead of an error.
@@ -278,7 +277,7 @@ class System(NamedPlaces, StateFunctions):
         if not given and t == 0.0 and keep is None and not least_violation:
             return self.mechanics.scene_start(self)
         state = self.state(q, v, t) if given else self.start(t)
-        kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
+        kept = (() if given else tuple(self.scene.starts)) if keep is None else name_list(keep, "initial_state: keep")
         return self.mechanics.consistent(self, state, kept, keep is not None, least_violation, given)
 
     def projected(self, state: State) -> State:

@@ -10,7 +10,7 @@ from gauss.system import coordinate_units, rate_units
 from gauss.view.style import FLAT_CHANGE, INK, check_format, curves, keep_flat, legend, looks, saved, unit_sizes
 
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
-MANY = 8  # names that fit into a title
+MOST_NAMES_IN_TITLE = 8  # names that fit into a title
 BELOW_ZERO = 0.04  # of the height of an axis: a line at zero does not lie on its edge
 WHOLE = 2 * np.pi  # turn
 LEAST_ARM = 1e-6  # m: moments that a force has about this arm are drawn as none
@@ -186,7 +186,8 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
     legend(force)
     undrawn = [name for name, (_, loose) in both.items() if loose]
     if undrawn:
-        force.set_title(f"unique components only, in {', '.join(undrawn[:MANY])}{' …' if len(undrawn) > MANY else ''}")
+        more = " …" if len(undrawn) > MOST_NAMES_IN_TITLE else ""
+        force.set_title(f"unique components only, in {', '.join(undrawn[:MOST_NAMES_IN_TITLE])}{more}")
     return _finished(figure, trajectory, [moment], path)
 
 

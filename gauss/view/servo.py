@@ -4,7 +4,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gauss.servo import Tracking, energy
-from gauss.servo.effort_units import effort_units
 from gauss.view.plots import scalar_coordinates
 from gauss.view.style import NAMED, check_format, curves, saved
 
@@ -38,7 +37,7 @@ def plot_tracking(tracking: Tracking, path=None):
     curves(coordinates, motion.t, scalar_coordinates(motion), "coordinate [rad, m]")
     curves(rates, motion.t, dict(zip(motion.system.coordinates, motion.v.T, strict=True)), "rate [rad/s, m/s]")
     efforts = dict(zip(servo.efforts, tracking.efforts.T, strict=True))
-    curves(forces, motion.t, efforts, f"servo effort [{', '.join(dict.fromkeys(effort_units(tracking.servo)))}]")
+    curves(forces, motion.t, efforts, f"servo effort [{', '.join(dict.fromkeys(tracking.servo.effort_units))}]")
     done = energy(tracking)
     stored = {"kinetic and potential energy": done.kinetic + done.potential - done.kinetic[0] - done.potential[0]}
     curves(work, motion.t, {f"work of {name}": part for name, part in efforts_of(tracking).items()} | stored, "energy [J]")

@@ -7,11 +7,11 @@ import pytest
 
 from gauss.codegen import trace, write
 from gauss.codegen.batch_code import batch_code
-from gauss.codegen.blocks import SHORTEST, STATES, has_blocks
+from gauss.codegen.emit import SHORTEST_IN_BLOCKS, STATES_PER_BLOCK, has_blocks
 from gauss.codegen.python_wrapper import Interface
 from tests.codegen.test_outlined_pieces import formula
 
-COUNTS = [1, 3, 8, STATES - 1, STATES, STATES + 1, 3 * STATES, 3 * STATES + 13]
+COUNTS = [1, 3, 8, *(STATES_PER_BLOCK + k for k in (-1, 0, 1)), 3 * STATES_PER_BLOCK, 3 * STATES_PER_BLOCK + 13]
 SEED, LENGTH = 5, 250  # of a random function long enough for blocks; its first output is an input, its last a constant
 
 
@@ -43,5 +43,5 @@ def test_rows_in_blocks_are_those_of_single_states(count, shortest, monkeypatch)
 
 def test_short_functions_and_those_with_functions_within_have_no_blocks():
     inner = write(formula(SEED, LENGTH), 2)
-    assert has_blocks(inner) and not has_blocks(write(formula(SEED, SHORTEST // 20), 2))
+    assert has_blocks(inner) and not has_blocks(write(formula(SEED, SHORTEST_IN_BLOCKS // 20), 2))
     assert not has_blocks(write(lambda x: inner(*x), 2))

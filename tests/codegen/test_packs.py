@@ -9,7 +9,7 @@ from gauss import math
 from gauss.codegen import Kernel, schedule, write
 from gauss.codegen import packed_function as packed_function_module
 from gauss.codegen.packed_function import PackedFunction
-from gauss.codegen.packs import Packs
+from gauss.codegen.superword import Packs
 
 pytestmark = pytest.mark.slow
 

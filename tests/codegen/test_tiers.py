@@ -29,7 +29,7 @@ def place(tmp_path, monkeypatch):
     """Empty cache; modules of any length are compiled quickly first, in units of one function."""
     monkeypatch.setenv("GAUSS_CACHE", str(tmp_path / "cache"))
     monkeypatch.delenv(tiers.VARIABLE, raising=False)
-    monkeypatch.setattr(machine, "SHORT", 0)
+    monkeypatch.setattr(machine, "SHORTEST_WHOLE", 0)
     monkeypatch.setattr(object_code, "UNIT_LENGTH", 1)
     monkeypatch.setattr(optimiser, "REST", 0.0)
     yield tmp_path / "cache"

@@ -1,6 +1,7 @@
 """Traced functions against numpy, CasADi and 40 digits; derivatives; machine code kept on disk."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import casadi
 import mpmath as mp
@@ -15,6 +16,7 @@ from gauss.codegen import (
     Function,
     Graph,
     Kernel,
+    branches,
     count,
     forward,
     jacobian,
@@ -295,6 +297,25 @@ def test_numbers_of_expressions_are_those_that_substitution_folds_to(a, b):
     folded = substitute(outputs, symbols, [a, b])
     known = [one.value if isinstance(one, Expression) else one for one in folded]
     np.testing.assert_array_equal(numbers_of(outputs, symbols)([a, b]), known)
+
+
+def test_an_if_of_another_thread_is_not_one_of_this():
+    """Scenes with laws that have an `if` may be compiled in several threads at once."""
+
+    def decided(x, others=()):
+        for other in others:
+            other()
+        return 1.0 if x < 0.0 else 2.0
+
+    with ThreadPoolExecutor(1) as pool:
+        beside = Graph().symbol("beside")
+        own = lambda: pool.submit(branches, lambda: decided(beside)).result()  # noqa: E731
+        untraced = lambda: pool.submit(bool, beside).exception()  # noqa: E731
+        found = []
+        x = Graph().symbol("x")
+        joined = branches(lambda: decided(x, (lambda: found.append(untraced()), own)))
+    assert all(isinstance(error, TypeError) for error in found) and len(found) == 2
+    assert [numbers_of([joined], [x])([value])[0] for value in (-1.0, 1.0)] == [1.0, 2.0]
 
 
 def test_calls_have_no_numbers():

@@ -9,9 +9,8 @@ from gauss.codegen import machine, write
 from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.linking import linked
-from gauss.codegen.object_code import optimised_objects, quick_objects
+from gauss.codegen.object_code import CONVENTION, LEAST_MULTIPLY_ADDS, optimised_objects, quick_objects, selected_whole
 from gauss.codegen.tiers import OPTIMISED, QUICK
-from gauss.codegen.whole_selection import CONVENTION, LEAST_MULTIPLY_ADDS, selected_whole
 
 
 def horner(degree: int, name: str):

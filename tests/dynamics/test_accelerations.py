@@ -121,7 +121,7 @@ def test_opaque_laws_are_called_beside_machine_code(what):
     system = gauss.compile_scene(scene)
     (state,), (load,) = mechanisms.consistent_states(system, 1)
     assert off(system.accelerations(state, load), certified(system, state, load)) <= ROUNDING
-    with pytest.raises(SimulationError, match="cannot be compiled: .*; use system.accelerations"):
+    with pytest.raises(SimulationError, match="system.accelerations"):
         _ = system.forward_dynamics
 
 
@@ -162,7 +162,7 @@ def test_quaternions_are_made_unit_or_refused():
     q = np.array([0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0])
     nearly = np.concatenate([q[:3], (1.0 + 4e-7) * q[3:]])
     assert off(f(nearly, v, none), f(q, v, none)) <= ROUNDING
-    with pytest.raises(StateError, match=r"quaternion \(w, x, y, z\) of joint .* has length 2, not 1"):
+    with pytest.raises(StateError, match="quaternion .* of joint"):
         f(np.concatenate([q[:3], 2.0 * q[3:]]), v, none)
 
 
@@ -171,7 +171,7 @@ def test_wrong_input_is_refused():
     scene.drive("J1", torque=lambda t: np.inf if t > 1 else 0.0)
     system = gauss.compile_scene(scene)
     state = system.state([0.1, 0.2])
-    with pytest.raises(StateError, match=r"load: expected 2 finite numbers \(J1, J2\), got shape \(3,\)"):
+    with pytest.raises(StateError, match=r"load: .*J1, J2.*\(3,\)"):
         system.accelerations(state, np.zeros(3))
     with pytest.raises(StateError, match="load: expected 2 finite numbers"):
         system.accelerations(state, [0.0, np.nan])

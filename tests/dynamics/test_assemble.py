@@ -9,8 +9,9 @@ import gauss
 from gauss import math
 from gauss.backends.columns import from_blocks
 from gauss.dynamics.assemble import closure_rates
-from gauss.dynamics.compiled_assembly import Assembler
+from gauss.dynamics.engines.certified import Assembler
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
 from gauss.scene import PAIRS
 from gauss.system import State, random_state, retract
 from tests.support import mechanisms
@@ -175,10 +176,14 @@ def test_machine_code_assembles_the_same_compulsion(name):
     for _ in range(3):
         state = State(rng.uniform(), start.q, start.v + rng.standard_normal(system.n_v))  # off the constraints in velocity
         load = rng.standard_normal(system.n_v)
-        expected, found = gauss.assemble(system, state, load), assembler(state, load)
+        expected, (found, power) = gauss.assemble(system, state, load), assembler(state, load)
         for part in ("A", "B", "C", "D", "P", "impressed", "constraint_residual"):
             one, two = (np.asarray(getattr(compulsion, part)) for compulsion in (expected, found))
             assert np.abs(one - two).max(initial=0.0) <= 1e-13 * max(1.0, np.abs(one).max(initial=0.0)), part
+        at_rest = assembler(State(state.t, state.q, np.zeros(system.n_v)))[1]
+        applied = Applied(kinematics(system, state))
+        assert np.allclose(power, applied.power, rtol=1e-12, atol=1e-12)
+        assert not at_rest.any()  # each call returns its own
 
 
 def test_sparse_matrices_of_blocks_add_what_lies_in_one_place():

@@ -50,7 +50,7 @@ def test_paths_end_near_the_guess(seed):
 @pytest.mark.slow
 def test_what_no_pose_closes_is_refused_with_its_residual():
     system = gauss.compile_scene(closed_chain(distance=9.0))
-    with pytest.raises(AssemblyError, match="'held'.*other starts.*does not reach") as refused:
+    with pytest.raises(AssemblyError, match="'held'.*starts") as refused:
         system.initial_state()
     missing = np.linalg.norm([9.0, 0.3, 0.2]) - sum(REACH)
     off = position_residual_of(system, refused.value.state)

@@ -9,7 +9,7 @@ import gauss
 from gauss.dynamics.assemble import position_residual
 from gauss.dynamics.initial_states import RESIDUAL_THRESHOLD
 from gauss.dynamics.kinematics import kinematics
-from gauss.errors import AssemblyError, InconsistentConstraintsWarning, SceneError, StateError
+from gauss.errors import ArgumentError, AssemblyError, InconsistentConstraintsWarning, SceneError, StateError
 from gauss.system import random_state
 from tests.support import mechanisms
 
@@ -85,6 +85,14 @@ def test_what_is_kept_keeps_its_value(angle):
     state = system.initial_state([angle, 0, 0, 0], [3.0, 0, 0, 0], keep=["A"])
     assert _gap(system, state) <= MET_RESIDUAL
     assert state.q[0] == pytest.approx(angle, abs=1e-12) and state.v[0] == pytest.approx(3.0, abs=1e-12)
+
+
+def test_one_joint_that_is_kept_is_named_by_a_text():
+    system = gauss.compile_scene(mechanisms.four_bar(twice=True))
+    named, listed = (system.initial_state(keep=keep) for keep in ("again", ["again"]))
+    assert np.array_equal(named.q, listed.q) and np.array_equal(named.v, listed.v)
+    with pytest.raises(ArgumentError, match="keep"):
+        system.initial_state(keep=3)
 
 
 @pytest.mark.slow

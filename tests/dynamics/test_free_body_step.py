@@ -57,7 +57,8 @@ def test_machine_code_and_python_take_the_same_steps(system):
         by_python = stepper.python_step(state, STEP)
         forces = stepper.known
         stepper.known = known
-        loop = stepper.run(state, np.zeros(3), np.array([state.t + STEP]), rows)
+        begin = np.concatenate([[state.t], state.q, state.v, np.zeros(3)])
+        loop = stepper.steps_from(begin, np.array([state.t + STEP]), rows)
         if loop.steps:
             finished += 1
             q, v, work = np.split(rows[0, 1:], [system.n_q, system.n_q + system.n_v])
@@ -107,7 +108,8 @@ def test_islands_are_problems_of_their_own(count, apart, islands):
     rows = np.empty((ends.size, 4 + system.n_q + system.n_v))
     first = stepper.python_step(system.initial_state(), STEP)  # machine code leaves the first contact of a kind to Python
     state = gauss.State(STEP, first.q, first.v)
-    done = stepper.run(state, np.zeros(3), ends[1:], rows).steps
+    begin = np.concatenate([[state.t], state.q, state.v, np.zeros(3)])
+    done = stepper.steps_from(begin, ends[1:], rows).steps
     assert done == ends.size - 1
     assert stepper.memory.islands == islands
     if apart < 1.0:

@@ -10,7 +10,7 @@ from gauss.codegen import machine
 from gauss.codegen.kernels import BlockContactLaws, BlockContactSolver, ContactGraph, Round
 from gauss.codegen.kernels.block_contacts import write_block_contacts
 from gauss.codegen.kernels.block_lu import write_order
-from gauss.dynamics.contact.block_contact_laws import FINE, LEAST_CONTACTS, REDUNDANT_ROUNDS
+from gauss.dynamics.contact.compiled_free_body_step import FINE, LEAST_CONTACTS, REDUNDANT_ROUNDS
 from gauss.dynamics.contact.contact_step import contact_solver
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 

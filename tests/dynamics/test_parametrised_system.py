@@ -8,8 +8,7 @@ import pytest
 import gauss
 from gauss.codegen import Graph, write
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.parameters import numbers, with_numbers
-from gauss.dynamics.parametrised_system import parametrised
+from gauss.dynamics.parameters import numbers, parametrised, with_numbers
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
@@ -117,6 +116,15 @@ def sticking(limit=1.0):
 )
 def test_systems_that_differ_in_more_than_numbers_are_of_two_kinds(one, other):
     assert numbers(gauss.compile_scene(one()))[1] != numbers(gauss.compile_scene(other()))[1]
+
+
+def test_a_law_may_name_what_is_not_bound_yet():
+    scene = arm()
+    scene.drive("A", torque=lambda t: 1.0 if t < 5.0 else later)
+    first, second = (numbers(gauss.compile_scene(scene)) for _ in range(2))
+    assert first[1] == second[1] and np.array_equal(first[0], second[0])
+    later = 2.0
+    assert numbers(gauss.compile_scene(scene))[1] != first[1]
 
 
 def test_parameters_of_functions_that_are_called_become_inputs_of_their_callers():

@@ -7,7 +7,7 @@ import pytest
 
 import gauss
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.laws.recorded_time import reads_time
+from gauss.dynamics.laws.recorded_time import reads_first, reads_time
 from gauss.dynamics.laws.sampled_laws import sampled_times
 
 SAME_TIME = 1e-9  # s, of a jump that is located by bisection
@@ -54,6 +54,7 @@ def motion():
 def test_reading_the_time_is_recorded(motion, name):
     law, expected = LAWS[name]
     assert reads_time(law, motion) == expected
+    assert reads_first(law, motion.state.t, motion) == expected[0]
 
 
 @pytest.mark.slow

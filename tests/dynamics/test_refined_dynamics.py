@@ -14,7 +14,7 @@ from gauss.dynamics.assemble import assemble
 from gauss.dynamics.engines import refined, tiering
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.sparse_qr import QR
+from gauss.dynamics.refined_dynamics import QR
 from gauss.dynamics.traced_system import Program
 from gauss.system import random_state
 from tests.support import mechanisms
@@ -206,3 +206,16 @@ def test_a_motion_goes_on_where_simple_machine_code_is_not_trusted(monkeypatch):
     assert run["auto"].stats.plan.fallback == "refined" and run["auto"].stats.handed_over is not None
     assert np.abs(run["auto"].q[-1] - run["recursion"].q[-1]).max() <= 1e-10
     assert run["auto"].stats.worst_error <= TOLERANCE
+
+
+def test_a_second_tier_that_another_thread_made_is_taken(monkeypatch):
+    tiered = tiering.TieredFunction(lambda x: x, lambda: lambda x: 2.0 * x, 1)
+    own = tiered.threshold.passed
+
+    def passed():
+        monkeypatch.setattr(tiered.threshold, "passed", own)
+        tiered(1.0)  # another thread, between the look at the threshold and the making
+        return own()
+
+    monkeypatch.setattr(tiered.threshold, "passed", passed)
+    assert tiered(3.0) == 6.0 and tiered.make is None

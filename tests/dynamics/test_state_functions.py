@@ -268,7 +268,7 @@ def test_derivatives_of_inverse_dynamics_undo_those_of_the_accelerations():
 def test_coordinates_that_determine_nothing_are_refused():
     system = gauss.compile_scene(gauss.load("slider_crank"))
     start = system.initial_state()
-    with pytest.raises(StateError, match="guide do not determine the other rates in this state"):  # at the dead centre
+    with pytest.raises(StateError, match="null_space: guide"):  # at the dead centre
         system.null_space(start.q, independent="guide")
     with pytest.raises(StateError, match="q does not meet the constraints, by "):
         system.null_space(start.q + 0.1, independent="A")

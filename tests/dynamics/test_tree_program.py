@@ -6,10 +6,10 @@ import pytest
 import gauss
 from gauss import math
 from gauss.codegen import Kernel
+from gauss.dynamics.kernel_program import TreeProgram
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.traced_system import Program
-from gauss.dynamics.tree_program import TreeProgram
 from gauss.system import random_state
 
 pytestmark = pytest.mark.slow

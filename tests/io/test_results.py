@@ -12,7 +12,7 @@ import zarr
 import gauss
 from gauss import rotations, rotors, servo
 from gauss.errors import ArgumentError, MissingPackageError, SimulationError
-from gauss.simulation.trajectory import MANY
+from gauss.simulation.trajectory import LEAST_COMPILED_SAMPLES
 
 ROUNDING = 1e-14  # of a rotation that is turned into a quaternion and back
 
@@ -66,7 +66,7 @@ def test_orientations_are_the_rotations_of_the_bodies(motion):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [3, MANY + 1])  # few samples by numpy, many by machine code
+@pytest.mark.parametrize("count", [3, LEAST_COMPILED_SAMPLES + 1])  # few samples by numpy, many by machine code
 def test_poses_are_those_of_the_bodies(count):
     motion = gauss.simulate(_all_pairs(), 0.1, times=np.linspace(0, 0.1, count))
     positions, turned = motion.poses()

@@ -99,6 +99,29 @@ def test_dead_centres_and_swing():
         linkage.dead_centres("ram")
 
 
+@pytest.mark.parametrize("lengths", [(1.0, 0.5, 1.0, 1.2), (2.0, 0.5, 1.8, 1.0)])
+def test_transmission_over_two_ranges_is_found_within_them(lengths):
+    linkage = _four_bar(*lengths)
+    ranges = linkage.closing_ranges()
+    ((least, at),) = linkage.least_transmission().values()
+    assert len(ranges) == 2
+    assert least >= 0.0  # not nan
+    assert any(low <= at <= high for low, high in ranges)
+
+
+def test_a_linkage_that_closes_nowhere_has_no_dead_centres():
+    with pytest.raises(LinkageError, match="closes at no crank angle"):
+        _four_bar(10.0, 0.5, 1.0, 1.2).dead_centres("rocker")
+
+
+def test_work_does_not_depend_on_the_order_of_the_angles():
+    linkage = _four_bar(0.4, 1.0, 0.7, 1.2, moment=-100.0, resisting=True)  # it jumps between the angles
+    angles = np.array([0.3, 6.0, 1.0])
+    order = np.argsort(angles)
+    sorted_work = linkage.work(angles[order])
+    np.testing.assert_allclose(linkage.work(angles)[order], sorted_work, atol=EXACT * np.abs(sorted_work).max())
+
+
 def test_coupler_curve():
     """The pin C as a coupler point moves on a circle about D; any other point has the velocity of its two ends' mixture."""
     found = gauss.load_linkage("four_bar").cycle()

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gauss
-from gauss.errors import FileError, GaussError, LinkageError, NearSingularWarning, SceneError
+from gauss.errors import FileError, GaussError, LinkageError, NearSingularWarning, SceneError, SimulationError
 from gauss.io.catalog import linkage_files as shipped
 from gauss.linkages import LinkJoint
 
@@ -229,7 +229,7 @@ def test_what_is_said_of_the_chain(act, words):
         (lambda bar: bar.motor([0.0], [1.0]), "two or more increasing"),
         (lambda bar: bar.motor([0.0, 0.0], [1.0, 2.0]), "two or more increasing"),
         (lambda bar: bar.drive("A", speed=np.nan), "finite"),
-        (lambda bar: bar.add("rocker"), "expected a Link"),
+        (lambda bar: bar.add("rocker"), "expected a PlanarLink"),
     ],
 )
 def test_what_is_typed(act, words):
@@ -320,3 +320,25 @@ def test_a_motor_without_a_torque_is_named(wrong):
     chain = gauss.load_linkage("four_bar").chain
     with pytest.raises(gauss.GaussError, match=r"four-bar: motor: at t = .* s its law"):
         gauss.linkages.run(chain, WRONG_MOTORS[wrong], 0.1)
+
+
+RUNS = {
+    "times": [[0.0, 5.0], [-1.0, 0.5], [0.5, 0.2], [np.nan], []],
+    "breaks": [[np.nan], ["late"]],
+    "speed": [np.nan, "fast"],
+    "angle": [np.inf],
+    "step": ["short", True],
+    "added_inertia": [None, -1.0, np.nan],
+}
+
+
+@pytest.mark.parametrize("name, value", [(name, value) for name, values in RUNS.items() for value in values])
+def test_arguments_of_a_run_that_are_none_are_named(name, value):
+    with pytest.raises((LinkageError, SimulationError), match=name):
+        gauss.load_linkage("four_bar").run(1.0, lambda t, angle, speed: 1.0, **{name: value})
+
+
+@pytest.mark.parametrize("angles", [[], [0.0, np.nan], "all"])
+def test_angles_of_work_that_are_none_are_refused(angles):
+    with pytest.raises(LinkageError, match="crank angles"):
+        gauss.load_linkage("four_bar").work(angles)

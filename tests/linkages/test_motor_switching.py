@@ -12,6 +12,7 @@ from gauss.errors import SimulationError, SwitchingWarning
 LIGHT = 1e-12  # of the crank: mass and inertia of the other links
 RELATIVE = 1e-8  # a hundred times rtol
 END = 20.0  # s
+FEW_CALLS = 1000  # of a motor: some 300 samples that show whether it remembers calls, and the steps of a smooth motion
 
 
 def wheel() -> gauss.Linkage:
@@ -58,6 +59,19 @@ def test_a_motor_that_is_called_seldom_is_warned_of_on_every_call():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         wheel().run(END, lambda t, angle, speed: 0.0, step=0.01)
+
+
+def test_a_motor_without_time_is_not_sampled_over_the_motion():
+    calls = []
+
+    def motor(t, angle, speed):
+        calls.append(speed)
+        return 1.0
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SwitchingWarning)
+        wheel().run(1.0, motor, times=[1.0])
+    assert len(calls) <= FEW_CALLS
 
 
 def test_an_interrupted_run_is_kept():

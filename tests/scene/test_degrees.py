@@ -58,6 +58,20 @@ def test_what_may_be_meant_is_not(name):
         scene(kind, **options).start("J", position)
 
 
+def test_a_given_state_beyond_limits_is_moved_with_a_warning():
+    system = gauss.compile_scene(scene(limits=(-1.0, 1.0)))
+    with pytest.warns(StartWarning, match="'J'"):
+        assert system.projected(system.state([2.0])).q == [1.0]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        gauss.SimulatorBatch(system, 1e-3, 4).reset(q=np.ones((4, 1)), seed=0)  # random changes are kept within them
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.float32])
+def test_numbers_of_numpy_are_starts(kind):
+    assert scene().start("J", kind(1)).position == 1.0
+
+
 @pytest.mark.slow
 def test_the_command_line_says_it():
     ran = subprocess.run(

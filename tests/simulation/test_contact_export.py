@@ -5,7 +5,8 @@ import pytest
 
 import gauss
 from benchmarks.free_bodies import bin_of_balls, dominoes, stack
-from gauss.dynamics.contact.friction_problem import FrictionProblem, on_cone
+from gauss.dynamics.contact.convex_relaxation import on_cones
+from gauss.dynamics.contact.friction_problem import FrictionProblem
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.errors import ArgumentError, BackendError, FileError, StateError
 from gauss.io import load_fclib, save_fclib
@@ -71,8 +72,9 @@ def test_impulses_by_hand_of_a_block_that_slides():
 @pytest.mark.parametrize("mu", [0.0, 0.5, 2.0])
 def test_the_projection_on_a_cone_is_nearest(mu):
     rng = np.random.default_rng(3)
-    for r in rng.standard_normal((50, 3)):
-        near = on_cone(r, mu)
+    for r in [*rng.standard_normal((50, 3)), np.array([-1.0, 0.0, 0.0])]:
+        (height,), (across,) = on_cones(r[:1], r[None, 1:], np.array([mu]))
+        near = np.array([height, *across])
         assert near[0] >= 0.0 and np.hypot(*near[1:]) <= mu * near[0] + 1e-12
         others = rng.standard_normal((200, 3))
         others[:, 0] = np.hypot(*others[:, 1:].T) / mu + np.abs(others[:, 0]) if mu else np.abs(others[:, 0])

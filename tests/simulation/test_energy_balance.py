@@ -301,3 +301,11 @@ def _quietly(system):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", BalanceWarning)
         return gauss.simulate(system, 2.0, **COARSE)
+
+
+def test_a_printed_motion_says_how_far_its_energy_is_off():
+    motion = gauss.simulate(gauss.load("pendulum"), 0.1, progress=False)
+    first, *_, last = str(motion).splitlines()
+    assert first == repr(motion) and f"{motion.energies.off:.3g} J" in last
+    unknown = gauss.Trajectory.from_coordinates(motion.system, motion.t, motion.q)
+    assert "unknown" in str(unknown).splitlines()[-1]

@@ -175,7 +175,8 @@ def test_what_is_left_of_a_closed_gap_is_removed_in_a_time_that_does_not_depend_
             row = np.empty((1, 4 + system.n_q + system.n_v))
             stepper.python_step(rest, h)  # finds the kernels of the pairs, and the forces of rest
             known = stepper.known
-            assert stepper.run(start, np.zeros(3), np.array([h]), row).steps == 1
+            begin = np.concatenate([[start.t], start.q, start.v, np.zeros(3)])
+            assert stepper.steps_from(begin, np.array([h]), row).steps == 1
             stepper.known = known
             assert row[0, 1 + system.n_q + 2] == pytest.approx(stepper.python_step(start, h).v[2], rel=1e-9)
             rates.append(row[0, 1 + system.n_q + 2])

@@ -8,7 +8,7 @@ from gauss.codegen import Kernel, write
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS, Chart, Point, Rates, Tolerance, advance, first_step
-from gauss.simulation.compiled_steps.explicit_stages import ExplicitStages, method_state_size
+from gauss.simulation.compiled_steps.explicit_stages import ExplicitStages
 from gauss.system import random_state
 
 SAME = 1e-12  # relative difference by rounding
@@ -29,10 +29,10 @@ class _Equations:
 
 def _case(name: str, shares: str = "equal"):
     system, method = gauss.compile_scene(SCENES[name]()), METHODS["dop853"]
-    program = Program(system, Laws(system), memory=method_state_size(system))
+    program = Program(system, Laws(system), memory=method.state_size(system))
     stages = ExplicitStages(program, method, shares=SHARES[shares](system.n_v))
     state, equations = random_state(system, np.random.default_rng(1)), _Equations(program)
-    lost = 1e-13 * np.arange(method_state_size(system))
+    lost = 1e-13 * np.arange(method.state_size(system))
     return stages, equations, Point(state, np.zeros(3), equations.evaluate(state), lost)
 
 
@@ -60,7 +60,7 @@ def test_a_finished_step_is_the_compensated_one(name):
     compensation = point.method_state[:-2]
     chart = Chart(equations, point.state)
     expected = advance(chart, Point(*[*vars(point).values()][:3], compensation), h, change[: stages.n_y])
-    size, memory = stages.layout.size, method_state_size(equations.system)
+    size, memory = stages.layout.size, point.method_state.size
     before = slice(0, size - memory)
     _near(found[before], stages.layout.pack(expected)[before])
     assert np.abs(found[size - memory : size - 2] - expected.method_state).max() <= 1e-15

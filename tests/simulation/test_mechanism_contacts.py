@@ -12,7 +12,7 @@ from gauss.bench.fuzz.scenes import moved_scene
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.errors import ContactLawWarning, PainleveWarning, StateError
-from gauss.simulation.moreau.contact_warnings import warn_of_laws
+from gauss.simulation.moreau.contact_warnings import LOOSE_LAWS, warn_of_laws
 from tests.support import mechanisms
 
 STEP = 1e-3  # [s]
@@ -212,8 +212,10 @@ def test_time_stepping_tells_painleves_paradox():
     scene, radius = gauss.load("painleve_rod"), 1e-3
     scene.shapes["end"] = replace(scene.shapes["end"], radius=radius)
     scene.shapes["floor"] = replace(scene.shapes["floor"], at=(0.0, -radius, 0.0))
-    with pytest.warns(PainleveWarning, match="'C'"):
-        moved(scene, 0.02, plan=KERNELS)
+    with pytest.warns(PainleveWarning, match="'C'") as told:
+        motion = moved(scene, 0.02, plan=KERNELS)
+    assert {warning.filename for warning in told} == {__file__}  # where the user calls
+    assert 0.0 <= motion.stats.law_error <= LOOSE_LAWS and f"{motion.stats.law_error:.0e}" in repr(motion.stats)
 
 
 def test_loose_laws_of_contact_are_told():

@@ -193,3 +193,35 @@ def test_a_motion_that_diverges_affects_no_other():
     batch.restart([1], np.zeros((1, 2)), np.zeros((1, 2)))
     batch.step(inputs[:, 0])
     assert not batch.diverged.any() and np.isfinite(batch.q).all()
+
+
+def test_truth_values_are_no_indices_and_counts():
+    system = gauss.compile_scene(gauss.load("pendulum"))
+    motion = gauss.Trajectory.from_coordinates(system, [0.0, 1.0], [[0.0], [0.1]])
+    many = gauss.rollout(system, [[0.0]] * 2, [[0.0]] * 2, steps=1, step=1e-3)
+    calls = {
+        "state": lambda: motion.state(True),
+        "trajectory": lambda: many.trajectory(True),
+        "contact_points": lambda: gauss.contact_points(motion, True),
+        "batch": lambda: gauss.SimulatorBatch(system, STEP, True),
+        "steps": lambda: gauss.Simulator(system, STEP).step(n=True),
+        "more steps than numbers": lambda: gauss.Simulator(system, STEP).step(n=10**400),
+    }
+    for call in calls.values():
+        with pytest.raises(GaussError):
+            call()
+
+
+def test_a_zero_at_the_start_counts_in_its_direction():
+    system = gauss.compile_scene(gauss.load("pendulum"))
+    rising = gauss.Trajectory.from_coordinates(system, [0.0, 1.0, 2.0], [[0.0], [0.1], [0.2]])
+    found = {way: len(gauss.crossings(rising, lambda at: at.coordinate("A"), direction=way)) for way in (-1, 0, 1)}
+    assert found == {-1: 0, 0: 1, 1: 1}
+
+
+@pytest.mark.parametrize("rate", [np.int64(50), np.float32(50.0)])
+def test_rates_and_limits_are_numbers_of_numpy_too(rate):
+    scene = gauss.load("cart_pole")
+    assert scene.input("push", "rail", limits=rate).bounds == (-50.0, 50.0)
+    motion = gauss.simulate(scene, 0.04, control=np.zeros((2, 1)), rate=rate, progress=False)
+    assert motion.settings["rate"] == 50.0

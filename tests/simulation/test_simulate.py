@@ -268,7 +268,7 @@ def test_many_samples_by_machine_code_are_the_few_by_numpy(name, monkeypatch):
     trajectory = gauss.simulate(gauss.load(name), 0.2, times=np.linspace(0, 0.2, 9))
     body = trajectory.system.structure.bodies[-1]
     few, energies = trajectory.body(body), gauss.energy(trajectory)
-    monkeypatch.setattr("gauss.simulation.trajectory.MANY", 0)
+    monkeypatch.setattr("gauss.simulation.trajectory.LEAST_COMPILED_SAMPLES", 0)
     many, energies_many = trajectory.body(body), gauss.energy(trajectory)
     for part in ("position", "rotation", "com", "velocity", "angular_velocity"):
         assert np.abs(getattr(few, part) - getattr(many, part)).max() <= 1e-13 * (1 + np.abs(getattr(few, part)).max())

@@ -118,7 +118,10 @@ def test_sleep_is_refused_where_it_does_not_apply(name, options):
         moved(gauss.load(name), 0.1, **options)
 
 
-@pytest.mark.parametrize("wrong", [{"speed": 0.0}, {"speed": np.nan}, {"duration": -1.0}, {"duration": np.inf}])
+@pytest.mark.parametrize(
+    "wrong",
+    [{"speed": 0.0}, {"speed": np.nan}, {"speed": [1e-3]}, {"duration": -1.0}, {"duration": np.inf}, {"duration": None}],
+)
 def test_sleeping_takes_positive_numbers(wrong):
     with pytest.raises(SimulationError, match=next(iter(wrong))):
         Sleeping(**wrong)

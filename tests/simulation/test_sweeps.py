@@ -278,3 +278,11 @@ def test_the_command_sweeps_and_says_what_came_of_it(tmp_path):
     assert result.exit_code == 0, result.output
     assert "4 of 6" in result.output and "2: body 'crank': mass" in result.output and "q A at the end" in result.output
     assert gauss.load_sweep(path).sizes["crank.mass"] == 3
+
+
+def test_measures_find_the_start_of_their_own_member():
+    """Systems of members that differ in their starts alone share machine code."""
+    again = lambda motion: gauss.simulate(motion.system, 0.05, rtol=1e-9, atol=1e-9).q[0, 0]  # noqa: E731
+    starts = [0.1, 0.4]
+    found = gauss.sweep(gauss.load("pendulum"), {"A.position": starts}, 0.05, measure={"first": again}, **FIXED)
+    assert found.first.values == pytest.approx(starts, abs=0)

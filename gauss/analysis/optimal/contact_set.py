@@ -20,7 +20,7 @@ from gauss.dynamics.mechanism import Mechanism
 from gauss.errors import ArgumentError, did_you_mean
 from gauss.scene import Contact
 from gauss.system import State, System, phase_scene, sides
-from gauss.system.contact_gaps import slips
+from gauss.system.contact_mode import slips
 from gauss.system.relations import place_residuals
 
 STICKS = "{} sticks"  # name of the tangential constraint of a rough contact

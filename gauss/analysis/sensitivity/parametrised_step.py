@@ -14,7 +14,7 @@ from gauss.dynamics.acceleration_derivatives import LoadedMechanism
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.motion_step import TABLEAUS, MotionStep
-from gauss.dynamics.parametrised_system import ParametrisedSystem
+from gauss.dynamics.parameters import ParametrisedSystem
 from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached

@@ -12,9 +12,8 @@ import numpy as np
 
 from gauss.codegen.gpu.cuda_driver import driver
 from gauss.codegen.gpu.cuda_memory import CudaArray, CudaView, stream_handle
-from gauss.codegen.gpu.device import Lowered
 from gauss.codegen.gpu.ptx import LEAST_CAPABILITY, ptx, refuse_libraries
-from gauss.codegen.gpu.thread_code import THREADS_PER_BLOCK, ThreadCode
+from gauss.codegen.gpu.thread_code import THREADS_PER_BLOCK, Lowered, ThreadCode
 from gauss.errors import DeviceError
 
 NEWEST_CAPABILITY = 90  # PTX for it runs on later devices, too

@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 
 class CudaArray:
-    """Array of doubles on a GPU; other packages read it without a copy (``__cuda_array_interface__``, DLPack).
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Its shape.
-    """
+    """Array of doubles on a GPU; other packages read it without a copy (``__cuda_array_interface__``, DLPack)."""
 
     def __init__(self, device: "CudaDevice", shape: tuple[int, ...]):
         self.device, self.shape = device, tuple(map(int, shape))
@@ -74,14 +68,9 @@ class CudaArray:
 
 
 class CudaView:
-    """Array of another library on a GPU.
+    """Array with ``__cuda_array_interface__`` of another library on a GPU.
 
     DeviceError if it lies on another GPU.
-
-    Parameters
-    ----------
-    given : object
-        Array with ``__cuda_array_interface__``.
     """
 
     def __init__(self, device: "CudaDevice", given):

@@ -61,16 +61,9 @@ def _release(own):
 
 
 def capsule(owner, pointer: int, shape: tuple[int, ...], kind: int, number: int):
-    """Capsule of a contiguous array of doubles; the owner of its memory lives as long as the consumer needs it.
+    """Capsule of a contiguous array of doubles at an address, in a kind of memory (CPU or CUDA) of a device with a number.
 
-    Parameters
-    ----------
-    pointer : int
-        Its address.
-    shape : tuple of int
-        Shape of the array.
-    kind, number : int
-        Kind of memory, CPU or CUDA, and which device.
+    The owner of its memory lives as long as the consumer needs it.
     """
     shape_ = (ctypes.c_int64 * max(len(shape), 1))(*shape)
     tensor = _Tensor(pointer, _Device(kind, number), len(shape), _DataType(*DOUBLE), shape_, None, 0)

@@ -6,22 +6,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from gauss.codegen import machine
-from gauss.codegen.gpu.device import Lowered
 from gauss.codegen.gpu.ptx import refuse_libraries
-from gauss.codegen.gpu.thread_code import ThreadCode
+from gauss.codegen.gpu.thread_code import Lowered, ThreadCode
 from gauss.errors import DeviceError
 
 FREE_BYTES = 1 << 31  # of the memory of this process that a batch may take at a time
 
 
 class HostArray:
-    """Array in the memory of this process.
-
-    Parameters
-    ----------
-    array : ndarray
-        Contiguous array of doubles.
-    """
+    """Contiguous array of doubles in the memory of this process."""
 
     def __init__(self, array: np.ndarray):
         self.array, self.shape = array, array.shape

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 
-from gauss.codegen.gpu.device import Device, DeviceProgram, Lowered
-from gauss.codegen.gpu.devices import devices
+from gauss.codegen.gpu.devices import Device, DeviceProgram, devices
+from gauss.codegen.gpu.thread_code import Lowered
 from gauss.errors import DeviceError
 
 SHARE_OF_MEMORY = 0.8  # of the free memory of a device: other libraries and its driver need some

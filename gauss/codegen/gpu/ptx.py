@@ -29,16 +29,9 @@ def _machine(capability: int) -> llvm.TargetMachine:
 
 
 def ptx(ir_text: str, capability: int) -> str:
-    """PTX of a module.
+    """PTX of a module with an entry for a GPU, for a compute capability times ten.
 
     MissingPackageError if llvmlite is too old.
-
-    Parameters
-    ----------
-    ir_text : str
-        The module, with an entry for a GPU.
-    capability : int
-        Compute capability of the device times ten.
     """
     if llvm.llvm_version_info[0] < LEAST_LLVM:
         raise MissingPackageError("device 'cuda' needs a newer llvmlite: pip install --upgrade llvmlite")

@@ -5,14 +5,14 @@ starts all threads at once, and this CPU one after the other, so that what a GPU
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from llvmlite import ir
 
-from gauss.codegen.device_module import DeviceModule, SingleDeviceModule
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER, counted_loop
-from gauss.codegen.lanes import INTEGER
+from gauss.codegen.ir_module import INTEGER, DeviceModule, SingleDeviceModule
 from gauss.codegen.native_function import NativeFunction
 
 THREADS_PER_BLOCK = 128  # a multiple of the 32 of a warp; more leave a thread fewer registers
@@ -20,29 +20,16 @@ INDEX = "llvm.nvvm.read.ptx.sreg."  # special registers of PTX
 WORD = ir.IntType(32)
 
 
+class Lowered(NamedTuple):
+    """Thread code for a device: name of its entry, its text, and which of its arguments are arrays."""
+
+    name: str
+    text: str
+    is_array: tuple[bool, ...]
+
+
 class ThreadCode:
-    """Module with one function (thread, *arguments), and what calls it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the entry.
-    kinds : sequence of llvmlite.ir.Type
-        Types of the arguments.
-    single : bool
-        Whether traced functions compute in single precision.
-
-    Attributes
-    ----------
-    writer : Writer
-        Writer of the module.
-    thread : llvmlite.ir.Value
-        Index of the thread.
-    arguments : sequence of llvmlite.ir.Value
-        The other arguments.
-    b : llvmlite.ir.IRBuilder
-        Builder at the beginning of the function.
-    """
+    """Module with one function (thread, *arguments), and what calls it."""
 
     def __init__(self, name: str, kinds: Sequence[ir.Type], single: bool = False):
         self.name, self.writer = name, Writer(SingleDeviceModule(name="gauss") if single else DeviceModule(name="gauss"))

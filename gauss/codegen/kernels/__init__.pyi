@@ -6,7 +6,6 @@ from gauss.codegen.kernels.call_recorder import CallRecorder, Operand, RecordedC
 from gauss.codegen.kernels.call_table import CallTable
 from gauss.codegen.kernels.checked_recursion import CorrectedRecursion, Correction
 from gauss.codegen.kernels.checked_switch import CheckedSwitch
-from gauss.codegen.kernels.column_pivoting import Pivots
 from gauss.codegen.kernels.compiled_loop import CallingLoop, Loop, address
 from gauss.codegen.kernels.contact_solver import CompiledContactSolver, ContactSolver
 from gauss.codegen.kernels.contact_step import ContactForces
@@ -26,6 +25,7 @@ from gauss.codegen.kernels.fixed_step_batch import WORST_RECORD, BatchSpan, Fixe
 from gauss.codegen.kernels.free_body_poses import FreeBodyFunctions
 from gauss.codegen.kernels.free_body_step import CompiledFreeBodyStep
 from gauss.codegen.kernels.free_motion import STIFF_DAMPING, implicit_inertia
+from gauss.codegen.kernels.lapack import Pivots
 from gauss.codegen.kernels.loop_control import Control, LoopStatus
 from gauss.codegen.kernels.mechanism_loop import CallingSteps, CompiledSteps
 from gauss.codegen.kernels.mechanism_step import CompiledMechanismStep, StepFunctions

@@ -1,8 +1,8 @@
 """Loop of an adaptive integrator over a batch of motions, one per SIMD lane, each with its own step length.
 
 All lanes try a step at once. A lane with a rejected step retries with a shorter one while the others advance; a lane that
-has
-reached the end is refilled with the next motion of the queue. Lanes are independent: a motion does not depend on the others.
+has reached the end is refilled with the next motion of the queue. Lanes are independent: a motion does not depend on the
+others.
 """
 
 import numpy as np
@@ -98,7 +98,7 @@ class AdaptiveBatchLoop(BatchLoop):
             Changed.
         lanes : ndarray
             See :meth:`lanes`; changed.
-        motions : ndarray, shape (size + len(RECORD), columns)
+        motions : ndarray, shape (size + len(MOTION_RECORD), columns)
             Point and record of each motion, changed when it ends; one that stops before the end has failed.
         grid : ndarray, shape (rows + 1,)
             Times of the samples, then infinity.

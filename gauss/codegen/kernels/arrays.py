@@ -26,15 +26,7 @@ INTEGERS = INTEGER.as_pointer()
 
 
 class Value:
-    """A double, an integer or a condition of the emitted code.
-
-    Parameters
-    ----------
-    b : llvmlite.ir.IRBuilder
-        Insertion point.
-    value : llvmlite.ir.Value
-        Its LLVM value.
-    """
+    """A double, an integer or a condition of the emitted code."""
 
     def __init__(self, b: ir.IRBuilder, value: ir.Value):
         self.b, self.value = b, value
@@ -104,15 +96,7 @@ class Value:
 
 
 class Array:
-    """Array of doubles or integers in memory.
-
-    Parameters
-    ----------
-    b : llvmlite.ir.IRBuilder
-        Insertion point.
-    pointer : llvmlite.ir.Value
-        Its address.
-    """
+    """Array of doubles or integers in memory."""
 
     def __init__(self, b: ir.IRBuilder, pointer: ir.Value):
         self.b, self.pointer = b, pointer
@@ -133,17 +117,7 @@ class Array:
 
 
 class Strided(Array):
-    """Input or output of a function: entry i lies at ``pointer[stride * i]``.
-
-    Parameters
-    ----------
-    b : llvmlite.ir.IRBuilder
-        Insertion point.
-    pointer : llvmlite.ir.Value
-        Its address.
-    stride : Value
-        Distance of entries.
-    """
+    """Input or output of a function: entry i lies at ``pointer[stride * i]``."""
 
     def __init__(self, b: ir.IRBuilder, pointer: ir.Value, stride: Value):
         super().__init__(b, pointer)
@@ -154,22 +128,12 @@ class Strided(Array):
 
 
 class Routine:
-    """Emitter of one function.
-
-    Parameters
-    ----------
-    function : llvmlite.ir.Function
-        The function, without code; its arguments are integers and pointers.
-
-    Attributes
-    ----------
-    integers, arrays : list of Value, list of Array
-        Arguments of each sort, in order.
-    """
+    """Emitter of one function, without code yet, whose arguments are integers and pointers."""
 
     def __init__(self, function: ir.Function):
         self.module, self.function = function.module, function
         self.b = ir.IRBuilder(function.append_basic_block("entry"))
+        # arguments of each sort, in order
         self.integers = [Value(self.b, argument) for argument in self.function.args if argument.type == INTEGER]
         self.arrays = [Array(self.b, argument) for argument in self.function.args if argument.type != INTEGER]
 

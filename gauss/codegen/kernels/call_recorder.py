@@ -16,15 +16,7 @@ from gauss.codegen.kernels.call_table import CallTable
 
 
 class Slot:
-    """Memory slot of a number, or of its negative.
-
-    Parameters
-    ----------
-    address : int
-        Address in memory.
-    negative : bool
-        Whether the number is the negative of the slot.
-    """
+    """Memory slot of a number, or of its negative."""
 
     __slots__ = ("address", "negative")
 
@@ -47,22 +39,14 @@ class Pattern(NamedTuple):
 
 
 class Operand:
-    """Array of numbers and slots, an argument or a result of a recorded call.
-
-    Parameters
-    ----------
-    pattern : int
-        Index of its pattern.
-    addresses : list of int
-        Addresses of its distinct slots.
-    shape : tuple of int
-        Its shape.
-    """
+    """Array of numbers and slots, an argument or a result of a recorded call."""
 
     __slots__ = ("pattern", "addresses", "shape")
 
     def __init__(self, pattern: int, addresses: list, shape: tuple):
-        self.pattern, self.addresses, self.shape = pattern, addresses, shape
+        self.pattern = pattern  # its index
+        self.addresses = addresses  # of its distinct slots
+        self.shape = shape
 
 
 @dataclass(frozen=True)
@@ -214,22 +198,11 @@ class CallRecorder:
 
 
 class RecordedCalls:
-    """Memory, and sections of calls on it, ready to run.
-
-    Parameters
-    ----------
-    values : ndarray
-        The memory.
-    kept : ndarray of int
-        Addresses of parameters and inputs.
-    calls : CallTable
-        The functions.
-    sections : dict
-        Call table of each section.
-    """
+    """Memory, and sections of calls on it, ready to run."""
 
     def __init__(self, values: np.ndarray, kept: np.ndarray, calls: CallTable, sections):
-        self.values, self.kept, self.calls = values, kept, calls
+        self.values, self.calls = values, calls  # the memory, and the functions
+        self.kept = kept  # addresses of parameters and inputs
         self.tables = {name: np.array(table, dtype=np.int32) for name, table in sections.items()}
 
     def run(self, section: str):
@@ -238,13 +211,7 @@ class RecordedCalls:
 
 
 class Vector:
-    """View of slots in memory as one vector.
-
-    Parameters
-    ----------
-    entries : ndarray
-        Numbers and slots.
-    """
+    """View of an array of numbers and slots in memory as one vector."""
 
     def __init__(self, entries: np.ndarray):
         flat = entries.ravel().tolist()

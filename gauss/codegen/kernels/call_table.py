@@ -14,19 +14,9 @@ SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_in
 
 
 class CallTable(NativeFunction):
-    """Functions on one memory, and the loop that calls them from a table.
+    """Functions on one memory, and the loop that calls them from a table; scenes with the same functions share its code.
 
     Its code is ``calls(double* memory, i32* table, i64 size)``, as the table is no vector of doubles.
-
-    Parameters
-    ----------
-    functions : list of Function
-        Called functions; the code depends only on these, so scenes with the same functions share it.
-
-    Attributes
-    ----------
-    count : int
-        Number of functions.
     """
 
     name = "calls"

@@ -16,7 +16,7 @@ class CheckedSwitch(NativeFunction):
     ----------
     fast, refined : Function
         Functions of the same inputs.
-    limit : float
+    least_accuracy : float
         Least value of the indicator with which the fast result is accepted.
     """
 

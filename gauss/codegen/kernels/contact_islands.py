@@ -13,14 +13,7 @@ from gauss.codegen.kernels.step_memory import RESULTS, StepMemory
 from gauss.codegen.kernels.vectors import WIDTH
 
 ISLANDS = (
-    "parent",
-    "number",
-    "contacts_before",
-    "bodies_before",
-    "slots_before",
-    "contact_place",
-    "body_place",
-    "blocks_of",
+    *("parent", "number", "contacts_before", "bodies_before", "slots_before", "contact_place", "body_place", "blocks_of"),
 )
 
 

@@ -22,10 +22,12 @@ class ContactModes:
         Arrays of the step.
     impact : Function
         (gap, rate, speed, h, share) → 1 for an impact.
+    rest_steps : float
+        As of :class:`gauss.codegen.kernels.StepFunctions`.
     """
 
-    def __init__(self, memory: StepMemory, impact: Function):
-        self.at, self.r, self.impact = memory, memory.r, impact
+    def __init__(self, memory: StepMemory, impact: Function, rest_steps: float):
+        self.at, self.r, self.impact, self.rest_steps = memory, memory.r, impact, rest_steps
         names = "modes", "next_modes", "closed", "fresh", "counts"
         self.modes, self.next, self.closed, self.fresh, self.counts = (memory.table(name) for name in names)
         self.laws = memory.n["laws"]
@@ -61,7 +63,7 @@ class ContactModes:
         """Whether a gap has an impact in the step."""
         s = self.at.settings
         push = self._product(row, lambda i: self.at["a"][i]) + self.at["bias"][row]
-        speed = self.r.absolute(push) * 2.0 * s["h"] + s["rest"]
+        speed = self.r.absolute(push) * self.rest_steps * s["h"] + s["rest"]
         (hit,) = self.r.inline(self.impact, self.at["gap"][row], self.at["rate"][row], speed, s["h"], s["share"])
         return hit
 

@@ -16,9 +16,8 @@ class ContactForces(NativeFunction):
 
     Inputs are the velocities (n,) after the step without forces, the step h, the Jacobian J (n, n_v) of the velocities, the
     inverse mass matrix H (n_v, n_v), initial forces (n,), sliding velocities (2 k,) before the step, the tolerance of
-    approach
-    velocities, and the velocity above which a contact slides. Outputs are the forces, the residual of the laws, and a doubt
-    flag: no solution was found, or the forces of sliding contacts may be undetermined (Painlevé).
+    approach velocities, and the velocity above which a contact slides. Outputs are the forces, the residual of the laws, and
+    a doubt flag: no solution was found, or the forces of sliding contacts may be undetermined (Painlevé).
 
     Parameters
     ----------

@@ -1,19 +1,31 @@
 """Explicit Runge–Kutta steps: kᵢ = f(t + cᵢ h, y + h Σⱼ aᵢⱼ kⱼ) by calls, sums over stages as loops over the entries of y.
 
-Unrolled, the code would grow with the square of the number of stages. A row y of one motion is
-padded with zeros to ``stride``, a multiple of the SIMD width; in a batch every entry is a SIMD vector already, and rows are
-not padded.
+Unrolled, the code would grow with the square of the number of stages. A row y of one motion is padded with zeros to
+``stride``, a multiple of the SIMD width; in a batch every entry is a SIMD vector already, and rows are not padded.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, Function, NativeFunction, Writer, processor
+from gauss.codegen import (
+    INTEGER,
+    POINTER,
+    Function,
+    Lanes,
+    NativeFunction,
+    Writer,
+    constant_array,
+    counted_loop,
+    processor,
+    vector_width,
+)
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS
-from gauss.codegen.kernels.row_code import RowCode
-from gauss.codegen.kernels.slope_sums import SlopeSums
+from gauss.codegen.kernels.row_code import RowCode, reduced
+from gauss.codegen.text_builder import TextBuilder
 
 
 def stride(n_y: int) -> int:
@@ -156,3 +168,81 @@ def _stages(rows: RowCode, slope: Function | NativeFunction, x, size: int, h, y0
         rows.put(given, size, rows.motions.fused("fma", node, rows.number(h, 0), rows.number(x, 0)))
         sums.write(rows.at(given, size + 1), y0, h, i, K)
         rows.call(slope, given, rows.at(K, b.mul(b.add(i, INTEGER(known)), INTEGER(row))))
+
+
+class SlopeSums:
+    """Emitter of weighted sums of slopes of ``size`` numbers, base + h Σⱼ wⱼ kⱼ, in one function.
+
+    One loop over entries and nonzero weights, a table in compressed sparse rows, serves all sums of a method. The entries of
+    one motion are added a vector register at a time, so that a row of slopes has a multiple of its length; entries of a
+    batch of motions are vectors already.
+    """
+
+    def __init__(self, rows: RowCode, weights: Sequence[np.ndarray], size: int):
+        self.rows, self.size, self.weights = rows, size, weights
+        entries = [(i, weight) for sum_of in weights for i, weight in enumerate(sum_of) if weight]
+        counts = [np.count_nonzero(sum_of) for sum_of in weights]
+        table = {
+            "first": np.cumsum([0, *counts]),
+            "place": np.array([i * size * rows.width for i, _ in entries], dtype=int),
+            "weight": np.array([weight for _, weight in entries], dtype=float),
+        }
+        module, name = rows.writer.module, rows.function.name
+        self.first, place, weight = (constant_array(module, f"{name}_{key}", values) for key, values in table.items())
+        self.table = [rows.b.bitcast(weight, POINTER), rows.b.bitcast(place, INTEGER.as_pointer())]
+
+    def write(self, target, base, h, k, K):
+        """Write sum k to an array: ``target = base + h · weights[k] @ K``."""
+        if self.rows.is_batch:
+            self._unrolled(target, base, h, self.weights[k.constant], K)
+            return
+        b, name = self.rows.b, f"slope_sum_{self.size}_{self.rows.width}"
+        code = self.rows.writer.module.globals.get(name) or self._code(name)
+        first = b.bitcast(self.first, INTEGER.as_pointer())
+        bounds = [b.load(b.gep(first, [b.add(k, INTEGER(j))])) for j in (0, 1)]
+        b.call(code, [target, base, h, *self.table, *bounds, K])
+
+    def _unrolled(self, target, base, h, weights: np.ndarray, K):
+        """Write a sum for a batch, its terms unrolled: that runs for long."""
+        b, lanes, width = self.rows.b, self.rows.motions, self.rows.width
+        terms = [(i, lanes.constant(float(weight))) for i, weight in enumerate(weights) if weight]
+        h = lanes.load(h, INTEGER(0))
+        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), width) as k:
+            slopes = [(lanes.load(K, b.add(k, INTEGER(i * self.size * width))), weight) for i, weight in terms]
+            total = b.fmul(*slopes[0])
+            for slope, weight in slopes[1:]:
+                total = lanes.fused("fma", slope, weight, total)
+            lanes.store(lanes.fused("fma", total, h, lanes.load(base, k)), target, k)
+
+    def zeros(self) -> ir.Constant:
+        """Row of zeros."""
+        length = self.size * self.rows.width
+        return self.rows.b.bitcast(constant_array(self.rows.writer.module, f"zeros_{length}", np.zeros(length)), POINTER)
+
+    def _code(self, name: str) -> ir.Function:
+        """Function (target, base, h, weights, places, first and last weight, slopes)."""
+        width, module, integers = self.rows.width, self.rows.writer.module, INTEGER.as_pointer()
+        kinds = [POINTER, POINTER, POINTER, POINTER, integers, INTEGER, INTEGER, POINTER]
+        code = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), name)
+        code.linkage = "internal"
+        target, base, h, weights, places, first, last, K = code.args
+        target.add_attribute("noalias")
+        b = TextBuilder(code.append_basic_block("entry"))
+        lanes = Lanes(module, vector_width(module) if width == 1 else width, b)
+        h = lanes.broadcast(b.load(h)) if width == 1 else lanes.load(h, INTEGER(0))
+
+        def term(j, k):
+            """Weight j, and entry k of its slope."""
+            place = b.add(k, b.load(b.gep(places, [j])))
+            return lanes.broadcast(b.load(b.gep(weights, [j]))), lanes.load(K, place)
+
+        def added(j, total, k):
+            weight, slope = term(j, k)
+            return lanes.fused("fma", weight, slope, total)
+
+        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), lanes.width) as k:
+            start, second = b.fmul(*term(first, k)), b.add(first, INTEGER(1))
+            total = reduced(b, second, last, start, partial(added, k=k))
+            lanes.store(lanes.fused("fma", total, h, lanes.load(base, k)), target, k)
+        b.ret_void()
+        return code

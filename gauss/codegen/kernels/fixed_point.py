@@ -16,9 +16,8 @@ class FixedPoint(NativeFunction):
     """Fixed-point iteration x ← f(x, given).
 
     It stops when the change is zero, or below ``CONVERGED_RELATIVE`` and no longer smaller than the one before: what
-    remains is
-    unbiased rounding error (Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta methods,
-    BIT 48, 2008).
+    remains is unbiased rounding error (Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta
+    methods, BIT 48, 2008).
 
     Parameters
     ----------

@@ -23,18 +23,7 @@ ADDRESSES = (
     *("modes", "next_modes", "closed", "fresh", "counts"),
 )
 SETTINGS = (
-    "t",
-    "h",
-    "share",
-    "rest",
-    "slow",
-    "margin",
-    "unit",
-    "tolerance",
-    "unsolved",
-    "removal",
-    "accepted",
-    "deepest",
+    *("t", "h", "share", "rest", "slow", "margin", "unit", "tolerance", "unsolved", "removal", "accepted", "deepest"),
     "curved",
 )
 POSE, COORDINATES, RATES = 24, 7, 6  # pose and velocities of a body, coordinates and rates of its joint
@@ -98,12 +87,10 @@ class FreeBodyFunctions:
         Of one body, as of :class:`gauss.dynamics.contact.free_bodies.FreeBodyKernels`.
     laws : BlockContactLaws
         Laws of contact and friction.
-    impact, plastic, elastic, to_close : Function
+    impact, plastic, elastic, to_close, rest_steps
         As of :class:`gauss.codegen.kernels.StepFunctions`.
     gap_after : Function
         (gap, its rate, its second derivative, a time) → the gap after that time.
-    rest_steps : float
-        Steps: a gap that closes no faster than by its acceleration in so many is at rest, without impact.
     """
 
     place: Function

@@ -10,7 +10,6 @@ from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER
 from gauss.codegen.kernels.arrays import Array, Value
-from gauss.codegen.kernels.asleep import pushes_asleep
 from gauss.codegen.kernels.block_contacts import CONTACT, write_block_contacts
 from gauss.codegen.kernels.block_lu import write_order
 from gauss.codegen.kernels.contact_modes import SLIDING, STICKING, ContactModes
@@ -63,7 +62,7 @@ class _FreeBodyStepWriter(BodiesOfStep):
         self.project = write_position_projection(functions, shared, module)
         super().__init__(functions, shared, ir.Function(module, STEP, "step"))
         self.remaining = self.settings["share"] * -1.0 + 1.0
-        self.status, self.modes = self.at.table("status"), _PointModes(self.at, functions.impact)
+        self.status, self.modes = self.at.table("status"), _PointModes(self.at, functions.impact, functions.rest_steps)
 
     def write(self) -> ir.Function:
         r, s, at = self.r, self.settings, self.at
@@ -165,17 +164,13 @@ class _FreeBodyStepWriter(BodiesOfStep):
         """Whether a contact pushes a body asleep; their columns follow those of the moving bodies."""
         at, first = self.at, self.at.n["n"]
         force = lambda c: at["f"][self.islands.contact[c] * 3]  # noqa: E731
-        return pushes_asleep(at, m, force, lambda column: (column >= first) & (column < first + at.n["sleepers"]))
+        return at.pushes_asleep(m, force, lambda column: (column >= first) & (column < first + at.n["sleepers"]))
 
     def _known(self, m: Value):
         """Initial impulses, those of the last step: contacts of both steps come in the same order."""
         r, at, h = self.r, self.at, self.settings["h"]
-        found, known, count, k = (
-            at.table("found"),
-            at.table("known_found"),
-            at.table("known_count")[0],
-            r.variable(0, INTEGER),
-        )
+        found, known = at.table("found"), at.table("known_found")
+        count, k = at.table("known_count")[0], r.variable(0, INTEGER)
         with r.each(m) as c:
             p, feature = found[c * 2], found[c * 2 + 1]
             with r.loop() as leave_if:

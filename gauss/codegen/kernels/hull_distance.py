@@ -14,24 +14,14 @@ from gauss.codegen.kernels.arrays import INTEGERS, Array, Value, subroutine
 from gauss.codegen.kernels.hull_penetration import write_penetration
 from gauss.codegen.kernels.hull_points import Hull, cross, pose, put, vector, write_farthest, write_nearest
 
-FOUND, INSIDE, FAR, LEFT, PLACELESS = (
-    1,
-    2,
-    3,
-    4,
-    5,
-)  # states of the search, 0 while it goes on; the last: a depth without a place
+FOUND, INSIDE, FAR, LEFT, PLACELESS = range(1, 6)  # states of the search, 0 while it goes on; the last: a depth, no place
 NEAREST = 7  # distance, normal out of the second hull (3), point on it (3)
 ROUNDS = 64
 BOUND_GAP = 1e-14  # relative to the size of both hulls: difference of both bounds that is rounding
 ACCEPTED_GAP = 1e-12  # the same, where no better corner is found
 TOUCHING = 4e-15  # the same: distance that has no direction
 LEAST_TRIANGLE = 1e-4  # relative to the square of the size: twice the area of a triangle
-ODD = (
-    0.11,
-    0.17,
-    0.05,
-)  # added to the direction of the other hull's centre at first: no faces and edges are expected across it
+ODD = 0.11, 0.17, 0.05  # added to the direction of the other hull's centre at first: no faces are expected across it
 WITHOUT_FOURTH = ((0, 1, 3, 2), (1, 2, 3, 0), (0, 2, 3, 1))  # sides of a simplex with its newest corner; the corner across
 
 

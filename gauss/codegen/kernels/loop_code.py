@@ -3,29 +3,30 @@
 A buffer holds one number per SIMD lane in each entry.
 """
 
-from contextlib import contextmanager
-
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, Buffers, Function, Lanes, NativeFunction, Writer, copy, endless_loop
+from gauss.codegen import (
+    DOUBLE,
+    INTEGER,
+    LINE,
+    Buffers,
+    Function,
+    Lanes,
+    NativeFunction,
+    Writer,
+    copy,
+    counted_loop,
+    endless_loop,
+)
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, update
 from gauss.codegen.kernels.loop_control import Control, Numbers
 from gauss.codegen.text_builder import TextBuilder
 
 
 class LoopCode:
-    """Emitter of one loop function.
+    """Emitter of one loop function for so many motions at a time.
 
-    Parameters
-    ----------
-    writer : Writer
-        Writer of its module.
-    pointers : sequence of str
-        Arguments ``double*``; ``control`` among them.
-    control : type
-        Record type of ``control``.
-    width : int
-        Number of motions at a time.
+    Its arguments are arrays of doubles, named by ``pointers``, and the budget; ``control`` is a record of one type.
     """
 
     def __init__(self, writer: Writer, name: str, pointers, control: type[Numbers] = Control, width: int = 1):
@@ -118,9 +119,8 @@ class LoopCode:
         found, worst = self.b.load(error), self.get("worst")
         self.set("worst", self.b.select(self.b.fcmp_ordered(">", found, worst), found, worst))
         self.set("constraint_residual", self.b.load(self.at(error, 1)))
-        for name, value in zip(
-            ENERGY_RECORD, self.energies_after([self.get(name) for name in ENERGY_RECORD], point, error), strict=True
-        ):
+        following = self.energies_after([self.get(name) for name in ENERGY_RECORD], point, error)
+        for name, value in zip(ENERGY_RECORD, following, strict=True):
             self.set(name, value)
 
     def energies_after(self, record, point, checked):
@@ -139,15 +139,9 @@ class LoopCode:
         """Write a loop; the context gives a function that leaves it where a condition holds."""
         return endless_loop(self.b)
 
-    @contextmanager
     def each(self, count: int):
         """Write a loop over the whole numbers below a count."""
-        place = self.counter(INTEGER(0))
-        with self.loop() as leave_if:
-            k = self.b.load(place)
-            leave_if(self.b.icmp_signed(">=", k, INTEGER(count)))
-            yield k
-            self.b.store(self.b.add(k, INTEGER(1)), place)
+        return counted_loop(self.b, INTEGER(0), INTEGER(count))
 
     def finish(self):
         """End the function."""

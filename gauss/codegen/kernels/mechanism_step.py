@@ -14,7 +14,6 @@ from llvmlite import ir
 from gauss.codegen import POINTER, Function
 from gauss.codegen.kernels.active_contacts import ActiveContacts
 from gauss.codegen.kernels.arrays import Routine, Value
-from gauss.codegen.kernels.asleep import pushes_asleep
 from gauss.codegen.kernels.contact_modes import ContactModes
 from gauss.codegen.kernels.contact_rows import ContactRows
 from gauss.codegen.kernels.contact_solver import ContactSolver
@@ -42,6 +41,8 @@ class StepFunctions:
         rate.
     to_close : Function
         (gap, its second derivative, time) → the gap that would be left if its rate were zero then.
+    rest_steps : float
+        Steps: a gap that closes no faster than by its acceleration in so many is at rest, without impact.
     """
 
     place: Function
@@ -50,6 +51,7 @@ class StepFunctions:
     plastic: Function
     elastic: Function
     to_close: Function
+    rest_steps: float
 
 
 class _StepWriter:
@@ -61,7 +63,7 @@ class _StepWriter:
         self.status = memory.table("status")
         self.free, self.rows, self.sliding = FreeMotion(memory), ContactRows(memory), SlidingContacts(memory)
         self.contacts = ActiveContacts(memory, self.free, self.rows, functions, solver)
-        self.modes = ContactModes(memory, functions.impact)
+        self.modes = ContactModes(memory, functions.impact, functions.rest_steps)
 
     def write(self) -> ir.Function:
         r, s = self.r, self.at.settings
@@ -94,7 +96,7 @@ class _StepWriter:
         with r.when(s["share"] > 0.0):
             push = self.rows.products(m + self.at.n["g"], self.at["a"])
             with r.each(m + self.at.n["g"]) as i:
-                speed = r.absolute(push[i] + self.at["bias"][i]) * 2.0 * s["h"] + s["rest"]
+                speed = r.absolute(push[i] + self.at["bias"][i]) * self.functions.rest_steps * s["h"] + s["rest"]
                 (hit,) = r.inline(self.functions.impact, self.at["gap"][i], self.at["rate"][i], speed, s["h"], s["share"])
                 found[0] = r.maximum(hit, found[0])
         with r.when(found[0] > 0.0):
@@ -104,7 +106,7 @@ class _StepWriter:
     def _wakes(self, m: Value) -> Value:
         """Whether a contact pushes a body asleep."""
         asleep = self.at.table("asleep")
-        return pushes_asleep(self.at, m, lambda c: self.at["force"][c], lambda body: asleep[body] > 0)
+        return self.at.pushes_asleep(m, lambda c: self.at["force"][c], lambda body: asleep[body] > 0)
 
     def _finish(self, m: Value, rows: Value, speed: Value):
         """State at the end of the step, power, and the forces to be known in the next step."""

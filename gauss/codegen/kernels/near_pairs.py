@@ -14,18 +14,12 @@ from gauss.codegen import INTEGER, POINTER, Function, machine
 from gauss.codegen.kernels.arrays import INTEGERS, Array, Routine, Value
 from gauss.codegen.kernels.broad_phase import GridWriter
 
-PART = (
-    18  # own rotation (9), centre (3), sizes (4) of a part in its body, radius of the ball around it, address of its record
-)
+# Own rotation (9), centre (3), sizes (4) of a part in its body, radius of the ball around it, address of its record.
+PART = 18
 BALL, RECORD = 16, 17  # places of the last two; records are those of :mod:`gauss.codegen.kernels.hull_points`
 MOVED = 31  # pose and velocities (24), sizes (4), centre of mass of the body (3)
 DISTANCE_INPUTS = 33  # rotation, centre and sizes of two shapes, length of the scene
-REACH, RECORDS, PATCH, HULL_INPUTS = (
-    33,
-    34,
-    36,
-    37,
-)  # places behind these, for hulls: two records, address of points; their end
+REACH, RECORDS, PATCH, HULL_INPUTS = 33, 34, 36, 37  # places behind these, of hulls: two records, address of points; the end
 FAR_AWAY, UNKNOWN = 1e300, -1e300  # distances: of a point that a patch has not; of a pair that is left to the other kernel
 ROW_INPUTS = 2 * MOVED + 4  # columns of two shapes, length of the scene, signs
 ROW = 55  # distance, point, rows of both bodies, biases

@@ -7,7 +7,7 @@ from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, Function, NativeFunction, Writer, counted_loop, intrinsic
 from gauss.codegen.kernels.fixed_point import CONVERGED_RELATIVE
-from gauss.codegen.kernels.lapack import lapack_routine
+from gauss.codegen.kernels.lapack import WHOLE, lapack_routine
 
 DIFFERENCE_RELATIVE = 1.5e-8  # difference step relative to |x| + scale: √ε
 SLOW_CONTRACTION = 0.5  # ratio of successive changes above which the Jacobian is updated
@@ -68,10 +68,9 @@ class _NewtonWriter:
         self.x, self.r, self.moved, self.delta = (room(size) for size in (len(newton.inputs), self.n, self.n, self.n))
         self.matrix = room(self.n**2)
         self.before, self.change, self.calls, self.matrices, self.count = (room(1) for _ in range(5))
-        whole = ir.IntType(32)
-        self.pivots, self.info = b.alloca(whole, INTEGER(self.n)), b.alloca(whole)
-        self.order, self.one, self.letter = b.alloca(whole), b.alloca(whole), b.alloca(ir.IntType(8))
-        for place, value in ((self.order, whole(self.n)), (self.one, whole(1)), (self.letter, ir.IntType(8)(ord("N")))):
+        self.pivots, self.info = b.alloca(WHOLE, INTEGER(self.n)), b.alloca(WHOLE)
+        self.order, self.one, self.letter = b.alloca(WHOLE), b.alloca(WHOLE), b.alloca(ir.IntType(8))
+        for place, value in ((self.order, WHOLE(self.n)), (self.one, WHOLE(1)), (self.letter, ir.IntType(8)(ord("N")))):
             b.store(value, place)
 
     def write(self):
@@ -86,10 +85,8 @@ class _NewtonWriter:
         b.branch(matrix)
         b.position_at_end(matrix)
         self._differences()
-        b.call(
-            lapack_routine(self.body.module, "dgetrf"),
-            [self.order, self.order, self.matrix, self.order, self.pivots, self.info],
-        )
+        factorise = lapack_routine(self.body.module, "dgetrf")
+        b.call(factorise, [self.order, self.order, self.matrix, self.order, self.pivots, self.info])
         self._add(self.matrices)
         b.store(_number(np.inf), self.before)
         b.branch(iterate)

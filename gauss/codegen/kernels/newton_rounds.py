@@ -16,29 +16,17 @@ LARGEST_RESIDUAL_SUM = 1e300  # sum of the residuals above which they count as i
 
 
 class Round(NamedTuple):
-    """Round of Newton steps.
+    """Round of Newton steps."""
 
-    Attributes
-    ----------
-    sweeps : int
-        Gauss–Seidel sweeps before it.
-    regularisation : float
-        ε, relative to the diagonal of the Delassus matrix: large values change the forces less by a step, and converge
-        linearly where small ones may cycle.
-    steps : int
-        Newton steps.
-    decay : float
-        Factor of the ε of a contact in each step in which its mode (open, sticking, slipping) stays; a change sets ε back.
-        So contacts that cycle move little, and the others as far as without regularisation. 1 keeps ε.
-    above, below : float
-        Residuals, in units of the target, between which the round is made.
-    """
-
-    sweeps: int
+    sweeps: int  # Gauss–Seidel sweeps before it
+    # ε, relative to the diagonal of the Delassus matrix: large values change the forces less by a step, and converge
+    # linearly where small ones may cycle
     regularisation: float
-    steps: int
+    steps: int  # Newton steps
+    # Factor of the ε of a contact in each step in which its mode (open, sticking, slipping) stays; a change sets ε back. So
+    # contacts that cycle move little, and the others as far as without regularisation. 1 keeps ε.
     decay: float = 1.0
-    above: float = 1.0
+    above: float = 1.0  # above, below: residuals, in units of the target, between which the round is made
     below: float = np.inf
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import (
-    DOUBLE,
     INTEGER,
     LINE,
+    POINTER,
     Buffers,
     Function,
     Lanes,
@@ -31,35 +31,19 @@ from gauss.codegen.text_builder import TextBuilder
 
 
 class RowCode:
-    """Emitter of a function (in, in_stride, out, out_stride) whose arrays are contiguous.
-
-    Parameters
-    ----------
-    writer : Writer
-        Writer of the module.
-    function : llvmlite.ir.Function
-        The function, without code.
-    width : int
-        Number of motions at a time.
-
-    Attributes
-    ----------
-    given, found : llvmlite.ir.Value
-        Inputs and outputs.
-    is_batch : bool
-        Whether it is a loop over a batch, one motion per SIMD lane or in a thread of a GPU.
-    """
+    """Emitter of a function (in, in_stride, out, out_stride) whose arrays are contiguous, for so many motions at a time."""
 
     def __init__(self, writer: Writer, function: ir.Function, width: int):
         self.writer, self.function, self.width = writer, function, width
+        # a loop over a batch: one motion per SIMD lane, or in a thread of a GPU
         self.is_batch = width == vector_width(writer.module)
         self.given, _, self.found, _ = self.function.args
         self.b = TextBuilder(self.function.append_basic_block("entry"))
-        self.motions, self.buffers = Lanes(writer.module, width, self.b), Buffers(self.b, width)
+        self.motions, self.buffers = Lanes(writer.module, width, self.b), Buffers(self.b)
 
     def room(self, size: int):
         """Buffer of ``size`` numbers."""
-        return self.buffers.room(DOUBLE, size * self.width, LINE)
+        return self.b.bitcast(self.buffers.room(self.motions.kind, size, LINE), POINTER)
 
     def at(self, pointer, offset):
         """Pointer to an entry."""

@@ -17,32 +17,14 @@ BYTE, ENTRY = ir.IntType(8), ir.IntType(32)
 
 
 class RecordedSections(NamedTuple):
-    """Recorded calls, and the vectors in their memory.
-
-    Attributes
-    ----------
-    calls : RecordedCalls
-        Sections of calls, with the initial content of the memory.
-    vectors : dict
-        Vectors by name.
-    """
+    """Recorded calls, and the vectors in their memory."""
 
     calls: RecordedCalls
     vectors: dict[str, Vector]
 
 
 class SectionCode:
-    """Emitter of sections within a function.
-
-    Parameters
-    ----------
-    code : RowCode
-        Emitter of the function.
-    sections : RecordedSections
-        The sections.
-    memory : llvmlite.ir.Value, optional
-        Their memory; a new one of the function when not given.
-    """
+    """Emitter of sections within a function, in a memory that is new where none is given."""
 
     def __init__(self, code: RowCode, sections: RecordedSections, memory=None):
         self.code, self.calls, self.vectors = code, sections.calls, sections.vectors

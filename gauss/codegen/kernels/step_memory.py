@@ -12,7 +12,7 @@ from llvmlite import ir
 from gauss.codegen import INTEGER, POINTER
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 from gauss.codegen.kernels.contact_solver import room_of
-from gauss.codegen.kernels.near_pairs import INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS
+from gauss.codegen.kernels.near_pairs import BODY, INTEGERS, NEAR_INTEGERS, NEAR_NUMBERS, parts_of
 
 SIZES = (
     *("n_q", "n_v", "r", "links", "bodies", "g", "s", "entries", "flat", "parts", "pairs", "capacity", "loops", "input"),
@@ -111,19 +111,11 @@ def slots(n: dict[str, int]) -> dict[str, int]:
 
 
 class MemoryLayout(NamedTuple):
-    """Names of what a step works on.
+    """Names of what a step works on."""
 
-    Attributes
-    ----------
-    sizes, addresses : tuple of str
-        Sizes of a scene, and arrays and kernels that are reached by their address.
-    slots : callable
-        Lengths of the arrays of working memory by name, for the sizes of a scene.
-    """
-
-    sizes: tuple[str, ...]
-    addresses: tuple[str, ...]
-    slots: Callable[[dict[str, int]], dict[str, int]]
+    sizes: tuple[str, ...]  # sizes of a scene
+    addresses: tuple[str, ...]  # arrays and kernels that are reached by their address
+    slots: Callable[[dict[str, int]], dict[str, int]]  # sizes of a scene → lengths of the arrays of working memory by name
 
 
 MECHANISM = MemoryLayout(SIZES, ADDRESSES, slots)
@@ -174,3 +166,18 @@ class StepMemory:
     def dot(self, one: Array, other: Array, count) -> Value:
         """Scalar product."""
         return self.r.sum(count, lambda i: one[i] * other[i])
+
+    def pushes_asleep(self, m: Value, force: Callable[[Value], Value], sleeps: Callable[[Value], Value]) -> Value:
+        """1 if one of m near contacts pushes a body asleep: such a step is not finished, its island is woken first.
+
+        Parameters
+        ----------
+        force, sleeps : callable
+            Normal force of a contact; whether a body sleeps, by its column.
+        """
+        r, woken, found, body = self.r, self.r.variable(0, INTEGER), self.table("found"), self.table("body")
+        with r.when(self.n["sleepers"] > 0), r.each(m) as c, r.when(force(c) > 0.0):
+            for part in parts_of(found[c * 2], self.n["parts"]):
+                with r.when(sleeps(body[part * BODY])):
+                    woken[0] = 1
+        return woken[0]

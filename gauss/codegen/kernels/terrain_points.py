@@ -19,8 +19,7 @@ from gauss.codegen.kernels.hull_patch import HIGH, ROOM, write_patch
 from gauss.codegen.kernels.hull_points import POSE, Hull, put, vector, write_nearest
 from gauss.codegen.kernels.near_pairs import FAR_AWAY, HULL_INPUTS, PATCH, REACH, RECORDS, UNKNOWN
 from gauss.codegen.kernels.patch_rows import POINT
-from gauss.codegen.kernels.terrain_choice import write_choice
-from gauss.codegen.kernels.terrain_outline import MOST_RAW
+from gauss.codegen.kernels.terrain_choice import MOST_RAW, write_choice
 from gauss.codegen.kernels.terrain_prism import Prism
 from gauss.codegen.kernels.terrain_surface import Surface, Triangle, TriangleMemory
 

@@ -168,12 +168,8 @@ class TriangleMemory:
 
     def __init__(self, r: Routine, surface: Surface, laws: tuple[float, float]):
         self.r, self.surface = r, surface
-        self.vertices, self.points, self.given, self.result = (
-            r.buffer(6, INTEGER),
-            r.buffer(12),
-            r.buffer(6),
-            r.buffer(1, INTEGER),
-        )
+        self.vertices, self.points = r.buffer(6, INTEGER), r.buffer(12)
+        self.given, self.result = r.buffer(6), r.buffer(1, INTEGER)
         name = name_with("has_normal", *laws)
         self.function = r.module.globals.get(name) or _NormalWriter(r.module, name, *laws).write()
 

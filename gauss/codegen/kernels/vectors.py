@@ -1,8 +1,9 @@
-"""TwistRows of eight doubles in machine code: vectors of twists, and blocks (6, 6) of matrices with rows of that length."""
+"""Rows of eight doubles in machine code: vectors of twists, and blocks (6, 6) of matrices with rows of that length."""
 
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, intrinsic
+from gauss.codegen import DOUBLE, intrinsic
+from gauss.codegen.ir_module import LANE, broadcast
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 
 WIDTH = 8  # doubles of a row, of which SIX count; the rest is zero
@@ -37,9 +38,7 @@ class TwistRows:
 
     def all(self, x: Value) -> ir.Value:
         """Row of equal entries."""
-        one = self.b.insert_element(ir.Constant(ROW, ir.Undefined), x.value, ir.Constant(ir.IntType(32), 0))
-        mask = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
-        return self.b.shuffle_vector(one, ir.Constant(ROW, ir.Undefined), mask)
+        return broadcast(self.b, x.value, WIDTH)
 
     def added(self, row: ir.Value, factors, rows) -> ir.Value:
         """``row`` + Σ factor · row, one fused operation each; factors are doubles."""
@@ -53,11 +52,11 @@ class TwistRows:
 
     def entry(self, row: ir.Value, k: int) -> Value:
         """Entry of a row."""
-        return Value(self.b, self.b.extract_element(row, ir.Constant(ir.IntType(32), k)))
+        return Value(self.b, self.b.extract_element(row, LANE(k)))
 
     def with_entry(self, row: ir.Value, k: int, x: float) -> ir.Value:
         """Row with another constant as one entry."""
-        return self.b.insert_element(row, ir.Constant(DOUBLE, x), ir.Constant(ir.IntType(32), k))
+        return self.b.insert_element(row, ir.Constant(DOUBLE, x), LANE(k))
 
 
 def write_product(r: Routine, sign: float, adds: bool) -> ir.Function:
@@ -96,6 +95,3 @@ def write_apply(r: Routine, sign: float) -> ir.Function:
             total = total + A[i * WIDTH + k] * given[k]
         y[i] = y[i] + total if sign > 0.0 else y[i] - total
     return r.done()
-
-
-__all__ = ["BLOCK", "INTEGER", "SIX", "WIDTH", "TwistRows", "write_apply", "write_inverse", "write_product"]

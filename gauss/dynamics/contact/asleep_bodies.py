@@ -8,12 +8,11 @@ from copy import copy
 
 import numpy as np
 
-from gauss.dynamics.contact.block_contact_laws import block_contact_laws
-from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, first_memory
+from gauss.dynamics.contact.compiled_free_body_step import FreeBodyMemory, KnownContacts
 from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
-from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.step_parts import FreeBodyStep
 from gauss.linked_groups import linked_groups
 from gauss.system import State
 
@@ -99,7 +98,7 @@ class BodySleepers:
         made.table.law[np.ix_(stands, stands)] = 0
         made.detection = NearDetection(made.table, column.size, whole.system.scale.length, whole.detection.code)
         made.record, made.graph = ModeRecord(len(made.elements)), None
-        made.memory = first_memory(made, block_contact_laws(), made.settings)
+        made.memory = FreeBodyMemory(made)
         made.forget()
         return made
 

@@ -14,8 +14,8 @@ from gauss.dynamics.contact.contact_changes import ModeRecord
 from gauss.dynamics.contact.coordinate_groups import bodies_of_groups, coordinate_groups
 from gauss.dynamics.contact.mechanism_kernels import MechanismKernels
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
-from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
 from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.step_parts import MechanismStep
 from gauss.linked_groups import linked_groups
 from gauss.system import State
 

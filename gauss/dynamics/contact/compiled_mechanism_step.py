@@ -12,7 +12,7 @@ from gauss.codegen.kernels.step_memory import MECHANISM, PATTERNS, RESULTS, STEP
 from gauss.dynamics.contact.compiled_step_memory import CompiledStepMemory, LoopOfSteps
 from gauss.dynamics.contact.contact_step import contact_solver
 from gauss.dynamics.contact.free_bodies import place_function
-from gauss.dynamics.contact.gap_laws import laws_of_gaps
+from gauss.dynamics.contact.gap_laws import REST_STEPS, laws_of_gaps
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms
 from gauss.dynamics.contact.near_detection import FIRST_ROOM
 from gauss.dynamics.contact.paradox import SLIDING as SLIDING_SPEED
@@ -186,6 +186,6 @@ def compiled_mechanism_step() -> CompiledMechanismStep:
     """Machine code, made once on a machine."""
 
     def make() -> CompiledMechanismStep:
-        return CompiledMechanismStep(StepFunctions(place_function(), contact_solver(), *laws_of_gaps()))
+        return CompiledMechanismStep(StepFunctions(place_function(), contact_solver(), *laws_of_gaps(), REST_STEPS))
 
     return from_disk((CompiledMechanismStep,), make)

@@ -18,7 +18,7 @@ LEAST_SIZE = 1e-300  # friction force: away from 0/0
 def on_cones(normal: np.ndarray, across: np.ndarray, friction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Projection of normal (m,) and friction forces (m, 2) on the cones of m coefficients of friction."""
     size = np.hypot(*across.T)
-    outside = size > friction * normal  # on the surface of the cone, or at its tip
+    outside = (size > friction * normal) | (normal < 0.0)  # its projection is on the surface of the cone, or at its tip
     height = np.maximum(0.0, (normal + friction * size) / (1.0 + friction * friction))
     share = friction * height / np.maximum(size, LEAST_SIZE)
     return np.where(outside, height, normal), np.where(outside[:, None], share[:, None] * across, across)

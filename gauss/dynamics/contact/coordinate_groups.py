@@ -18,27 +18,13 @@ from gauss.system import System
 
 
 class CoordinateGroups(NamedTuple):
-    """Groups of one system, numbered from 0.
+    """Groups of one system, numbered from 0."""
 
-    Attributes
-    ----------
-    of_rate : ndarray of int, shape (n_v,)
-        Group of each rate.
-    of_carrier : ndarray of int, shape (k,)
-        Group of each body that carries shapes; −1 of those that no rate moves.
-    of_row : ndarray of int, shape (g + s,)
-        Group of each stop, rope and set-valued element; −1 of those that act on no rate.
-    timed : ndarray of bool, shape (count,)
-        Groups that depend on time: by a law of a load, or a prescribed motion.
-    inputs : ndarray of bool, shape (n_u, count)
-        Groups that each input acts on.
-    """
-
-    of_rate: np.ndarray
-    of_carrier: np.ndarray
-    of_row: np.ndarray
-    timed: np.ndarray
-    inputs: np.ndarray
+    of_rate: np.ndarray  # (n_v,) group of each rate
+    of_carrier: np.ndarray  # (k,) group of each body that carries shapes; −1 of those that no rate moves
+    of_row: np.ndarray  # (g + s,) group of each stop, rope and set-valued element; −1 of those that act on no rate
+    timed: np.ndarray  # (count,) whether each depends on time: by a law of a load, or a prescribed motion
+    inputs: np.ndarray  # (n_u, count) whether each input acts on each
 
 
 class _Dependence(NamedTuple):

@@ -31,6 +31,8 @@ class ForceResponses:
     ----------
     backend : str
         Backend; "auto" for machine code where possible.
+    laws : Laws, optional
+        Loads of the system; as they are now when not given.
 
     Attributes
     ----------
@@ -38,10 +40,10 @@ class ForceResponses:
         Engine.
     """
 
-    def __init__(self, system: System, backend: str | Backend | type = "auto"):
+    def __init__(self, system: System, backend: str | Backend | type = "auto", laws: Laws | None = None):
         self.system = system
         self.solver: CompiledEngine | CertifiedEngine = CertifiedEngine(backend)
-        laws = Laws(system)
+        laws = Laws(system) if laws is None else laws
         plan = RESPONSES.plan(Question(system, laws, backend))
         if plan.dynamics == "tree recursion":
             self.solver = CompiledEngine(system, tree_recursion_kernels(system), LoadForces(system, (), laws))

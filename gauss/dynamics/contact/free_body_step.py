@@ -12,23 +12,21 @@ from functools import cache
 import numpy as np
 
 from gauss.codegen.kernels import BlockContactSolver, ContactGraph, NearPairs
-from gauss.dynamics.contact.block_contact_laws import block_contact_laws
-from gauss.dynamics.contact.compiled_free_body_step import KnownContacts, compiled_free_body_step, first_memory
+from gauss.dynamics.contact.compiled_free_body_step import FreeBodyMemory, KnownContacts, compiled_free_body_step
 from gauss.dynamics.contact.compiled_step_memory import LoopOfSteps
 from gauss.dynamics.contact.contact_changes import ModeRecord, ModesOfStep, modes_of_contacts
 from gauss.dynamics.contact.contact_step import LAW_TOLERANCE, ContactLaws, ContactProblem
 from gauss.dynamics.contact.convex_relaxation import CONVEX_ERROR, relaxed_impulses
 from gauss.dynamics.contact.free_bodies import constants, free_body_kernels
-from gauss.dynamics.contact.free_body_step_parts import BegunStep, FreeBodyStep
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
 from gauss.dynamics.contact.impact import resting
 from gauss.dynamics.contact.moreau_step import MIDPOINT
-from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
-from gauss.dynamics.contact.near_detection import NearDetection
+from gauss.dynamics.contact.near_detection import NearContacts, NearDetection, confirmed
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP, penetration_error
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.position_projection import ACCEPTED_DEPTH, depth_after, without_penetration
 from gauss.dynamics.contact.shape_table import ShapeTable
+from gauss.dynamics.contact.step_parts import BegunStep, FreeBodyStep
 from gauss.errors import SimulationError
 from gauss.system import State, System
 
@@ -65,25 +63,26 @@ class FreeBodyStepper:
         self.n = len(self.moving)
         self.gravity = np.repeat(np.array(system.scene.gravity, dtype=float)[:, None], self.n, axis=1)
         self._index_bodies()
-        code = NearPairs(compiled_free_body_step(block_contact_laws()).code)
+        code = NearPairs(compiled_free_body_step().code)
         self.detection = NearDetection(self.table, self.n + self.fixed.shape[1], system.scale.length, code)
-        self.reach = self._reaches()
+        reach = np.zeros(self.n + self.fixed.shape[1])
+        np.maximum.at(reach, self.table.body, self.table.length)
+        self.reach = reach[: self.n]  # farthest point of the shapes of each moving body from its centre of mass [m]
         self.shares = (0.0,) if self.table.restitution.any() else (MIDPOINT, 0.0)
         self.coefficients = np.unique(self.table.restitution)
         self.elements = [contact.name for contact in self.table.contacts]
         self.first_set_valued, self.record = len(self.elements), ModeRecord(len(self.elements))
         self.graph: ContactGraph | None = None
-        unit = system.scale.length / system.scale.time
         self.settings = {
             "margin": REACH_MARGIN,
-            "unit": unit,
+            "unit": system.scale.length / system.scale.time,
             "tolerance": LAW_TOLERANCE,
             "unsolved": UNSOLVED,
             "removal": removal,
             "curved": MOST_CURVED / min(self.reach[self.reach > 0.0], default=np.inf),
             "accepted": np.inf if removal else ACCEPTED_DEPTH * system.scale.length,
         }
-        self.memory = first_memory(self, block_contact_laws(), self.settings)
+        self.memory = FreeBodyMemory(self)
         self.forget()
 
     def _index_bodies(self):
@@ -101,12 +100,6 @@ class FreeBodyStepper:
         self.table.body = np.array(body, dtype=np.int64)
         still = np.flatnonzero(self.table.body >= self.n)
         self.table.law[np.ix_(still, still)] = 0  # bodies that stand still need no forces between them
-
-    def _reaches(self) -> np.ndarray:
-        """Farthest point (n,) of the shapes of each moving body from its centre of mass [m]."""
-        found = np.zeros(self.fixed.shape[1] + self.n)
-        np.maximum.at(found, self.table.body, self.table.length)
-        return found[: self.n]
 
     inputs = np.zeros(0)
     asleep = np.zeros(0, dtype=np.int64)  # columns of bodies asleep, as of the stepper of all
@@ -136,10 +129,6 @@ class FreeBodyStepper:
         self.detection.expect(found.key.size)  # a new stepper that continues a motion has met no contacts yet
         self.memory = self.memory.fitting()
         self.memory.known = found
-
-    def run(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
-        """Steps from a state and its work to some times by machine code, as of :meth:`steps_from`."""
-        return self.steps_from(np.concatenate([[state.t], state.q, state.v, work]), ends, rows)
 
     def steps_from(self, begin: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
         """Steps by machine code, as of :meth:`gauss.dynamics.contact.compiled_step_memory.CompiledStepMemory.advance`."""
@@ -250,7 +239,7 @@ class FreeBodyStepper:
         bodies = np.where(near.bodies < self.n, near.bodies, -1)
         if self.graph is None or not np.array_equal(self.graph.bodies, bodies):
             self.graph = block_contact_solver().graph(self.n, bodies)
-        unit = self.system.scale.length / self.system.scale.time
+        unit = self.settings["unit"]
         scale = unit + np.abs(b).max()
         start, friction = h * self._start(near), self.table.friction[near.law]
         f, added, (left, *_) = self.graph.solve(near.J, begun.mass, b, friction, start, LAW_TOLERANCE * scale)
@@ -269,7 +258,7 @@ class FreeBodyStepper:
     def pushed_apart(self, near: NearContacts, begun: BegunStep, b: np.ndarray) -> np.ndarray | None:
         """Velocities (n, 6) that contacts without friction add to relative velocities b (m, 3); None if none are found."""
         graph = block_contact_solver().graph(self.n, np.where(near.bodies < self.n, near.bodies, -1))
-        scale, m = self.system.scale.length / self.system.scale.time + np.abs(b).max(), near.gap.size
+        scale, m = self.settings["unit"] + np.abs(b).max(), near.gap.size
         _, added, (left, *_) = graph.solve(near.J, begun.mass, b, np.zeros(m), np.zeros((m, 3)), LAW_TOLERANCE * scale)
         return added if left <= UNSOLVED * scale else None
 
@@ -333,13 +322,7 @@ class FreeBodyStepper:
 
     def _start(self, near: NearContacts) -> np.ndarray:
         """Forces (m, 3) of the last step; zero of new contacts."""
-        keys, forces, _ = self.known
-        found = np.zeros((near.gap.size, 3))
-        if keys.size:
-            places = np.minimum(np.searchsorted(keys, near.key), keys.size - 1)
-            same = keys[places] == near.key
-            found[same] = forces[places[same]]
-        return found
+        return near.known_forces(self.known.key, self.known.force)
 
     def _keep(self, near: NearContacts, force: np.ndarray, expected: np.ndarray):
         order = np.argsort(near.key)
@@ -373,4 +356,4 @@ def rates(near: NearContacts, twists: np.ndarray) -> np.ndarray:
 @cache
 def block_contact_solver() -> BlockContactSolver:
     """Machine code of the contact problem: that of the step."""
-    return BlockContactSolver(compiled_free_body_step(block_contact_laws()).code)
+    return BlockContactSolver(compiled_free_body_step().code)

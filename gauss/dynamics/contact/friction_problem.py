@@ -8,16 +8,26 @@ W is the Delassus operator, which does not depend on the step but by stiff dampi
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from gauss.dynamics.contact.cone_solvers import CONE_SOLVERS, ConeSolver, coulomb_by_cones
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem
-from gauss.errors import BackendError, SimulationError, did_you_mean
+from gauss.dynamics.contact.convex_relaxation import on_cones
+from gauss.errors import BackendError, SimulationError, did_you_mean, extra
 from gauss.shapes import Shaped
 
 OWN = "gauss"  # name of our solver
+MOST_PROGRAMMES = 300  # of the fixed point
+FIXED = 1e-10  # relative: change of the tangential rates that ends it
+ACCURACY = 1e-12  # of a programme
+
+
+class ConeSolver(Protocol):
+    """Solver of one programme."""
+
+    def __call__(self, W: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
+        """Impulses (3 m,) that minimise ½ rᵀ W r + qᵀ r over the friction cones."""
 
 
 class FrictionProblem(NamedTuple):
@@ -48,14 +58,12 @@ class FrictionProblem(NamedTuple):
         r : ndarray, shape (3 m,)
             Impulses [N s].
         """
-        u, worst = self.W @ r + self.q, 0.0
-        for k, mu in enumerate(self.mu):
-            mine = slice(3 * k, 3 * k + 3)
-            size = max(self.W.diagonal()[mine].max(), np.finfo(float).tiny)
-            moved = r[mine] - u[mine] / size
-            moved[0] -= mu * np.hypot(*u[mine][1:]) / size
-            worst = max(worst, size * float(np.linalg.norm(r[mine] - on_cone(moved, mu))))
-        return worst
+        r, u = r.reshape(-1, 3), (self.W @ r + self.q).reshape(-1, 3)
+        size = np.maximum(self.W.diagonal().reshape(-1, 3).max(axis=1), np.finfo(float).tiny)[:, None]
+        moved = r - u / size
+        moved[:, 0] -= self.mu * np.hypot(*u[:, 1:].T) / size[:, 0]
+        found = np.column_stack(on_cones(moved[:, 0], moved[:, 1:], self.mu))
+        return float((size[:, 0] * np.linalg.norm(r - found, axis=1)).max(initial=0.0))
 
     def solve(self, solver: str | ConeSolver | Callable = OWN) -> Shaped[np.ndarray, " 3*m"]:
         """Impulses (3 m,) [N s].
@@ -96,11 +104,65 @@ class FrictionProblem(NamedTuple):
         return r
 
 
-def on_cone(r: np.ndarray, mu: float) -> np.ndarray:
-    """Projection of an impulse (3,) on its friction cone; without friction, on the normal."""
-    size = float(np.hypot(r[1], r[2]))
-    if r[0] >= 0.0 and size <= mu * r[0]:
-        return r
-    height = max(0.0, (r[0] + mu * size) / (1.0 + mu * mu))
-    across = mu * height / size if size else 0.0
-    return np.array([height, across * r[1], across * r[2]])
+def coulomb_by_cones(W: np.ndarray, q: np.ndarray, mu: np.ndarray, solver: ConeSolver) -> np.ndarray:
+    """Impulses (3 m,) by Coulomb's law: the fixed point of programmes whose normal rates are raised by μ ‖u_T‖.
+
+    SimulationError if it is not found.
+    """
+    raised, size = np.zeros(mu.size), 1.0 + np.abs(q).max(initial=0.0)
+    for _ in range(MOST_PROGRAMMES):
+        given = q.copy()
+        given[::3] += raised
+        r = np.asarray(solver(W, given, mu), dtype=float)
+        u = (W @ r + q).reshape(-1, 3)
+        before, raised = raised, mu * np.hypot(u[:, 1], u[:, 2])
+        if np.abs(raised - before).max(initial=0.0) <= FIXED * size:
+            return r
+    raise SimulationError(f"{MOST_PROGRAMMES} cone programmes do not lead to a fixed point of Coulomb's law.")
+
+
+def _cones(mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of r ≥ 0 of normals, and of (μ r_N, r_T) of contacts."""
+    normals = -np.eye(3 * mu.size)[::3]
+    return normals, -np.diag(np.stack([mu, np.ones_like(mu), np.ones_like(mu)], axis=1).ravel())
+
+
+def _clarabel(W: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
+    with extra():
+        import clarabel
+    from scipy.sparse import csc_matrix, triu
+
+    normals, cones = _cones(mu)
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = ACCURACY
+    kinds = [clarabel.NonnegativeConeT(mu.size), *[clarabel.SecondOrderConeT(3)] * mu.size]
+    rows = csc_matrix(np.concatenate([normals, cones]))
+    found = clarabel.DefaultSolver(
+        triu(csc_matrix(W), format="csc"), q, rows, np.zeros(4 * mu.size), kinds, settings
+    ).solve()
+    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+        raise SimulationError(f"clarabel: {found.status}.")
+    return np.array(found.x)
+
+
+def _scs(W: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
+    with extra():
+        import scs
+    from scipy.sparse import csc_matrix, triu
+
+    normals, cones = _cones(mu)
+    data = {
+        "P": triu(csc_matrix(W), format="csc"),
+        "A": csc_matrix(np.concatenate([normals, cones])),
+        "b": np.zeros(4 * mu.size),
+        "c": q,
+    }
+    kinds = {"l": mu.size, "q": [3] * mu.size}
+    found = scs.SCS(data, kinds, verbose=False, eps_abs=ACCURACY, eps_rel=ACCURACY).solve()
+    if found["info"]["status"] not in ("solved", "solved (inaccurate - reached max_iters)"):
+        raise SimulationError(f"scs: {found['info']['status']}.")
+    return found["x"]
+
+
+CONE_SOLVERS: dict[str, Callable] = {"clarabel": _clarabel, "scs": _scs}

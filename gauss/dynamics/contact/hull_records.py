@@ -42,11 +42,7 @@ class HullRecord:
         counts = len(self.vertices) if is_small else 0, len(self.normals)
         self.record = np.array([*counts, *(array.ctypes.data for array in arrays)], dtype=np.int64)
         assert self.record.size == RECORD
-
-    @property
-    def address(self) -> int:
-        """Address of the record."""
-        return self.record.ctypes.data
+        self.address = self.record.ctypes.data
 
 
 class TerrainRecord:
@@ -68,11 +64,7 @@ class TerrainRecord:
         self.record = np.array([*self.heights.shape, *addresses], dtype=np.int64)
         assert self.record.size == TERRAIN_RECORD
         assert self.numbers.size == len(NUMBERS)
-
-    @property
-    def address(self) -> int:
-        """Address of the record."""
-        return self.record.ctypes.data
+        self.address = self.record.ctypes.data
 
 
 def shape_records(table: ShapeTable) -> list[HullRecord | TerrainRecord | None]:

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import CallingKernel, Kernel, as_number, forward, jacobian, write
-from gauss.dynamics.called_program import called_loads
 from gauss.dynamics.inputs import input_loads
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
@@ -23,6 +22,7 @@ from gauss.dynamics.load_receiver import LoadReceiver, received
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.loop_joints import LoopJoint
 from gauss.dynamics.mechanism import loop_constraints
+from gauss.dynamics.programs import called_loads
 from gauss.dynamics.state_terms import StateTerms
 from gauss.dynamics.store import cached_on_disk
 from gauss.rotations import cross
@@ -88,40 +88,21 @@ class SparseArrays:
 
 
 class MechanismTerms(NamedTuple):
-    """Terms of one state.
+    """Terms of one state."""
 
-    Attributes
-    ----------
-    M : ndarray, shape (n_v, n_v)
-        Mass matrix.
-    tau, power : ndarray, shape (n_v,), (3,)
-        Generalised forces less the bias forces, τ − h; power of drives, of forces on bodies, and of dissipation [W].
-    bodies : ndarray, shape (24, k + 1)
-        Poses, velocities and their rates with q̈ = 0 of the bodies that carry shapes, and of the ground.
-    J : ndarray, shape (k + 1, 6, n_v)
-        Their Jacobians, (angular velocity, velocity of the centre of mass) in world axes.
-    gap, rate, K, bias : ndarray, shape (g,), (r,), (r, n_v), (r,)
-        Gap functions of unilateral constraints that are no contacts of shapes; rates of these and of set-valued elements,
-        their Jacobian, and their derivatives with q̈ = 0.
-    G, gamma : ndarray, shape (l, n_v), (l,)
-        Loop constraints G q̈ = γ.
-    B, beta : ndarray, shape (n_v, n_v), (n_v,)
-        Rates v = B v of all joints by those of the spanning tree, and accelerations of the others where these are zero.
-    """
-
-    M: np.ndarray
-    tau: np.ndarray
-    power: np.ndarray
-    bodies: np.ndarray
-    J: np.ndarray
-    gap: np.ndarray
-    rate: np.ndarray
-    K: np.ndarray
-    bias: np.ndarray
-    G: np.ndarray
+    M: np.ndarray  # (n_v, n_v) mass matrix
+    tau: np.ndarray  # (n_v,) generalised forces less the bias forces, τ − h
+    power: np.ndarray  # (3,) of drives, of forces on bodies, and of dissipation [W]
+    bodies: np.ndarray  # (24, k + 1) poses, velocities, their rates with q̈ = 0 of bodies that carry shapes; the ground last
+    J: np.ndarray  # (k + 1, 6, n_v) their Jacobians, (angular velocity, velocity of the centre of mass) in world axes
+    gap: np.ndarray  # (g,) gap functions of unilateral constraints that are no contacts of shapes
+    rate: np.ndarray  # (r,) rates of these and of set-valued elements
+    K: np.ndarray  # (r, n_v) their Jacobian
+    bias: np.ndarray  # (r,) their derivatives with q̈ = 0
+    G: np.ndarray  # G (l, n_v), gamma (l,): loop constraints G q̈ = γ
     gamma: np.ndarray
-    B: np.ndarray
-    beta: np.ndarray
+    B: np.ndarray  # (n_v, n_v) rates v = B v of all joints by those of the spanning tree
+    beta: np.ndarray  # (n_v,) accelerations of the others where those of the tree are zero
 
 
 class TracedMechanism:

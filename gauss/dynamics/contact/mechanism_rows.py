@@ -15,7 +15,7 @@ from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
 from gauss.dynamics.contact.contact_changes import ModesOfStep
 from gauss.dynamics.contact.contact_step import ContactLaws
 from gauss.dynamics.contact.mechanism_kernels import MechanismTerms, other_gaps
-from gauss.dynamics.contact.near_contacts import NearContacts
+from gauss.dynamics.contact.near_detection import NearContacts
 from gauss.dynamics.contact.shape_table import ShapeTable
 from gauss.scene import JointDryFriction
 from gauss.system import System, sides
@@ -125,12 +125,7 @@ class MechanismRows:
 
     def start(self, near: NearContacts, rows: StepRows, known) -> np.ndarray:
         """Forces (n,) of the last step in units of the rows; zero of new contacts."""
-        keys, forces, others, _ = known
-        found, g = np.zeros((near.gap.size, 3)), len(self.others)
-        if keys.size:
-            places = np.minimum(np.searchsorted(keys, near.key), keys.size - 1)
-            same = keys[places] == near.key
-            found[same] = forces[places[same]]
+        found, others, g = near.known_forces(known.key, known.force), known.others, len(self.others)
         return np.concatenate([found[:, 0], others[:g], found[rows.rough, 1:].ravel(), others[g:]]) / rows.unit
 
     def split(self, rows: StepRows, near: NearContacts, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

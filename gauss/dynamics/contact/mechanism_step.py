@@ -25,14 +25,13 @@ from gauss.dynamics.contact.implicit_damping import ImplicitDamping
 from gauss.dynamics.contact.mechanism_compliance import Compliance
 from gauss.dynamics.contact.mechanism_kernels import mechanism_kernels
 from gauss.dynamics.contact.mechanism_rows import MechanismRows, StepRows
-from gauss.dynamics.contact.mechanism_step_parts import FreeStep, MechanismStep, OpenStep
 from gauss.dynamics.contact.moreau_step import MIDPOINT, MISSED_CLOSING_RATE
-from gauss.dynamics.contact.near_contacts import NearContacts, confirmed
-from gauss.dynamics.contact.near_detection import NearDetection, near_pairs
+from gauss.dynamics.contact.near_detection import NearContacts, NearDetection, confirmed, near_pairs
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UNSEEN_OVERLAP, penetration_error
 from gauss.dynamics.contact.paradox import Paradox, sliding_above
 from gauss.dynamics.contact.shape_table import ShapeTable, carriers_of
 from gauss.dynamics.contact.step_doubts import JAMMED_RESPONSE, paradoxes_of_step, refuse_jam
+from gauss.dynamics.contact.step_parts import FreeStep, MechanismStep, OpenStep
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, acceleration_scale, centrifugal_scale
 from gauss.dynamics.inputs import InputForces
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
@@ -172,10 +171,6 @@ class MechanismStepper:
     def slow(self, v: np.ndarray) -> float:
         """Tangential speed below which a contact may stick, in units of the scene."""
         return sliding_above(self.system, v) * self.system.scale.time / self.system.scale.length
-
-    def run(self, state: State, work: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
-        """Steps from a state and its work to some times by machine code, as of :meth:`steps_from`."""
-        return self.steps_from(np.concatenate([[state.t], state.q, state.v, work]), ends, rows)
 
     def steps_from(self, begin: np.ndarray, ends: np.ndarray, rows: np.ndarray) -> LoopOfSteps:
         """Steps to some times by machine code, as far as it finishes them.

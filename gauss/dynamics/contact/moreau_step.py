@@ -3,10 +3,9 @@
 Coordinates move with the rates before the step over a share s of it; forces are evaluated there, rate-dependent ones at
 rates that the free accelerations and the contact forces of the last step have changed by then; the rest of the way takes the
 rates after the step (midpoint rule: Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). With an impact s = 0.
-Impulses of an impact are no forces of the step after it, which expects none. A gap that would close within the step
-closes at its end (:mod:`gauss.dynamics.contact.gap_laws`); one with an impact opens with e times its speed (Moreau 1988;
-Stewart, Trinkle 1996).
-Friction and set-valued elements act on the rates after the step. The forces f solve the problem of
+Impulses of an impact are no forces of the step after it, which expects none. A gap that would close within the step closes
+at its end (:mod:`gauss.dynamics.contact.gap_laws`); one with an impact opens with e times its speed (Moreau 1988; Stewart,
+Trinkle 1996). Friction and set-valued elements act on the rates after the step. The forces f solve the problem of
 :mod:`gauss.dynamics.contact.contact_step`.
 """
 
@@ -22,11 +21,10 @@ from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import contact_scales, gap_scales
 from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver, laws_of
-from gauss.dynamics.contact.damped_step import DampedResponses, DampedStep
 from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.gap_laws import REST_STEPS, gap_to_close, is_impact, least_rate
 from gauss.dynamics.contact.impact import jammed_error, resting
-from gauss.dynamics.contact.implicit_damping import ImplicitDamping
+from gauss.dynamics.contact.implicit_damping import DampedResponses, DampedStep, ImplicitDamping
 from gauss.dynamics.contact.overlaps import START_OVERLAP, UnseenOverlaps, penetration_error
 from gauss.dynamics.contact.paradox import (
     MOST_CONTACTS,
@@ -40,13 +38,14 @@ from gauss.dynamics.contact.paradox import (
 from gauss.dynamics.contact.step_modes import StepModes
 from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
 from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.laws.traced_laws import Laws, present_laws
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.scene import JointDryFriction
 from gauss.system import State, System, retract, sides
-from gauss.system.contact_gaps import slips
+from gauss.system.contact_mode import slips
 
 MIDPOINT = 0.5  # share of a step in which coordinates move with the rates before it
 INCONSISTENT_RESPONSE = 1e-6  # relative: responses that violate the constraints by more are round-off
@@ -76,11 +75,13 @@ class MoreauStepper:
         Backend of the free accelerations.
     removal : float
         Least time in which penetration is removed [s]; zero: within a step.
+    laws : Laws
+        Loads of the system without unilateral and set-valued elements.
     """
 
-    def __init__(self, system: System, backend: str | Backend | type = "auto", removal: float = 0.0):
+    def __init__(self, system: System, backend: str | Backend | type, removal: float, laws: Laws):
         scene = system.scene
-        self.system, self.smooth, self.removal = system, smooth_system(system), removal
+        self.system, self.smooth, self.removal, self.loads = system, laws.system, removal, laws
         self.backend, self.kernel = backend, ContactTermsKernel(system)
         self.unit = system.scale.time / contact_scales(system)
         gaps, rough = sides(scene), slips(scene)
@@ -110,7 +111,7 @@ class MoreauStepper:
     @cached_property
     def responses(self) -> ForceResponses:
         """Responses of the system without unilateral and set-valued elements."""
-        return ForceResponses(self.smooth, self.backend)
+        return ForceResponses(self.smooth, self.backend, self.loads)
 
     @cached_property
     def damping(self) -> ImplicitDamping:
@@ -373,7 +374,16 @@ def advance_rates(state: State, acceleration, h, share) -> State:
     return State(state.t, state.q, state.v + (share * h) * acceleration)
 
 
-def moreau_stepper(system: System, backend: str | Backend | type = "auto", removal: float = 0.0) -> MoreauStepper:
-    """Stepper of a system, cached."""
+def moreau_stepper(
+    system: System, backend: str | Backend | type = "auto", removal: float = 0.0, laws: Laws | None = None
+) -> MoreauStepper:
+    """Stepper of a system, cached for its laws as they are now.
+
+    Parameters
+    ----------
+    laws : Laws, optional
+        Loads of the system without unilateral and set-valued elements, where they are known.
+    """
+    laws = present_laws(smooth_system(system)) if laws is None else laws
     key = backend if isinstance(backend, str) else id(backend)  # kept alive by the stepper
-    return cached(system, (MoreauStepper, key, removal), lambda: MoreauStepper(system, backend, removal))
+    return cached(system, (MoreauStepper, key, removal, laws.key), lambda: MoreauStepper(system, backend, removal, laws))

@@ -1,4 +1,7 @@
-"""Near contacts by one call of machine code: :mod:`gauss.codegen.kernels.near_pairs` on a table of shapes."""
+"""Contacts that are near at one instant: near pairs of shapes, near pairs of their features, rows of the contact problem.
+
+They are found by one call of machine code, :mod:`gauss.codegen.kernels.near_pairs` on a table of shapes.
+"""
 
 from functools import cache
 from typing import NamedTuple
@@ -13,11 +16,11 @@ from gauss.codegen.kernels.near_pairs import KINDS as MOST_KINDS
 from gauss.codegen.kernels.patch_rows import POINT
 from gauss.dynamics.contact.free_bodies import place_function
 from gauss.dynamics.contact.hull_records import shape_records
-from gauss.dynamics.contact.near_contacts import COLUMNS, NearContacts, Overlap
 from gauss.dynamics.contact.overlaps import START_OVERLAP
-from gauss.dynamics.contact.pair_kernels import SIGNS, PairKernels, pair_kernels
+from gauss.dynamics.contact.pair_kernels import CYCLIC, POSE, SIGNS, SIZES, PairKernels, pair_kernels
 from gauss.dynamics.contact.patch_kernels import PatchKernels
 from gauss.dynamics.contact.shape_table import KINDS, MOST_FEATURES, ShapeTable
+from gauss.errors import SimulationError
 from gauss.scene import Collider, HalfSpace
 from gauss.scene.contact_pairs import RULES
 from gauss.scene.contact_patch import SLOTS
@@ -26,22 +29,47 @@ from gauss.system import System
 
 FIRST_ROOM = 64  # contacts that there is room for at first
 MOST_LISTED_PAIRS = 4000  # pairs that are tried one by one; more are found by a grid
+COLUMN = POSE + SIZES + 3  # pose and sizes of a part, centre of mass of its body
+# Rows of a column for each axis of a box that counts as its first, and those that distances depend on.
+TURNED = np.array([[*(3 * i + a for i in range(3) for a in axes), *range(9, POSE)] for axes in CYCLIC])
+COLUMNS = np.concatenate([TURNED, POSE + CYCLIC, np.tile(np.arange(POSE + 3, COLUMN), (3, 1))], axis=1)
+
+
+class NearContacts(NamedTuple):
+    """Contacts of one instant, m of them."""
+
+    key: np.ndarray  # (m,) pair of parts and of their features: the same contact has the same key at all times
+    law: np.ndarray  # (m,) contact of the scene
+    bodies: np.ndarray  # (m, 2) bodies; −1 is the ground
+    gap: np.ndarray  # (m,) contact distances [m]
+    place: np.ndarray  # place (m, 3), axes (m, 3, 3): points [m]; normals and two tangents as rows, in world axes
+    axes: np.ndarray
+    J: np.ndarray  # (m, 2, 3, 8) rows for the twists (ω, u) of both bodies; the last two columns are zero
+    bias: np.ndarray  # (m, 3) accelerations along normal and tangents while the rates are constant [m/s²]
+
+    def known_forces(self, keys: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Forces (m, 3) by the keys in order (k,) and forces (k, 3) of the last step; zero of new contacts."""
+        found = np.zeros((self.gap.size, 3))
+        if keys.size:
+            places = np.minimum(np.searchsorted(keys, self.key), keys.size - 1)
+            same = keys[places] == self.key
+            found[same] = forces[places[same]]
+        return found
+
+
+class Overlap(NamedTuple):
+    """Shapes in each other of which no pair of features says so: a contact of the scene, and how deep [m]."""
+
+    law: int
+    depth: float
 
 
 class CandidatePairs(NamedTuple):
-    """Pairs of convex parts of shapes that a step with contacts looks at.
+    """Pairs of convex parts of shapes that a step with contacts looks at."""
 
-    Attributes
-    ----------
-    parts, pairs : int
-        Convex parts of the shapes that take part in contacts, and their pairs.
-    by_grid : bool
-        Whether near pairs are found by a grid of cells; the work is then that of the parts, not that of the pairs.
-    """
-
-    parts: int
-    pairs: int
-    by_grid: bool
+    parts: int  # convex parts of the shapes that take part in contacts
+    pairs: int  # their pairs
+    by_grid: bool  # whether near pairs are found by a grid: the work is then that of the parts, not that of the pairs
 
 
 def candidate_pairs(system: System) -> CandidatePairs:
@@ -174,3 +202,21 @@ class NearDetection:
 def near_pairs() -> NearPairs:
     """Machine code of its own, made once on a machine; compiled steps hold the same."""
     return from_disk((NearPairs,), lambda: NearPairs(near_code(place_function())))
+
+
+def confirmed(near: NearContacts, overlaps: list[Overlap], table: ShapeTable, t: float) -> NearContacts:
+    """Contacts of a state, whose shapes are not too deep in each other, and meet where they have normals.
+
+    SimulationError if they are, or do not: it names the contact.
+    """
+    if overlaps:
+        law, depth = overlaps[0]
+        raise SimulationError(
+            f"t = {t:.6g} s: shapes are {depth:.3g} m in each other, and no gap of {table.contacts[law].name!r} leads out; "
+            "move them apart with scene.start, or shorten the step."
+        )
+    sloped = np.isfinite(near.J).all(axis=(1, 2, 3))
+    if not sloped.all():
+        name = table.contacts[near.law[int(np.flatnonzero(~sloped)[0])]].name
+        raise SimulationError(f"t = {t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
+    return near

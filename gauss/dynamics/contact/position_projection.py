@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss.codegen.kernels.position_projection import DOUBT, LARGEST_MOVE, REACH
 from gauss.dynamics.contact.gap_laws import gap_after
-from gauss.dynamics.contact.near_contacts import NearContacts
+from gauss.dynamics.contact.near_detection import NearContacts
 from gauss.system import State
 
 ACCEPTED_DEPTH = 2e-6  # of the length of the scene: less than a hundredth of what soft contacts in such steps need

@@ -12,18 +12,10 @@ MOST_NAMED = 5  # loads that are named
 
 
 class Sleepers(NamedTuple):
-    """Bodies that joints let move.
+    """Bodies that joints let move."""
 
-    Attributes
-    ----------
-    able : tuple of str
-        Those that may sleep.
-    never : tuple of str
-        Those that never do: a law of time or a prescribed motion acts on them, or on what they are connected with.
-    """
-
-    able: tuple[str, ...]
-    never: tuple[str, ...]
+    able: tuple[str, ...]  # those that may sleep
+    never: tuple[str, ...]  # others: a law of time or a prescribed motion acts on them, or on what they are connected with
 
 
 def sleepers(ask: Question) -> Sleepers:

@@ -17,31 +17,15 @@ TIMED = 20  # steps by machine code that are timed, after as many that are not
 
 
 class StepEstimate(NamedTuple):
-    """A step of time stepping at the start of a scene.
+    """A step of time stepping at the start of a scene."""
 
-    Attributes
-    ----------
-    free : bool
-        Whether it is the step of free bodies, whose matrix is block-sparse; otherwise that of mechanisms, dense.
-    points, pairs : int
-        Near contact points, and near pairs of convex parts.
-    kinds : tuple of str
-        Kinds of these pairs.
-    islands : tuple of int
-        Numbers of bodies in the groups of free bodies that near contacts connect; empty of mechanisms.
-    step : float
-        Length of the step [s].
-    cost : float
-        CPU time that it takes [s], measured.
-    """
-
-    free: bool
-    points: int
+    free: bool  # whether it is the step of free bodies, whose matrix is block-sparse; otherwise that of mechanisms, dense
+    points: int  # points, pairs: near contact points, near pairs of convex parts
     pairs: int
-    kinds: tuple[str, ...]
-    islands: tuple[int, ...]
-    step: float
-    cost: float
+    kinds: tuple[str, ...]  # of these pairs
+    islands: tuple[int, ...]  # numbers of bodies in groups of free bodies that near contacts connect; empty of mechanisms
+    step: float  # its length [s]
+    cost: float  # CPU time that it takes [s], measured
 
 
 def estimated_step(system: System, plan: Plan) -> StepEstimate | None:
@@ -81,15 +65,16 @@ def _islands(count: int, pairs: np.ndarray) -> tuple[int, ...]:
 
 def _cost(stepper: Stepper, state: State, h: float) -> float:
     """CPU time of a step [s]: the mean of some by machine code after others; of one in Python where it finishes none."""
-    work, rows = np.zeros(3), np.empty((TIMED, 4 + state.q.size + state.v.size))
+    begin = np.concatenate([[state.t], state.q, state.v, np.zeros(3)])
+    rows = np.empty((TIMED, begin.size))
     for _ in range(2):  # the first steps make what all share, and find forces without a guess
         began = thread_time()
-        steps = stepper.run(state, work, state.t + h * np.arange(1, TIMED + 1), rows).steps
+        steps = stepper.steps_from(begin, begin[0] + h * np.arange(1, TIMED + 1), rows).steps
         taken = thread_time() - began
         if not steps:
             began = thread_time()
-            stepper.python_step(state, h)
+            t, q, v = np.split(begin[:-3], [1, 1 + state.q.size])
+            stepper.python_step(State(float(t[0]), q, v), h)
             return thread_time() - began
-        t, q, v = np.split(rows[steps - 1, :-3], [1, 1 + state.q.size])
-        state = State(float(t[0]), q, v)
+        begin = rows[steps - 1].copy()
     return taken / steps

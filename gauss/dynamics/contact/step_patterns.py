@@ -15,31 +15,17 @@ from gauss.linked_groups import linked_groups
 
 
 class StepPatterns(NamedTuple):
-    """Places of what may differ from zero.
+    """Places of what may differ from zero."""
 
-    Attributes
-    ----------
-    gathered, weight : ndarray, shape (l, 2), (l,)
-        Terms of Nᵀ M N on and below its diagonal: place in C, place in M, product of both entries of N.
-    first, lowest : ndarray, shape (r,)
-        First entry of each row of C; least coordinate that each one is connected to.
-    z_begin, z_end : ndarray, shape (n_v,)
-        Bounds of the rows of Z.
-    body_begin, body_end : ndarray, shape (k + 1,)
-        Bounds of the Jacobians of bodies.
-    row_begin, row_end : ndarray, shape (g + s,)
-        Bounds of the rows of stops, ropes and set-valued elements.
-    """
-
-    gathered: np.ndarray
-    weight: np.ndarray
-    first: np.ndarray
-    lowest: np.ndarray
-    z_begin: np.ndarray
+    gathered: np.ndarray  # (l, 2) terms of Nᵀ M N on and below its diagonal: place in C, place in M
+    weight: np.ndarray  # (l,) products of both entries of N
+    first: np.ndarray  # (r,) first entry of each row of C
+    lowest: np.ndarray  # (r,) least coordinate that each one is connected to
+    z_begin: np.ndarray  # z_begin, z_end (n_v,): bounds of the rows of Z
     z_end: np.ndarray
-    body_begin: np.ndarray
+    body_begin: np.ndarray  # body_begin, body_end (k + 1,): bounds of the Jacobians of bodies
     body_end: np.ndarray
-    row_begin: np.ndarray
+    row_begin: np.ndarray  # row_begin, row_end (g + s,): bounds of the rows of stops, ropes and set-valued elements
     row_end: np.ndarray
 
 

@@ -21,12 +21,8 @@ Gains = tuple[float, float] | None
 class CallGraphKernels:
     """Forward dynamics, their check and projection, called as :class:`gauss.dynamics.traced_system.Kernels` are.
 
-    Parameters
-    ----------
-    system : System
-        One with loops or couplings, without relations and gear trains.
-    gains : tuple of float, optional
-        Gains α and β [1/s] of the Baumgarte feedback −2α φ̇ − β² φ.
+    ``system``: one with loops or couplings, without relations and gear trains. ``gains``: gains α and β [1/s] of the
+    Baumgarte feedback −2α φ̇ − β² φ.
     """
 
     def __init__(self, system: System, gains: Gains = None):

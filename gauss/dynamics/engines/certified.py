@@ -1,4 +1,7 @@
-"""Certified accelerations: the compulsion of every state is minimised by a backend, with a certificate."""
+"""Certified accelerations: the compulsion of every state is minimised by a backend, with a certificate.
+
+The compulsion is assembled by numpy in a millisecond, above a threshold of evaluations by machine code in a microsecond.
+"""
 
 from dataclasses import replace
 
@@ -7,8 +10,8 @@ import numpy as np
 from gauss.backends import Backend, ready, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
-from gauss.dynamics.assemble import assemble_motion, position_residual
-from gauss.dynamics.compiled_assembly import Assembler
+from gauss.codegen import trace
+from gauss.dynamics.assemble import assemble_motion, checked_load, position_residual, units
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
@@ -18,20 +21,71 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.projection import velocity_residual_of
 from gauss.dynamics.store import cached_on_disk
-from gauss.errors import SimulationError
+from gauss.errors import SceneError, SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
+
+
+class Assembler:
+    """Compulsions of one system, assembled by a kernel traced from :func:`gauss.assemble`.
+
+    TypeError if a law cannot be traced.
+    SceneError if there are unilateral constraints, which have no fixed rows.
+
+    ``system``: the laws of its loads must be written with :mod:`gauss.math`.
+    """
+
+    def __init__(self, system: System):
+        if system.contacts.placed or system.set_valued.placed or system.losses:
+            raise SceneError(
+                "unilateral constraints, set-valued elements and losses have no fixed rows; they are solved state by state."
+            )
+        self.system = system
+
+        def flat(t, q, v):
+            motion = kinematics(system, State(t[0], q, v))
+            applied = Applied(motion)
+            compulsion = assemble_motion(motion, applied)
+            self._shapes = [[block.shape for block in blocks] for blocks in _blocks(compulsion)]
+            entries = [block.ravel() for blocks in _blocks(compulsion) for block in blocks]
+            power = applied.power
+            vectors = compulsion.impressed, compulsion.P, compulsion.C, compulsion.D
+            return *vectors, [compulsion.constraint_residual], power, np.concatenate(entries)
+
+        self.kernel = trace(flat, 1, system.n_q, system.n_v, batch=False)
+        n_rows = system.structure.n_rows
+        self._ends = np.cumsum([system.Phi.size, system.n_v, n_rows, n_rows, 1, 3])
+
+    def __call__(self, state: State, load=None) -> tuple[Compulsion, np.ndarray]:
+        """Compulsion in a state, see :func:`gauss.assemble`, and power of drives, of forces on bodies, of dampers [W]."""
+        system = self.system
+        numbers = self.kernel(np.concatenate([[state.t], state.q, state.v]))
+        impressed, P, C, D, (gap,), power, entries = np.split(numbers, self._ends)
+        blocks, place = [], 0
+        for shapes in self._shapes:
+            row = []
+            for shape in shapes:
+                size = shape[0] * shape[1]
+                row.append(entries[place : place + size].reshape(shape))
+                place += size
+            blocks.append(tuple(row))
+        count = len(system.structure.constraints)
+        none = np.zeros((0, system.Phi.size + system.n_v))
+        A, B = tuple(blocks[:count]), tuple(blocks[count:])
+        P = P + checked_load(system, load)
+        return Compulsion(
+            system.structure, system.Phi, impressed, P, A, B, C, D, none, np.zeros(0), float(gap), units(system)
+        ), power
+
+
+def _blocks(compulsion: Compulsion):
+    return *compulsion.A_blocks, *compulsion.B_blocks
 
 
 class CertifiedEngine(Engine):
     """Accelerations of one system by one backend with a persistent workspace.
 
-    Parameters
-    ----------
-    backend : str, Backend or class
-        Backend, or "auto".
-    gains : tuple of float or None
-        Baumgarte gains α and β [1/s] of the feedback −2α ċ − β² c.
+    ``backend``: backend, or "auto". ``gains``: Baumgarte gains α and β [1/s] of the feedback −2α ċ − β² c.
     """
 
     evaluations, rescued = 0, 0
@@ -58,34 +112,17 @@ class CertifiedEngine(Engine):
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
         """Certified accelerations and power of the loads, all or those given; ``load`` (n_v,) is added to their forces.
 
-        Raises
-        ------
-        SimulationError
-            If the backend's answer is not certified; the message says why.
+        SimulationError if the answer of the backend is not certified, with the reason.
         """
-        solution, (driven, loaded, dissipated) = self.solved(system, state, load, loads)
-        driven = driven - solution.multipliers @ solution.compulsion.C  # rheonomic constraints do work, as drives do
-        return Rates(solution.qdd, np.array([driven, loaded, dissipated]))
+        return rates_of(*self.solved(system, state, load, loads))
 
-    def solved(self, system: System, state: State, load=None, loads=None) -> tuple[Solution, tuple]:
-        """Certified solution, and power of drives, forces and dampers.
-
-        Raises
-        ------
-        SimulationError
-            If the backend's answer is not certified; the message says why.
-        """
+    def solved(self, system: System, state: State, load=None, loads=None) -> tuple[Solution, np.ndarray]:
+        """Certified solution, and power of drives, forces and dampers."""
         compulsion, power = self.assembled(system, state, load, loads)
         return self.answer(compulsion, state.t), power
 
     def answer(self, compulsion: Compulsion, t: float) -> Solution:
-        """Certified solution of a compulsion.
-
-        Raises
-        ------
-        SimulationError
-            If the backend's answer is not certified; the message says why.
-        """
+        """Certified solution of a compulsion."""
         solution = solve(compulsion, self.backend)
         self.evaluations += 1
         if not solution.status.certified:
@@ -100,14 +137,14 @@ class CertifiedEngine(Engine):
         """State after a step, projected onto the constraints."""
         return project(system, state)
 
-    def assembled(self, system: System, state: State, load, loads):
+    def assembled(self, system: System, state: State, load, loads) -> tuple[Compulsion, np.ndarray]:
         """Compulsion, and power of drives, forces and dampers; compiled above the threshold of evaluations."""
         may_compile = self.evaluations == COMPILE_THRESHOLD and loads is None and self.gains is None
         may_compile = may_compile and not system.contacts.placed
         if may_compile and not (laws := Laws(system)).called:
             self.assembler = cached_on_disk(system, (Assembler, laws.key), lambda: Assembler(system))
         if self.assembler is not None:
-            return self.assembler(state, load), self.assembler.power
+            return self.assembler(state, load)
         motion = kinematics(system, state)
         applied = Applied(motion, loads)
         compulsion = assemble_motion(motion, applied, load)
@@ -116,7 +153,12 @@ class CertifiedEngine(Engine):
             feedback = -2.0 * alpha * velocity_residual_of(system, motion) - beta**2 * position_residual(motion)
             compulsion = replace(compulsion, D=compulsion.D + feedback)
         compulsion = with_contacts(motion, compulsion)
-        return compulsion, (applied.driven, applied.loaded, applied.dissipated)
+        return compulsion, applied.power
 
     def check(self, point: Point, last: bool = False):
         """Do nothing: every evaluation was certified."""
+
+
+def rates_of(solution: Solution, power: np.ndarray) -> Rates:
+    """Rates by a solution, and the power of the loads; rheonomic constraints do work, as drives do."""
+    return Rates(solution.qdd, power - np.array([solution.multipliers @ solution.compulsion.C, 0.0, 0.0]))

@@ -42,18 +42,9 @@ class StateKernels(Protocol):
 class CompiledEngine(Engine):
     """Accelerations by the compiled articulated-body recursion until a check fails, then by the certified engine.
 
-    Parameters
-    ----------
-    system : System
-        A smooth system (see :func:`gauss.dynamics.conditions.obstacles`).
-    kernels : StateKernels
-        Its machine code.
-    loads : LoadForces, optional
-        Loads beside the machine code; none when not given.
-    slow : sequence of str
-        Names of the loads with opaque callbacks.
-    gains : tuple of float or None
-        Baumgarte gains of the certified engine; those of the machine code are compiled in.
+    ``system``: a smooth system (see :func:`gauss.dynamics.conditions.obstacles`). ``loads``: loads beside the machine code;
+    none when not given. ``slow``: names of the loads with opaque callbacks. ``gains``: Baumgarte gains of the certified
+    engine; those of the machine code are compiled in.
     """
 
     evaluations = 0
@@ -119,10 +110,8 @@ class CompiledEngine(Engine):
 
         ``load`` (n_v,) are generalised forces under which the accelerations were found, besides the loads.
 
-        Raises
-        ------
-        DistrustError
-            If the residual is too large, as with masses of very different order; from then on the certified engine answers.
+        DistrustError if the residual is too large, as with masses of very different order; from then on the certified engine
+        answers.
         """
         if self.handed_over is not None:
             return

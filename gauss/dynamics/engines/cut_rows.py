@@ -19,10 +19,10 @@ from gauss.backends.closure import Factor
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.certified import CertifiedEngine, rates_of
 from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
-from gauss.dynamics.engines.held_joints import HeldJoint, held_rows
+from gauss.dynamics.engines.held_joints import HeldJoint
 from gauss.dynamics.engines.tiering import tiered_kernels
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan
@@ -62,7 +62,7 @@ def cut_rows(
     """Rows of a phase to be cut: links with losses, with the directions of power flow of its mode, and held joints."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if mode.power_flow.get(name) and name in places}
-    names, rows = (*links, *(joint.name for joint in held)), held_rows(held)
+    names, rows = (*links, *(joint.name for joint in held)), [{joint.v: joint.sign} for joint in held]
     R = _matrix(system, [_places(system, link.acts_on) for link in links.values()] + rows)
     W = _matrix(system, [_places(system, joint_factors(link, mode.power_flow[name])) for name, link in links.items()] + rows)
     columns = [*(system.column(link.driven) for link in links.values()), *(joint.v for joint in held)]
@@ -88,14 +88,8 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
 
     SimulationError if the iteration does not converge.
 
-    Parameters
-    ----------
-    residual : callable
-        Forces (m,) → residual (m,).
-    guess : ndarray, shape (m,)
-        Initial forces.
-    units : ndarray, shape (m,)
-        Forces of the scene: smaller ones, as near a reversal, have round-off relative to these.
+    ``residual``: forces (m,) → residual (m,). ``guess`` (m,): initial forces. ``units`` (m,): forces of the scene: smaller
+    ones, as near a reversal, have round-off relative to these.
     """
     Q, left = guess, residual(guess)
     if not np.isfinite(left).all():
@@ -122,12 +116,7 @@ def piecewise_affine_root(residual, guess: np.ndarray, units: np.ndarray) -> np.
 def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndarray, Solution]:
     """Forces Q (m,) of rows in a compulsion with all rows and no inequalities, and the solution with losses.
 
-    Parameters
-    ----------
-    compulsion : Compulsion
-        Without the losses.
-    answer : callable
-        Compulsion → certified solution.
+    ``compulsion``: without the losses. ``answer``: compulsion → certified solution.
     """
     if links.ideal:
         found = answer(compulsion)
@@ -148,14 +137,7 @@ def with_losses(compulsion: Compulsion, links: CutRows, answer) -> tuple[np.ndar
 class CutRowEngine(Engine):
     """Accelerations of a phase with cut rows: compiled, or by numpy up to a threshold of evaluations.
 
-    Parameters
-    ----------
-    system : System
-        The phase, with all rows.
-    cut : System
-        The same without the cut rows.
-    backend : str, Backend or class
-        How accelerations are solved.
+    ``system``: the phase, with all rows. ``cut``: the same without the cut rows. ``backend``: how accelerations are solved.
     """
 
     def __init__(self, system: System, cut: System, links: CutRows, backend: str | Backend | type, plan: Plan):
@@ -213,10 +195,9 @@ class CutRowEngine(Engine):
 
     def _solved(self, state: State):
         """Rates, and the certified solution."""
-        compulsion, (driven, loaded, dissipated) = self.certified.assembled(self.system, state, None, None)
+        compulsion, power = self.certified.assembled(self.system, state, None, None)
         self.Q, solution = with_losses(compulsion, self.links, lambda problem: self.certified.answer(problem, state.t))
-        driven = driven - solution.multipliers @ solution.compulsion.C
-        return Rates(solution.qdd, np.array([driven, loaded, dissipated])), solution
+        return rates_of(solution, power), solution
 
     def _compiled(self, engine: CompiledEngine, state: State) -> Rates:
         found: Rates

@@ -14,10 +14,7 @@ class DistrustError(SimulationError):
 class Engine(ABC):
     """Source of accelerations along one motion.
 
-    Attributes
-    ----------
-    handed_over : float or None
-        Time from which the certified engine is in use [s]; None while this one is.
+    Attributes: ``handed_over``: time from which the certified engine is in use [s]; None while this one is.
     """
 
     handed_over: float | None = None
@@ -54,10 +51,7 @@ class Engine(ABC):
     def check(self, point: Point, last: bool = False):
         """Check the accelerations of a point by an independent computation; ``last`` marks the end of the motion.
 
-        Raises
-        ------
-        DistrustError
-            If they differ; from then on the engine uses the independent computation.
+        DistrustError if they differ; from then on the engine uses the independent computation.
         """
 
     def hand_over(self, t: float) -> bool:

@@ -3,7 +3,7 @@
 They change from phase to phase; what they act on does not, and its machine code is shared by all phases.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -60,8 +60,3 @@ def braking(whole: System, mode: ContactMode, frictions: Mapping[str, JointFrict
     for name, one in frictions.items():
         forces[whole.column(one.joint)] += mode.set_valued.get(name, 0) * one.limit
     return forces
-
-
-def held_rows(joints: Sequence[HeldJoint]) -> list[dict[int, float]]:
-    """Rows of held joints: factors by place in v."""
-    return [{joint.v: joint.sign} for joint in joints]

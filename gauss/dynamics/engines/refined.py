@@ -17,12 +17,8 @@ from gauss.system import State, System
 class RefinedEngine(CertifiedEngine):
     """Certified accelerations; above the compile threshold by compiled iterative refinement with an error bound.
 
-    Parameters
-    ----------
-    system : System
-        A smooth system (see :func:`gauss.dynamics.conditions.obstacles`).
-    laws : Laws
-        Its loads, all of which are traced.
+    ``system``: a smooth system (see :func:`gauss.dynamics.conditions.obstacles`). ``laws``: its loads, all of which are
+    traced.
     """
 
     def __init__(self, system: System, laws: Laws):

@@ -41,10 +41,7 @@ def compiled_at_once() -> Iterator[None]:
 class CompileThreshold:
     """Count of evaluations without machine code.
 
-    Parameters
-    ----------
-    evaluations : int
-        Number of evaluations before machine code is made.
+    ``evaluations``: number of evaluations before machine code is made.
     """
 
     def __init__(self, evaluations: int):
@@ -59,15 +56,8 @@ class CompileThreshold:
 class TieredFunction:
     """A function that is replaced by a faster one above the compile threshold.
 
-    Parameters
-    ----------
-    function : callable
-        The first tier.
-    make : callable
-        () → the second tier.
-    evaluations : int, optional
-        Number of evaluations of the first tier that take as long as making the second; that of refined dynamics when not
-        given.
+    ``function``: the first tier. ``make``: () → the second tier. ``evaluations``: number of evaluations of the first tier
+    that take as long as making the second; that of refined dynamics when not given.
     """
 
     def __init__(self, function: Callable, make: Callable[[], Callable], evaluations: int | None = None):
@@ -77,24 +67,18 @@ class TieredFunction:
 
     def __call__(self, *args, **kwargs):
         """Value of the function of the current tier."""
-        if self.make is not None and self.threshold.passed():
-            self.function, self.make = self.make(), None
+        make = self.make  # another thread may have called it in between
+        if make is not None and self.threshold.passed():
+            self.function, self.make = make(), None
         return self.function(*args, **kwargs)
 
 
 def tiered_kernels(system: System, plan: Plan, laws: Laws, spent: int) -> Kernels | None:
     """Machine code of a phase; None where the plan is not to compile, below the threshold, and with opaque laws.
 
-    Parameters
-    ----------
-    system : System
-        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
-    plan : Plan
-        Of the phase, see :data:`gauss.dynamics.plan.MODES`: "compiled" has no threshold, "tiered" has one.
-    laws : Laws
-        Loads of the system.
-    spent : int
-        Evaluations of the phase by numpy in this motion.
+    ``system``: one without obstacles (see :func:`gauss.dynamics.conditions.obstacles`). ``plan``: of the phase, see
+    :data:`gauss.dynamics.plan.MODES`: "compiled" has no threshold, "tiered" has one. ``spent``: evaluations of the phase by
+    numpy in this motion.
     """
     if laws.called or plan.dynamics not in ("compiled", "tiered"):
         return None

@@ -4,20 +4,13 @@ import numpy as np
 
 from gauss.codegen import Kernel
 from gauss.codegen.kernels import CorrectedRecursion
-from gauss.dynamics.kernel_program import added_forces
+from gauss.dynamics.kernel_program import added_forces, tree_correction
 from gauss.dynamics.store import cached_on_disk
-from gauss.dynamics.tree_program import tree_correction
 from gauss.system import System
 
 
 class TreeRecursionKernels:
-    """Forward dynamics and their check, called as :class:`gauss.dynamics.traced_system.Kernels` are.
-
-    Parameters
-    ----------
-    system : System
-        A tree.
-    """
+    """Forward dynamics and their check, called as :class:`gauss.dynamics.traced_system.Kernels` are."""
 
     project = None  # a tree has no loop constraints
 

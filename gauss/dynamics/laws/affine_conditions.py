@@ -22,25 +22,9 @@ Pieces = tuple[tuple[float, float], ...]  # of a function: value at the begin, a
 def affine_changes(
     conditions: Sequence, clock: Expression, begin: float, end: float, apart: float
 ) -> tuple[np.ndarray, list[Expression]]:
-    """Times at which conditions change, and the conditions of which they are not known.
+    """Times (k,) at which conditions change, in no order [s], and the conditions that are not piecewise affine.
 
-    Parameters
-    ----------
-    conditions : sequence of Expression or bool
-        Conditions of the time alone.
-    clock : Expression
-        Symbol of the time.
-    begin, end : float
-        Interval of time [s].
-    apart : float
-        Distance of two times at which a condition is compared [s].
-
-    Returns
-    -------
-    times : ndarray, shape (k,)
-        In no order [s].
-    others : list of Expression
-        Conditions that are not piecewise affine.
+    ``apart``: distance of two times at which a condition is compared [s].
     """
     asked = [condition for condition in conditions if isinstance(condition, Expression)]
     pieces, times, others = _pieces(asked, clock, begin), list[np.ndarray](), list[Expression]()

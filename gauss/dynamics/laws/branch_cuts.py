@@ -16,7 +16,7 @@ from gauss.dynamics.system_dynamics import SystemDynamics
 from gauss.math import atan2, where
 from gauss.scene.relation import Relation
 from gauss.system import State, System, build, retract
-from gauss.system.symbolic_mechanism import Symbols
+from gauss.system.symbolic_mechanism import Symbols, symbols_of
 
 ITERATIONS, SMALL_STEP = 40, 1e-6  # of Newton's method, and of its differences, in units of the coordinates
 ON_CUT = 1e-8  # residual beside its terms, at a state of the size of the scene, of a cut that is met
@@ -38,27 +38,15 @@ class Unfolded(Relation):
         return inlined(self.whole, at, lambda traced, view: _unfolded(traced[1]))
 
 
-def residuals(relation: Relation, view: Symbols) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity residuals in symbols."""
-    parts = relation.positions(view), relation.velocities(view)
-    return tuple(np.array([*part, None], dtype=object)[:-1] for part in parts)  # type: ignore[return-value]
-
-
 def inlined(relation: Relation, at, change) -> list:
     """Residuals of a relation, changed as they are traced: a function of both parts and the symbols."""
     view = Symbols(at.system, Graph())  # of its own: the order of the conditions depends on nothing else
-    changed = list(change(residuals(relation, view), view))
+    changed = list(change(view.residuals(relation), view))
     bodies = [entry for b in view.bodies for entry in (*np.ravel(at.R[b]), *at.x[b], *at.W[b], *at.u[b])]
     placed = [at.system.joints[j] for j in view.joints]
     joints = [entry for joint in placed for entry in (*at.coordinates_of(joint), *at.rates_of(joint))]
     given = np.array([*bodies, *joints, at.t], dtype=object)
-    return list(Function("residual", symbols_of(view), changed).inlined(given))
-
-
-def symbols_of(view: Symbols) -> list[Expression]:
-    """Symbols of bodies and joints of a view, and the time."""
-    bodies = [symbol for parts in view.bodies.values() for part in parts for symbol in np.ravel(part)]
-    return [*bodies, *(symbol for parts in view.joints.values() for part in parts for symbol in part), view.t]
+    return list(Function("residual", symbols_of(view.bodies, view.joints, view.t), changed).inlined(given))
 
 
 def _cuts(outputs) -> list[Expression]:
@@ -81,7 +69,7 @@ def unfolded_system(system: System) -> System | None:
     def make() -> tuple[System | None]:
         found = {}
         for name, relation in system.scene.relations.items():
-            traced = residuals(relation, Symbols(system, Graph()))
+            traced = Symbols(system, Graph()).residuals(relation)
             if not relation.loses and _cuts([*traced[0], *traced[1]]):
                 found[name] = Unfolded(name, relation)
         if not found:

@@ -9,16 +9,16 @@ from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws, symbols
 from gauss.scene import Cam, Constraint, OnCurve, OneSidedConstraint, Relation, Transmission
 from gauss.system import System
-from gauss.system.relations import Rows, place_relations
+from gauss.system.relations import Relations, Rows, place_relations
 
 OWN = (Cam, Constraint, OnCurve, OneSidedConstraint, Transmission)  # kinds of relations made of functions of the user
 
 
 class WatchedFunctions(NamedTuple):
-    """Traced functions over the symbols of a motion, each with the name of its load or constraint."""
+    """Traced functions over the symbols of a motion."""
 
-    motion: Kinematics
-    functions: list[tuple[str, Function]]
+    motion: Kinematics  # the system in symbols
+    functions: list[tuple[str, Function]]  # each with the name of its load or constraint
 
     @property
     def outputs(self) -> list[Expression]:
@@ -31,19 +31,21 @@ def watched_functions(system: System, laws: Laws) -> Laws | WatchedFunctions:
     own = [relation for relation in system.scene.relations.values() if _is_own(relation)]
     if not own:
         return laws
-    motion, relations = symbols(system), place_relations(system, own)
-    pairs = zip(relations.placed, relations.rows(motion), strict=True)
-    traced = [(placed.name, Function("constraint", [], _residuals(rows, placed.velocities))) for placed, rows in pairs]
+    motion = symbols(system)
     functions = [(name, Function("law", [], _expressions(function.outputs))) for name, function in laws.functions]
-    return WatchedFunctions(motion, [*functions, *traced])
+    return WatchedFunctions(motion, [*functions, *_traced(place_relations(system, own), motion)])
 
 
 def residual_functions(system: System) -> WatchedFunctions:
     """Residuals of all constraints beyond the joints."""
     motion = symbols(system)
-    pairs = zip(system.relations.placed, system.relations.rows(motion), strict=True)
-    traced = [(placed.name, Function("constraint", [], _residuals(rows, placed.velocities))) for placed, rows in pairs]
-    return WatchedFunctions(motion, traced)
+    return WatchedFunctions(motion, _traced(system.relations, motion))
+
+
+def _traced(relations: Relations, motion: Kinematics) -> list[tuple[str, Function]]:
+    """Residuals of relations, each with its name."""
+    pairs = zip(relations.placed, relations.rows(motion), strict=True)
+    return [(placed.name, Function("constraint", [], _residuals(rows, placed.velocities))) for placed, rows in pairs]
 
 
 def _is_own(relation: Relation) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from gauss.codegen import Expression, Function, Graph, reachable, substitute
 from gauss.dynamics.gap_functions import stacked_rows
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.dynamics.laws.branch_cuts import ON_CUT, TRIED, inlined, met_from, residuals, symbols_of, unfolded_system
+from gauss.dynamics.laws.branch_cuts import ON_CUT, TRIED, inlined, met_from, unfolded_system
 from gauss.dynamics.laws.levels import LEVELED, Levels, levels_of
 from gauss.dynamics.laws.switching_times import CONDITIONS, of_time
 from gauss.dynamics.projection import scalar_coordinates
@@ -27,7 +27,7 @@ from gauss.errors import GaussError, SimulationError
 from gauss.scene.relation import Relation
 from gauss.system import State, System, build, retract
 from gauss.system.relations import Relations, bound_relations
-from gauss.system.symbolic_mechanism import Symbols
+from gauss.system.symbolic_mechanism import Symbols, symbols_of
 
 CONTINUOUS = 1e-9  # change of a residual across a surface, relative to its terms, that is rounding of the surface's place
 LINES, LOOKS = 24, 33  # random lines through the configuration space, and states on each, between which surfaces are found
@@ -65,8 +65,8 @@ class OneMode(Relation):
 class Condition(NamedTuple):
     """A condition, by the difference of its two sides, or the argument of a floor or of a row."""
 
-    op: str
-    levels: Levels | None
+    op: str  # operation of its node
+    levels: Levels | None  # those of a floor or row
 
     @classmethod
     def of(cls, node: Expression) -> "Condition":
@@ -107,17 +107,14 @@ class Step(NamedTuple):
 class ConstraintModes:
     """Modes of the constraints of a system.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Relations that have conditions on the state.
+    Attributes: ``names``: relations that have conditions on the state.
     """
 
     def __init__(self, system: System):
         self.system, self.counts, self.conditions, self.about = system, dict[str, int](), list[Condition](), list[str]()
         for name, relation in system.scene.relations.items():
             own = Symbols(system, Graph())
-            nodes = _conditions(residuals(relation, own), own)
+            nodes = _conditions(own.residuals(relation), own)
             if not nodes or relation.loses:
                 continue
             self.counts[name] = len(nodes)
@@ -138,11 +135,15 @@ class ConstraintModes:
         view, sides = Symbols(self.system, Graph()), list[Expression | float]()
         for name, values in self._parts(mode).items():
             own = Symbols(self.system, Graph())
-            nodes = _conditions(residuals(self.system.scene.relations[name], own), own)
+            nodes = _conditions(own.residuals(self.system.scene.relations[name]), own)
             found = [node.operands[0] if node.op in LEVELED else node.operands[0] - node.operands[1] for node in nodes]
             if mode is not None:
                 found = list(substitute(found, nodes, _values(nodes, values)))
-            sides += list(Function("sides", symbols_of(own), found).inlined(np.array(_same(own, view), dtype=object)))
+            sides += list(
+                Function("sides", symbols_of(own.bodies, own.joints, own.t), found).inlined(
+                    np.array(_same(own, view), dtype=object)
+                )
+            )
         return bound_relations(view.graph, [], view.bodies, view.joints, sides)
 
     def _parts(self, mode: Mode | None) -> dict[str, Mode]:

@@ -23,14 +23,7 @@ def enclosed_parts(
 ) -> tuple[list[np.ndarray], list[list[Interval]]]:
     """Values of (t, q, v) at the ends of the subintervals of a step, and enclosures of (t, q, v, q̈) on each.
 
-    Parameters
-    ----------
-    begin, end : State
-        Ends of the step, numbers or expressions.
-    first, last : ndarray, shape (n_v,)
-        Accelerations there.
-    count : int
-        Number of subintervals.
+    ``begin``, ``end``: ends of the step, numbers or expressions. ``first``, ``last`` (n_v,): accelerations there.
     """
     h = end.t - begin.t
     value = [np.concatenate([[s.t], s.q, s.v]) for s in (begin, end)]

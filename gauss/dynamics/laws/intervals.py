@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.codegen import LOOKUPS, Column, Expression, looked_up, reachable
+from gauss.codegen import LOOKUPS, Column, Expression, Function, looked_up, reachable, write
 
 UNBOUNDED = 1e150  # in place of infinity: its square is finite, and its product with zero is zero
 
@@ -59,24 +59,33 @@ class Interval(NamedTuple):
 
 
 def enclose(outputs, given: dict[int, Interval]) -> list[Interval]:
-    """Enclosures of expressions.
-
-    Parameters
-    ----------
-    given : dict
-        Interval of every symbol, or of any expression, by its index.
-
-    Returns
-    -------
-    list of Interval
-        One for each output.
-    """
+    """Enclosures of expressions, given the interval of every symbol, or of any expression, by its index."""
     known = dict(given)
     for node in _needed(outputs, known):
         if node.index not in known:
             operands = [known[x.index] for x in node.operands if x.index in known]
             known[node.index] = _operation(node, operands)
     return [known[x.index] if isinstance(x, Expression) else Interval.point(float(x)) for x in outputs]
+
+
+def written_values(outputs, symbols: list[Expression], name: str) -> Function:
+    """Function of the values of some symbols → those of expressions."""
+
+    def values(given):
+        found = {symbol.index: Interval.point(value) for symbol, value in zip(symbols, given, strict=True)}
+        return [value.low for value in enclose(outputs, found)]
+
+    return write(values, len(symbols), name=name)
+
+
+def written_enclosures(outputs, symbols: list[Expression], name: str) -> Function:
+    """Function of low and high of some symbols, one after the other, → low and high of expressions."""
+
+    def enclosures(ends):
+        given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
+        return [end for value in enclose(outputs, given) for end in value]
+
+    return write(enclosures, 2 * len(symbols), name=name)
 
 
 def _needed(outputs, known) -> list[Expression]:

@@ -23,12 +23,7 @@ UNCROSSED = 0.5 / PARTS  # from the middle of the subinterval of a crossing to i
 def kink_error(begin: Point, end: Point, tolerance: Tolerance) -> Scalar:
     """Largest error of rates over the tolerance, if the step has a kink; root mean square, as the estimate of a pair.
 
-    Parameters
-    ----------
-    begin, end : Point
-        Ends of the step, numbers or expressions.
-    tolerance : Tolerance
-        Local error.
+    ``begin``, ``end``: ends of the step, numbers or expressions.
     """
     v, h = (begin.state.v, end.state.v), end.state.t - begin.state.t
     residual = v[1] - v[0] - 0.5 * h * (begin.rates.acceleration + end.rates.acceleration)
@@ -40,11 +35,7 @@ def kink_error(begin: Point, end: Point, tolerance: Tolerance) -> Scalar:
 def kink_factor(error: Scalar, crossing: Scalar) -> Scalar:
     """Factor of a rejected step with a kink: the next ends before the crossing, or is short enough to cross it.
 
-    Parameters
-    ----------
-    error : float
-        :func:`kink_error`, above 1.
-    crossing : float
-        Middle of the subinterval of the first crossing, relative to the step.
+    ``error``: :func:`kink_error`, above 1. ``crossing``: middle of the subinterval of the first crossing, relative to the
+    step.
     """
     return math.maximum(crossing - UNCROSSED, next_factor(error, KINK_ORDER))

@@ -33,10 +33,7 @@ class Search(NamedTuple):
 class KnownSearch:
     """Last search of one law.
 
-    Parameters
-    ----------
-    takes_motion : bool
-        Whether the law takes the motion: its values then depend on the start.
+    ``takes_motion``: whether the law takes the motion: its values then depend on the start.
     """
 
     def __init__(self, takes_motion: bool):
@@ -46,14 +43,7 @@ class KnownSearch:
     def key(self, law: Callable, start: State, *others: Hashable) -> Hashable | None:
         """Key of a search by content; None if the content of the law is unknown, or large.
 
-        Parameters
-        ----------
-        law : callable
-            The law.
-        start : State
-            Initial state.
-        *others
-            What else the search depends on.
+        ``*others``: what else the search depends on.
         """
         content = content_digest(law, most=MOST_PARTS, in_process=True)
         return content and (content, (start.q.tobytes(), start.v.tobytes()) if self.takes_motion else None, others)
@@ -63,16 +53,8 @@ class KnownSearch:
     ) -> Timetable:
         """What a search finds, or has found for the same law.
 
-        Parameters
-        ----------
-        key : hashable or None
-            A :meth:`key`.
-        values : callable
-            Values (k, n) of the law at times (k,) [s].
-        ends : tuple of float
-            Begin and end of the interval [s].
-        search : callable
-            () → what is found.
+        ``key``: a :meth:`key`. ``values``: values (k, n) of the law at times (k,) [s]. ``ends``: begin and end of the
+        interval [s]. ``search``: () → what is found.
         """
         last = self.last
         if key is None:

@@ -7,7 +7,7 @@ peak by one enclosure of the whole step.
 """
 
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from gauss import math
 from gauss.codegen import Expression, Function, Kernel, Scalar, write
 from gauss.codegen.kernels import CheckedSwitch
 from gauss.dynamics.laws.enclosed_parts import PARTS, enclosed_parts
-from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.intervals import Interval, written_enclosures, written_values
 from gauss.dynamics.laws.products import FLAT, PEAK, Products
 from gauss.integrators import Point
 from gauss.system import State, System
@@ -31,14 +31,9 @@ COMPOSITE = np.array([1.0, 4.0, 2.0, 4.0, 2.0, 4.0, 2.0, 4.0, 1.0]) / 24.0
 class NarrowPeaks:
     """Products and exponential functions of a state in laws, which may be narrow.
 
-    Parameters
-    ----------
-    symbols, accelerations : list of Expression
-        Symbols of (t, q, v), and of the accelerations.
-    exponents, phases : list of Expression
-        Arguments of exponential functions, and of sines and cosines.
-    slopes : callable
-        Expressions → their time derivatives; empty if there are none.
+    ``symbols``, ``accelerations``: symbols of (t, q, v), and of the accelerations. ``exponents``, ``phases``: arguments of
+    exponential functions, and of sines and cosines. ``slopes``: expressions → their time derivatives; empty if there are
+    none.
     """
 
     def __init__(self, system: System, symbols, accelerations, products: Products, exponents: list, phases: list, slopes):
@@ -63,12 +58,7 @@ class NarrowPeaks:
     def unresolved(self, evaluate: Callable[[State], np.ndarray], order: Callable = lambda t: None) -> CheckedSwitch:
         """(t, q, v, q̈) at both ends of a fixed step → 1 if three samples of the accelerations do not resolve them, else 0.
 
-        Parameters
-        ----------
-        evaluate : callable
-            Accelerations of a traced state.
-        order : callable
-            Called with the symbol of time before anything is traced.
+        ``evaluate``: accelerations of a traced state. ``order``: called with the symbol of time before anything is traced.
         """
 
         def whole(t, *ends):
@@ -134,29 +124,13 @@ class NarrowPeaks:
     @cached_property
     def _phases(self) -> Function:
         """(t, q, v, q̈) → phases, and their rates."""
-        symbols = [*self.symbols, *self.accelerations]
         rates = self.slopes(self.phases) or [0.0] * len(self.phases)
-
-        def values(state):
-            given = {symbol.index: Interval.point(value) for symbol, value in zip(symbols, state, strict=True)}
-            return [value.low for value in enclose([*self.phases, *rates], given)]
-
-        return write(values, len(symbols), name="phases")
+        return written_values([*self.phases, *rates], [*self.symbols, *self.accelerations], "phases")
 
     def _enclosed(self, asked: list[Expression]) -> tuple[int, Function, Function]:
         """Number of expressions; (t, q, v) → values; ends of each of (t, q, v, q̈) → those of them and of their rates."""
-        symbols, rates = [*self.symbols, *self.accelerations], self.slopes(asked)
-
-        def values(state):
-            given = {symbol.index: Interval.point(value) for symbol, value in zip(self.symbols, state, strict=True)}
-            return [value.low for value in enclose(asked, given)]
-
-        def enclosures(ends):
-            given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
-            return [end for value in enclose([*asked, *rates], given) for end in value]
-
-        at = write(values, len(self.symbols), name="bases")
-        return len(asked), at, write(enclosures, 2 * len(symbols), name="base_enclosures")
+        at, every = written_values(asked, self.symbols, "bases"), [*asked, *self.slopes(asked)]
+        return len(asked), at, written_enclosures(every, [*self.symbols, *self.accelerations], "base_enclosures")
 
     def _enclosures(self, size: int, at: Function, around: Function, count: int, t, q, v, first, t_end, q_end, v_end, last):
         """Values at the ends of subintervals, and enclosures of values and rates on each."""
@@ -179,22 +153,16 @@ def ends_of(begin: Point, end: Point) -> list:
 def missed(system: System, evaluate: Callable[[State], np.ndarray], begin: State, first, end: State, last) -> Scalar:
     """1 where Simpson's rule by three samples of the accelerations in a step misses their integral by nine, else 0.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Accelerations of a state.
-    begin, end : State
-        Ends of the step, numbers or expressions.
-    first, last : ndarray, shape (n_v,)
-        Accelerations there.
+    ``evaluate``: accelerations of a state. ``begin``, ``end``: ends of the step, numbers or expressions. ``first``, ``last``
+    (n_v,): accelerations there.
     """
     nodes, _ = enclosed_parts(system, begin, first, end, last)
     a = np.array([first, *(evaluate(_state(system, node)) for node in nodes[1:-1]), last])
     h, units = end.t - begin.t, system.scale.coordinates
     off, found = np.abs((SIMPSON - COMPOSITE) @ a) * h / units, 0.0
-    fastest = _largest(np.abs([*(begin.v / units), *(end.v / units)]))
+    fastest = reduce(math.maximum, np.abs([*(begin.v / units), *(end.v / units)]))
     for k, change in enumerate(off):
-        spread = h * _largest(np.abs(a[1:, k] - a[0, k])) / units[k]
+        spread = h * reduce(math.maximum, np.abs(a[1:, k] - a[0, k])) / units[k]
         counts = math.where(change > NEGLIGIBLE_RATE * fastest, 1.0, 0.0)
         found = math.where(change > UNRESOLVED_SHARE * spread, math.maximum(found, counts), found)
     return found
@@ -206,10 +174,3 @@ def _state(system: System, node: np.ndarray) -> State:
     for place in system.quaternions.values():
         q[place] = q[place] / np.sqrt(np.sum(q[place] * q[place]))
     return State(node[0], q, node[1 + system.n_q :])
-
-
-def _largest(values) -> Scalar:
-    found = values[0]
-    for value in values[1:]:
-        found = math.maximum(found, value)
-    return found

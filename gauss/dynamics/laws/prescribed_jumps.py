@@ -75,14 +75,8 @@ def driven_impact(system: System, state: State, names: tuple[str, ...], since: f
 
     SimulationError if the velocity constraints are inconsistent, or a contact with friction bears an impulse.
 
-    Parameters
-    ----------
-    system : System
-        The system after the jump.
-    state : State
-        State before it.
-    since : float, optional
-        Time just before the impact [s], where prescribed speeds differ from those at the time of the state.
+    ``system``: the system after the jump. ``state``: state before it. ``since``: time just before the impact [s], where
+    prescribed speeds differ from those at the time of the state.
     """
     parts = sides(system.scene)
     touching = np.flatnonzero(gaps(kinematics(system, state)).width <= TOUCHING * gap_scales(system))
@@ -119,14 +113,7 @@ def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
 
     SimulationError if a prescribed position jumps at one of them.
 
-    Parameters
-    ----------
-    start : State
-        Initial state.
-    end : float
-        Final time [s].
-    stops : sequence of (float, float)
-        Times just before and just after each switching time of its relations [s].
+    ``end``: final time [s]. ``stops``: times just before and just after each switching time of its relations [s].
     """
     if not system.relations.asks_time:
         return NO_JUMPS
@@ -156,21 +143,10 @@ def _may_jump(motion: Kinematics, before: float, after: float) -> bool:
 class _Sides:
     """One-sided limits in time of the residuals of all relations at one state.
 
-    Parameters
-    ----------
-    before, after : float
-        Times [s].
-    sizes : ndarray, shape (2, r)
-        Magnitudes of the position and velocity that each row prescribes, to which a jump is compared.
+    ``sizes`` (2, r): magnitudes of the position and velocity that each row prescribes, to which a jump is compared.
 
-    Attributes
-    ----------
-    before, after : float
-        Times [s].
-    gaps : ndarray, shape (r,)
-        Jump of the position residuals.
-    positions, speeds : ndarray of bool, shape (r,)
-        Rows whose position residual jumps, and whose velocity residual does.
+    Attributes: ``gaps`` (r,): jump of the position residuals. ``positions``, ``speeds`` (r,): rows whose position residual
+    jumps, and whose velocity residual does.
     """
 
     def __init__(self, motion: Kinematics, before: float, after: float, sizes: np.ndarray):

@@ -27,19 +27,10 @@ Power = tuple[int, bool, float]  # position of a base, whether it is an exponent
 class Products:
     """Products in outputs that may have narrow peaks.
 
-    Parameters
-    ----------
-    outputs : sequence of Expression
-        Values of laws.
-    known : set of int
-        Indices of expressions with features that are known, as those of time alone.
+    ``outputs``: values of laws. ``known``: indices of expressions with features that are known, as those of time alone.
 
-    Attributes
-    ----------
-    bases : list of Expression
-        Bases of the products, and exponents of exponential functions among these.
-    nodes : list of Expression
-        The products.
+    Attributes: ``bases``: bases of the products, and exponents of exponential functions among these. ``nodes``: the
+    products.
     """
 
     def __init__(self, outputs: list[Expression], known: set[int]):
@@ -60,14 +51,8 @@ class Products:
     def hidden(self, ends: list[list], values: list[list[Interval]], rates: list[list[Interval]], tau: Scalar) -> Scalar:
         """Share of a step before its first narrow peak that samples may miss, 1 where there is none.
 
-        Parameters
-        ----------
-        ends : list of list
-            Bases at the ends of the subintervals.
-        values, rates : list of list of Interval
-            Enclosures of bases and of their rates on the subintervals; rates may be empty.
-        tau : Scalar
-            Length of a subinterval [s].
+        ``ends``: bases at the ends of the subintervals. ``values``, ``rates``: enclosures of bases and of their rates on the
+        subintervals; rates may be empty. ``tau``: length of a subinterval [s].
         """
         hidden: Scalar = 1.0
         bounds = self._all_bounds(ends, values, rates, tau)

@@ -16,15 +16,7 @@ BARE = {"__new__", "__getattribute__"}  # methods of a float that say nothing of
 class RecordedTime:
     """Time that behaves as the number it is, and records whether it was read.
 
-    Parameters
-    ----------
-    t : float
-        Time [s].
-
-    Attributes
-    ----------
-    is_read : bool
-        Whether its value, its text or its type was asked for.
+    Attributes: ``is_read``: whether its value, its text or its type was asked for.
     """
 
     __slots__ = "is_read", "value"
@@ -62,35 +54,35 @@ def reads_time(law: Callable, motion: Kinematics) -> tuple[bool, bool]:
 
     A law that keeps one of them, or returns it, or raises an exception, reads it.
 
-    Parameters
-    ----------
-    law : callable
-        Of (t, motion).
+    ``law``: of (t, motion).
     """
     own, of_motion = RecordedTime(motion.state.t), RecordedTime(motion.state.t)
     given = KinematicsAtTime(motion, of_motion)
     of_motion.is_read = False  # a checker of types may have asked for it
-    unread = getrefcount(own), getrefcount(of_motion)
+    first, second = _reads(law, (own, given), (own, of_motion))
+    return first, second
+
+
+def reads_first(law: Callable, t: float, *others) -> bool:
+    """Whether a law of (t, ...) reads its first argument at a time [s] and other arguments; see :func:`reads_time`."""
+    own = RecordedTime(t)
+    return _reads(law, (own, *others), (own,))[0]
+
+
+def _reads(law: Callable, given: tuple, recorded: tuple[RecordedTime, ...]) -> list[bool]:
+    unread = list(map(getrefcount, recorded))
     try:
         with preserved(law):
-            value = law(own, given)  # it may be the time itself
-            kept = getrefcount(own) > unread[0], getrefcount(of_motion) > unread[1]
+            value = law(*given)  # it may be the time itself
+            read = list(map(getrefcount, recorded))
             del value
     except Exception:  # whatever it does with the time
-        return True, True
-    return own.is_read or kept[0], of_motion.is_read or kept[1]
+        return [True] * len(recorded)
+    return [t.is_read or after > before for t, after, before in zip(recorded, read, unread, strict=True)]
 
 
 class KinematicsAtTime(Kinematics):
-    """Kinematics of the same coordinates and rates at another time: poses are those of the other one.
-
-    Parameters
-    ----------
-    motion : Kinematics
-        Kinematics of these coordinates and rates.
-    t : float
-        Time [s].
-    """
+    """Kinematics of the same coordinates and rates at another time: poses are those of the other one."""
 
     def __init__(self, motion: Kinematics, t):
         self.system, self.state, self._other = motion.system, State(t, motion.state.q, motion.state.v), motion

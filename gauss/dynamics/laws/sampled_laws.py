@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from gauss.dynamics.laws.known_searches import KnownSearch
-from gauss.dynamics.laws.recorded_time import KinematicsAtTime, reads_time
+from gauss.dynamics.laws.recorded_time import KinematicsAtTime, reads_first, reads_time
 from gauss.dynamics.laws.step_sampling import LawOfTime
 from gauss.dynamics.laws.switching_times import EQUAL_TIMES, NO_TIMES, Timetable
 from gauss.scene.stateful_laws import preserved
@@ -29,22 +29,11 @@ def sampled_times(
 ) -> Timetable:
     """Jumps of one law, and ends of the intervals in which it is constant; with the law itself unless it is constant.
 
-    Parameters
-    ----------
-    law : callable
-        Of (t, motion).
-    motion : Kinematics
-        Kinematics of the initial state; None for laws of rotors.
-    begin, end : float
-        Interval of time [s].
-    what : str
-        Name of the law in warnings.
-    uses_time : bool
-        Whether the law is known to use the time: a constant value is then warned of.
-    known : KnownSearch, optional
-        Last search of this law of loads, which is not repeated for the same law.
+    ``law``: of (t, motion). ``motion``: kinematics of the initial state; None for laws of rotors. ``what``: name of the law
+    in warnings. ``uses_time``: whether the law is known to use the time: a constant value is then warned of. ``known``: last
+    search of this law of loads, which is not repeated for the same law.
     """
-    own, of_motion = (True, False) if motion is None else reads_time(law, motion)
+    own, of_motion = (reads_first(law, begin, None), False) if motion is None else reads_time(law, motion)
     values = partial(_values, law, motion, of_motion)
     count = _count(motion, end - begin) if own or of_motion or uses_time else LEAST_SAMPLES
     search = partial(_located, values, begin, end, what, count, CONSTANT if uses_time else "")

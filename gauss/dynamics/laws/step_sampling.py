@@ -23,14 +23,7 @@ LEAST_RANGE = 1e-6  # of a law, relative to its size: less does not count
 def laws_of_time(outputs, of_time: Sequence[Expression], clock: Expression) -> LawOfTime | None:
     """Parts of traced laws that depend on the time alone, as one function; None where there are none.
 
-    Parameters
-    ----------
-    outputs : sequence of Expression or float
-        Values of the laws, in one graph.
-    of_time : sequence of Expression
-        Nodes that depend on the time alone, and are examined.
-    clock : Expression
-        Symbol of the time.
+    ``outputs``: values of the laws, in one graph. ``of_time``: nodes that depend on the time alone, and are examined.
     """
     alone = {node.index for node in of_time}
     used = {x.index for node in reachable(outputs) if node.index not in alone for x in node.operands}
@@ -50,14 +43,7 @@ def laws_of_time(outputs, of_time: Sequence[Expression], clock: Expression) -> L
 def coarse_steps(law: LawOfTime, begin: float, end: float, step: float, switches: np.ndarray) -> tuple[int, float]:
     """Number of fixed steps that do not resolve a law, estimated from some of them, and the begin of the first [s].
 
-    Parameters
-    ----------
-    law : callable
-        The law.
-    begin, end, step : float
-        Interval and step [s].
-    switches : ndarray, shape (k,)
-        Times at which the law switches [s]: steps across one are not examined.
+    ``switches`` (k,): times at which the law switches [s]: steps across one are not examined.
     """
     count = max(1, round((end - begin) / step))
     which = np.unique(np.linspace(0, count - 1, min(count, EXAMINED_STEPS)).astype(int))

@@ -19,7 +19,7 @@ from gauss.dynamics.store import cached
 from gauss.integrators import Point
 from gauss.scene.values import ConstantLaw, as_function
 from gauss.system import BoundLoad, Relations, State, System
-from gauss.system.contact_gaps import has_own_gaps
+from gauss.system.contact_mode import has_own_gaps
 
 LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements that may be laws
 
@@ -56,18 +56,7 @@ NO_SWITCHING = Switching()
 def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
     """Switching times, switching functions and velocity jumps of a motion.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    laws : Laws
-        Its loads.
-    start : State
-        Initial state.
-    end : float
-        Final time [s].
-    breaks : sequence of float
-        Further switching times [s].
+    ``end``: final time [s]. ``breaks``: further switching times [s].
     """
     begin, monotone = start.t, bool(system.scene.nonsmooth)  # release of contacts is checked at few times of a step
     times, jumps = timed_switching(system, laws, start, end, breaks, monotone)

@@ -7,6 +7,7 @@ switching function, since the last stages lie beyond it, but for places where it
 (:mod:`gauss.dynamics.laws.kink_error`); it may miss two, as where a narrow region is entered and left.
 """
 
+from collections.abc import Iterable
 from functools import cached_property, partial, reduce
 from itertools import chain, islice, starmap
 from operator import sub
@@ -27,7 +28,7 @@ from gauss.dynamics.laws.enclosed_parts import (
     sign_changes,
     upper_bounds,
 )
-from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.intervals import Interval, enclose, written_enclosures, written_values
 from gauss.dynamics.laws.kink_error import kink_error, kink_factor
 from gauss.dynamics.laws.levels import LEVELED, leveled
 from gauss.dynamics.laws.narrow_peaks import NarrowPeaks, ends_of
@@ -62,15 +63,9 @@ class TracedFunctions(Protocol):
 class SwitchingFunctions:
     """Switching functions of the traced laws of a system, other than those of time.
 
-    Parameters
-    ----------
-    laws : TracedFunctions
-        Its loads, or other functions of its motion.
+    ``laws``: its loads, or other functions of its motion.
 
-    Attributes
-    ----------
-    pairs : list of tuple of Expression
-        The two sides of every comparison; a switching function is their difference.
+    Attributes: ``pairs``: the two sides of every comparison; a switching function is their difference.
     """
 
     def __init__(self, system: System, laws: TracedFunctions):
@@ -146,10 +141,7 @@ class SwitchingFunctions:
 
         The place is the middle of the subinterval of the first one beyond rounding, relative to the step, 1 without any.
 
-        Parameters
-        ----------
-        first, last : ndarray, shape (n_v,)
-            Accelerations there.
+        ``first``, ``last`` (n_v,): accelerations there.
         """
         crossings, distinct, crossed = 0.0, 0.0, 1.0
         hidden = self._without_narrow_peaks(begin, first, end, last)
@@ -158,7 +150,8 @@ class SwitchingFunctions:
         nodes, parts = enclosed_parts(self.system, begin, first, end, last)
         ends = [list(self._values(node)) for node in nodes]
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
-        enclosed = [_divided(_intervals(self._enclosures(np.ravel(part))), *self._counts) for part in parts]
+        ends_of_all = (self._enclosures(np.ravel(part)).reshape(-1, 2) for part in parts)
+        enclosed = [_divided(starmap(Interval, own), *self._counts) for own in ends_of_all]
         tops = [
             upper_bounds(values[conditions:], rates[conditions:], (ends[j][conditions:], ends[j + 1][conditions:]), tau)
             for j, (values, rates, _, _) in enumerate(enclosed)
@@ -266,24 +259,12 @@ class SwitchingFunctions:
     @cached_property
     def _values(self) -> Function:
         """(t, q, v) → values of the switching functions: written once, called at every end of a subinterval."""
-        asked = self._groups[0]
-
-        def values(state):
-            given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, state, strict=True)}
-            return [value.low for value in enclose(asked, given)]
-
-        return write(values, len(self._symbols), name="switching")
+        return written_values(self._groups[0], self._symbols, "switching")
 
     @cached_property
     def _enclosures(self) -> Function:
         """Low and high of each of (t, q, v, q̈) → those of all groups: written once, called for every subinterval."""
-        symbols, asked = [*self._symbols, *self._acceleration], [x for group in self._groups for x in group]
-
-        def enclosures(ends):
-            given = {symbol.index: Interval(*pair) for symbol, pair in zip(symbols, ends.reshape(-1, 2), strict=True)}
-            return [end for value in enclose(asked, given) for end in value]
-
-        return write(enclosures, 2 * len(symbols), name="enclosures")
+        return written_enclosures(list(chain(*self._groups)), [*self._symbols, *self._acceleration], "enclosures")
 
     def _slopes(self, asked) -> list:
         """Time derivatives of switching functions, with accelerations as symbols; empty if one has none."""
@@ -332,12 +313,7 @@ def _jumps(x: Expression) -> list[Expression]:
     return [node for node in reachable([x]) if jumps(node)]
 
 
-def _intervals(ends) -> list[Interval]:
-    """Intervals of their ends, low and high one after the other."""
-    return list(starmap(Interval, ends.reshape(-1, 2)))
-
-
-def _divided(values: list, *counts: int) -> list[list]:
+def _divided(values: Iterable, *counts: int) -> list[list]:
     """Values in consecutive groups of the given sizes."""
     rest = iter(values)
     return [list(islice(rest, count)) for count in counts]

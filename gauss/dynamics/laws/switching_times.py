@@ -35,25 +35,14 @@ FINEST = 2.0**-24  # smallest cell of the mesh, relative to the interval
 
 @dataclass(frozen=True)
 class Timetable:
-    """Switching times and mesh of laws of time.
+    """Switching times and mesh of laws of time."""
 
-    Attributes
-    ----------
-    switches : ndarray, shape (k,)
-        Times at which a condition changes [s], ascending: no step crosses one. The end of the interval is one of them if a
-        condition is another there than just before.
-    mesh : ndarray, shape (m,)
-        Ends of cells [s], ascending: steps end at each.
-    limitations : tuple of str
-        Warnings about features that are not resolved.
-    laws : tuple of callable
-        Laws of time, of which fixed steps may be too long.
-    """
-
+    # (k,) times at which a condition changes [s], ascending: no step crosses one; with the end of the interval if one is
+    # another there than just before
     switches: np.ndarray
-    mesh: np.ndarray
-    limitations: tuple[str, ...] = ()
-    laws: tuple[LawOfTime, ...] = ()
+    mesh: np.ndarray  # (m,) ends of cells [s], ascending: steps end at each
+    limitations: tuple[str, ...] = ()  # warnings about features that are not resolved
+    laws: tuple[LawOfTime, ...] = ()  # laws of time, of which fixed steps may be too long
 
     def __bool__(self):
         return bool(self.switches.size or self.mesh.size)
@@ -116,16 +105,8 @@ def distinct(values: np.ndarray) -> np.ndarray:
 def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bool = False) -> Timetable:
     """Switching times and mesh of traced laws.
 
-    Parameters
-    ----------
-    outputs : sequence of Expression or float
-        Values of the laws, in one graph.
-    clock : Expression
-        Symbol of the time.
-    begin, end : float
-        Interval of time [s].
-    monotone : bool
-        Whether the mesh makes laws nearly monotone in each cell, for conditions that are sampled at few times of a step.
+    ``outputs``: values of the laws, in one graph. ``monotone``: whether the mesh makes laws nearly monotone in each cell,
+    for conditions that are sampled at few times of a step.
     """
     nodes = of_time(outputs, clock)
     conditions = [_condition(node) for node in nodes if node.op in CONDITIONS]

@@ -1,7 +1,8 @@
 """Laws of loads in compiled dynamics: traced laws become machine code, opaque ones are Python callbacks."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from gauss.codegen import Expression, Function, Graph, branches, content_key, numbers_of
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.store import cached
+from gauss.scene import Input
 from gauss.scene.stateful_laws import preserved
 from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import BoundLoad, State, System, retract
@@ -26,27 +28,13 @@ class Laws:
 
     A law that returns numbers when it is traced does not depend on its arguments, or hides how: it is opaque.
 
-    Parameters
-    ----------
-    system : System
-        The system.
-    trace : bool
-        False: all laws are opaque.
+    ``trace``: False: all laws are opaque.
 
-    Attributes
-    ----------
-    traced, called : list of BoundLoad
-        Loads with traced laws, which become machine code, and loads with opaque laws.
-    reasons : dict
-        Why the law of a load is opaque, {name of the load: reason}.
-    key : Hashable
-        Key of the set of traced laws, those of inputs included: a law may have changed since it was traced.
-    motion : Kinematics or None
-        The system in symbols, where there are laws.
-    functions : list of (str, Function)
-        Traced laws over these symbols, each with the name of its load.
-    of_smooth : Laws or None
-        Laws of the system without unilateral and set-valued elements, once they are asked for.
+    Attributes: ``traced``, ``called``: loads with traced laws, which become machine code, and loads with opaque laws.
+    ``reasons``: why the law of a load is opaque, {name of the load: reason}. ``key``: key of the set of traced laws, those
+    of inputs included: a law may have changed since it was traced. ``motion``: the system in symbols, where there are laws.
+    ``functions``: traced laws over these symbols, each with the name of its load. ``of_smooth``: laws of the system without
+    unilateral and set-valued elements, once they are asked for.
     """
 
     def __init__(self, system: System, trace: bool = True):
@@ -97,10 +85,33 @@ class Laws:
         return [entry for _, function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
 
 
+def present_laws(system: System) -> Laws:
+    """Loads of a system: traced anew, for their functions may have changed; cached where they have none."""
+    return cached(system, (Laws,), lambda: Laws(system)) if system.is_plain else Laws(system)
+
+
 def _with_inputs(key: str, system: System) -> Hashable:
-    """Key with the content of the laws of inputs, where they have some."""
-    inputs = tuple(content_key(given) for given in system.scene.inputs.values() if not given.is_plain)
-    return (key, inputs) if inputs else key
+    """Key with the content of the laws of inputs, where they have some, and with their operations when they are traced.
+
+    The content of a law does not hold all that it looks up: an attribute of a class or of a module may have changed.
+    """
+    given = [one for one in system.scene.inputs.values() if not one.is_plain]
+    return (key, *((content_key(one), *_operations(one, system)) for one in given)) if given else key
+
+
+def _operations(given: Input, system: System) -> Iterator[str]:
+    """Digests of the laws of an input, traced with a symbol for its value; why one cannot be traced."""
+    forces = [part for force in given.forces for part in (force.force, force.moment) if callable(part)]
+    for law in (*([] if given.effort is None else [given.effort]), *forces):
+        motion = symbols(system)
+        value = motion.state.t.graph.parameter("value of an input")
+        try:
+            with preserved(law):
+                traced = _in_symbols(partial(law, value) if law is given.effort else law, motion)
+        except Exception as error:  # a law may fail with symbols in any way
+            yield f"{type(error).__name__}: {error}"
+        else:
+            yield _digest(system, Function("law", [], traced))
 
 
 def needs_poses(load) -> bool:
@@ -124,7 +135,7 @@ def traced_law(law, motion: Kinematics) -> Function | str:
     """Law as a function of symbols, or why it cannot be one."""
     try:
         with preserved(law) as kept:
-            values = list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))
+            values = _in_symbols(law, motion)
     except Exception as error:  # a law may fail with symbols in any way, and not with numbers
         return f"{type(error).__name__}: {error}"
     if kept.changed:
@@ -134,6 +145,11 @@ def traced_law(law, motion: Kinematics) -> Function | str:
     if not any(isinstance(value, Expression) for value in values):
         return "it returns the same numbers whatever it is given"
     return Function("law", [], values)
+
+
+def _in_symbols(law, motion: Kinematics) -> list:
+    """Values of a law of the time and the motion for symbols."""
+    return list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))
 
 
 def _confirmed(law, traced: Function | str, motion: Kinematics, probe: Probe) -> Function | str:

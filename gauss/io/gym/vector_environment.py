@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.dynamics.outputs import split
+from gauss.dynamics.projection import within_limits
 from gauss.errors import ArgumentError, SimulationError, extra, require
 from gauss.io.gym.task import Task
 from gauss.simulation import SimulatorBatch
@@ -95,7 +96,7 @@ class MechanismVectorEnv(VectorEnv):
         starts = []
         for change in self.np_random.uniform(-spread, spread, (chosen.size, 2, self.system.n_v)):
             q = retract(self.system, self._start.q, change[0])
-            starts.append(self.system.projected(State(0.0, q, self._start.v + change[1])))
+            starts.append(self.system.projected(within_limits(self.system, State(0.0, q, self._start.v + change[1]))))
         self.simulators.restart(chosen, [start.q for start in starts], [start.v for start in starts])
 
     def _observed(self) -> np.ndarray:

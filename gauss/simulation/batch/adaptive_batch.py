@@ -32,18 +32,9 @@ DEVICE_BUDGET = 50
 
 
 class AdaptiveBatchCode:
-    """Machine code of one system and method.
+    """Machine code of one system, with its method state, and one method, on a device or this CPU.
 
-    Parameters
-    ----------
-    program : Program
-        The system, with the size of the method state.
-    method : ExplicitPair
-        The method.
-    shares : ndarray, optional
-        Factors of the tolerance, see :class:`gauss.integrators.Tolerance`.
-    device : str, optional
-        Name of a device; this CPU by default.
+    ``shares``: see :class:`gauss.integrators.Tolerance`.
     """
 
     loop: AdaptiveBatchLoop | DeviceAdaptiveLoop
@@ -75,45 +66,20 @@ class AdaptiveBatchCode:
 
 @dataclass(frozen=True)
 class AdaptiveBatchResult:
-    """Trajectories of a batch.
+    """Trajectories of a batch."""
 
-    Parameters
-    ----------
-    samples : ndarray, shape (batch, k, n_q + n_v + 3)
-        States and work.
-    error : ndarray, shape (batch,)
-        Largest error of the accelerations, relative to the largest of them; infinite where a motion failed.
-    steps, rejected : ndarray, shape (batch,)
-        Accepted and rejected steps.
-    energies : EnergyRecord
-        Energies (batch,).
-    """
-
-    samples: np.ndarray
-    error: np.ndarray
-    steps: np.ndarray
+    samples: np.ndarray  # (batch, k, n_q + n_v + 3) states and work
+    error: np.ndarray  # (batch,) largest error of the accelerations, relative to their largest; infinite where one failed
+    steps: np.ndarray  # steps, rejected (batch,): accepted and rejected steps
     rejected: np.ndarray
-    energies: EnergyRecord
+    energies: EnergyRecord  # energies (batch,)
 
 
 class AdaptiveBatch:
-    """Batch of motions by an adaptive method.
+    """Batch of motions by an adaptive method, from initial states (n_q + n_v, batch) at t = 0.
 
-    Parameters
-    ----------
-    code : AdaptiveBatchCode
-        Machine code.
-    starts : ndarray, shape (n_q + n_v, batch)
-        Initial states, at t = 0.
-    tolerance : Tolerance
-        Local error.
-    parameters : ndarray, shape (n, batch), optional
-        Parameters of each motion, of a parametrised system.
-
-    Attributes
-    ----------
-    residual : ndarray, shape (batch,)
-        Constraint residuals of the initial states, relative to the sizes of the constraints.
+    ``parameters`` (n, batch): those of each motion, of a parametrised system; ``residual`` (batch,): constraint residuals of
+    the initial states, relative to the sizes of the constraints.
     """
 
     def __init__(

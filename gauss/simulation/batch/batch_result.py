@@ -4,15 +4,14 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from numbers import Integral
 
 import numpy as np
 
-from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import FORCES, shape_of, split
+from gauss.dynamics.programs import CalledProgram
 from gauss.dynamics.sensor_values import INERTIAL
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, StateError, did_you_mean
@@ -24,7 +23,7 @@ from gauss.simulation.held_inputs import RecordedInput, driven_as
 from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.motion_records import Stats
-from gauss.simulation.trajectory import Trajectory
+from gauss.simulation.trajectory import Trajectory, is_index
 from gauss.system import System
 
 METHOD = "compiled batch, checked by inverse dynamics"
@@ -96,7 +95,7 @@ class Rollout:
         StateError
             If there is no such motion.
         """
-        if not isinstance(index, Integral) or not -len(self) <= index < len(self):
+        if not is_index(index, len(self)):
             raise StateError(f"trajectory: expected the number of a motion, below {len(self)}, got {index!r}.")
         k = int(index) % len(self)
         if k in self.again:
@@ -107,8 +106,8 @@ class Rollout:
         error = np.nan if self.errors is None else float(self.errors[k])
         stats = Stats(self.settings.get("evaluations", 1) * (steps + rejected), steps, rejected, 0, 0.0, error, METHOD)
         step = self.settings["step"] if self.settings.get("integrator") == TIME_STEPPING.name else None
-        parts = (part[:rows].copy() for part in (self.t, self.q[k], self.v[k], self._work_of(k)))
-        return Trajectory(self._driven(k), *parts, stats, step=step, settings=dict(self.settings))
+        t, q, v, work = (part[:rows].copy() for part in (self.t, self.q[k], self.v[k], self._work_of(k)))
+        return Trajectory(self._driven(k), t, q, v, work, stats, step=step, settings=dict(self.settings))
 
     def _work_of(self, k: int) -> np.ndarray:
         """Work (k, 3) of one motion; that of fixed steps by the same steps again."""
@@ -145,7 +144,7 @@ class Rollout:
             If it depends on the accelerations of a motion with contacts or friction, which are means over steps.
         """
         outputs = self.system.scene.outputs
-        if name not in outputs:
+        if not isinstance(name, str) or name not in outputs:
             raise StateError(f"no output {name!r}. {did_you_mean(name, outputs)}")
         output = outputs[name]
         if output.kind in (*INERTIAL, *FORCES) and self.system.nonsmooth:
@@ -177,10 +176,7 @@ class Rollout:
 def kept_on_interruption(make: Callable[..., Rollout]):
     """Attach a rollout to a KeyboardInterrupt, for a ``with`` statement: of its ``samples`` (batch, k, n_q + n_v …), if any.
 
-    Parameters
-    ----------
-    make : callable
-        (samples, fields) → rollout.
+    ``make``: (samples, fields) → rollout.
     """
     try:
         yield

@@ -10,14 +10,13 @@ from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.constraint_modes import constraint_modes
 from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.parametrised_system import parametrised
+from gauss.dynamics.parameters import parametrised
 from gauss.dynamics.plan import BATCHES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
-from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
-from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
+from gauss.simulation.batch.fixed_step_batch import DeviceFixedStepBatch, FixedStepBatch
 from gauss.simulation.batch.machine_code import FIXED
 from gauss.simulation.batch.rollout import ADAPTIVE
 from gauss.simulation.compiled_steps.loop_functions import fixed_batch
@@ -28,29 +27,11 @@ from gauss.system import State, System
 
 
 class Ensemble:
-    """Machine code of a parametrised system.
+    """Machine code of a parametrised system: one of the systems, and the numbers in which some members (batch, n) differ.
 
-    Parameters
-    ----------
-    pattern : System
-        One of the systems.
-    members : ndarray, shape (batch, n)
-        Numbers of some of them, see :func:`gauss.dynamics.parameters.numbers`; those that differ are the parameters.
-    integrator : str
-        "dop853" or "dopri5", with steps of each motion; "rk4" or "semi_implicit_euler".
-    step : float, optional
-        Largest step [s].
-    rtol : float
-        Local error of adaptive steps, relative to coordinates and rates.
-    atol : float, pair or mapping
-        Absolute part of it, as for :func:`gauss.simulate`.
-    device : str, optional
-        Name of devices; this CPU by default.
-
-    Raises
-    ------
-    SimulationError
-        If the systems cannot be compiled, with the reasons, or not with this integrator.
+    Numbers: see :func:`gauss.dynamics.parameters.numbers`. Integrators: "dop853" or "dopri5", with steps of each motion, up
+    to ``step`` [s]; "rk4" or "semi_implicit_euler". ``atol``: as for :func:`gauss.simulate`. SimulationError if the systems
+    cannot be compiled, with the reasons, or not with this integrator.
     """
 
     def __init__(
@@ -87,33 +68,12 @@ class Ensemble:
 
     @one_tier()
     def move(self, starts, members, times, threads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Trajectories of members.
+        """Samples (batch, k, n_q + n_v) of members, which of them fail a check (batch,), and their imbalances (batch,).
 
-        Parameters
-        ----------
-        starts : ndarray, shape (n_q + n_v, batch)
-            Consistent starts at t = 0.
-        members : ndarray, shape (batch, n)
-            Numbers of each system.
-        times : ndarray, shape (k,)
-            Samples [s], equally spaced from 0 on.
-        threads : int
-            Threads that share the motions.
-
-        Returns
-        -------
-        samples : ndarray, shape (batch, k, n_q + n_v)
-            States.
-        doubtful : ndarray of bool, shape (batch,)
-            Motions that fail a check: of accelerations by inverse dynamics, of loops by constraint residuals; all of them
-            where fixed steps cross switching times, or prescribed velocities or constraints jump.
-        share : ndarray, shape (batch,)
-            Residual of their energy balance, relative to their largest energy.
-
-        Raises
-        ------
-        SimulationError
-            If a prescribed position jumps.
+        Consistent starts are (n_q + n_v, batch) at t = 0, numbers of members (batch, n), times of samples (k,) equally
+        spaced from 0 on [s]. Accelerations are checked by inverse dynamics, loops by constraint residuals; all members fail
+        where fixed steps cross switching times, or prescribed velocities or constraints jump. The imbalance is the residual
+        of the energy balance, relative to the largest energy. SimulationError if a prescribed position jumps.
         """
         system, duration = self.family.pattern, float(times[-1])
         start = State(0.0, *np.split(starts[:, 0], [system.n_q]))

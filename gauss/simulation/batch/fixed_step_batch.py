@@ -1,4 +1,4 @@
-"""Fixed-step batch: motions side by side in vector registers, by a compiled loop, in several threads."""
+"""Fixed-step batch: motions side by side in vector registers, by a compiled loop, in several threads; or on devices."""
 
 import os
 from collections.abc import Callable, Iterable
@@ -17,37 +17,13 @@ NEVER = 2**52  # steps: beyond the end of any motion
 CHUNKS_PER_THREAD = 4  # of the motions: a delayed thread does not delay the others
 
 
-class FixedStepBatch:
-    """Points of a batch of motions, one column each; the last one is repeated to fill a vector register.
+class BatchPoints:
+    """Points of motions, one column each, of which the first ``size`` count, and their worst checks so far."""
 
-    Parameters
-    ----------
-    loop : FixedStepBatchLoop or DeviceFixedStepLoop
-        Compiled loop.
-    starts : ndarray, shape (n_q + n_v, batch)
-        Initial states, at t = 0.
-    parameters : ndarray, shape (n, batch), optional
-        Parameters of each motion, of a parametrised system.
-    """
-
-    def __init__(
-        self, loop: FixedStepBatchLoop | DeviceFixedStepLoop, starts: np.ndarray, parameters: np.ndarray | None = None
-    ):
-        self.loop, self.size = loop, starts.shape[1]
-        filled = self._filled(starts)
-        self.columns = filled.shape[1]
-        self.points = np.zeros((loop.size, self.columns))
-        self.states = slice(1, 1 + len(starts))
-        self.points[self.states] = filled
-        if parameters is not None:
-            self.points[loop.size - len(parameters) :] = self._filled(parameters)
-        self.worst = np.zeros((len(WORST_RECORD), self.columns))
-        none = np.zeros((0, 0, 0))
-        span = BatchSpan(columns=self.columns, rows=0, begin=0, end=self.columns)
-        loop(span, self.points, self.worst, none, *([none] if loop.inputs else []))
-
-    def _filled(self, columns: np.ndarray) -> np.ndarray:
-        return np.pad(columns, ((0, 0), (0, -self.size % self.loop.width)), mode="edge")
+    points: np.ndarray  # (m, columns)
+    worst: np.ndarray  # (k, columns), as of WORST_RECORD
+    states: slice  # of a point: coordinates and rates
+    size: int
 
     @property
     def error(self) -> np.ndarray:
@@ -70,14 +46,41 @@ class FixedStepBatch:
         return self.worst[3, : self.size]
 
     @property
+    def reached(self) -> np.ndarray:
+        """States (n_q + n_v, batch) so far, NaN of motions that cannot continue."""
+        return self.points[self.states, : self.size]
+
+
+class FixedStepBatch(BatchPoints):
+    """Points of a batch of motions, one column each; the last one is repeated to fill a vector register.
+
+    Initial states are (n_q + n_v, batch), at t = 0; ``parameters`` (n, batch) those of each motion, of a parametrised
+    system.
+    """
+
+    def __init__(
+        self, loop: FixedStepBatchLoop | DeviceFixedStepLoop, starts: np.ndarray, parameters: np.ndarray | None = None
+    ):
+        self.loop, self.size = loop, starts.shape[1]
+        filled = self._filled(starts)
+        self.columns = filled.shape[1]
+        self.points = np.zeros((loop.size, self.columns))
+        self.states = slice(1, 1 + len(starts))
+        self.points[self.states] = filled
+        if parameters is not None:
+            self.points[loop.size - len(parameters) :] = self._filled(parameters)
+        self.worst = np.zeros((len(WORST_RECORD), self.columns))
+        none = np.zeros((0, 0, 0))
+        span = BatchSpan(columns=self.columns, rows=0, begin=0, end=self.columns)
+        loop(span, self.points, self.worst, none, *([none] if loop.inputs else []))
+
+    def _filled(self, columns: np.ndarray) -> np.ndarray:
+        return np.pad(columns, ((0, 0), (0, -self.size % self.loop.width)), mode="edge")
+
+    @property
     def energies(self) -> EnergyRecord:
         """Energies (batch,) so far."""
         return EnergyRecord(*self.worst[WORST_RECORD.index("kinetic") :, : self.size])
-
-    @property
-    def reached(self) -> np.ndarray:
-        """States (n_q + n_v, batch) so far."""
-        return self.points[self.states, : self.size]
 
     def kept(self) -> tuple:
         """What motions continue from."""
@@ -163,6 +166,32 @@ class FixedStepBatch:
             rows[np.arange(rows.shape[1]) > made[:, None] // keep] = np.nan
             error.samples = rows[: self.size]  # type: ignore[attr-defined]
             raise
+        return rows[: self.size]
+
+
+class DeviceFixedStepBatch(FixedStepBatch):
+    """Points of a batch of motions on devices: all at once, in parts that fit into their memory."""
+
+    def run(
+        self, steps: int, h: float, keep: int, threads: int, control: np.ndarray | None = None, with_work: bool = False
+    ) -> np.ndarray:
+        """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps; ``threads`` has no meaning.
+
+        DeviceError if one motion alone does not fit into the memory of the device.
+        """
+        loop = self.loop
+        assert isinstance(loop, DeviceFixedStepLoop)
+        sample = loop.written if with_work else self.states
+        rows = np.empty((self.columns, steps // keep + 1, sample.stop - sample.start))
+        rows[:, 0] = self.points[sample].T
+        settings = {"h": h, "keep": keep, "every": steps_per_check(loop.evaluations), "columns": self.columns}
+        settings |= {"rows": rows.shape[1], "row": rows.shape[2], "begin": 0, "end": self.columns}
+        if control is not None:
+            settings |= {"hold": steps // control.shape[1], "motions": len(control), "changes": control.shape[1]}
+        spans = [
+            BatchSpan(first=first, last=min(first + BUDGET, steps), **settings) for first in range(0, steps, BUDGET)
+        ]  # a program is no longer than the driver allows on a GPU with a display
+        loop.move(spans, self.points, self.worst, rows, *([] if control is None else [control]))
         return rows[: self.size]
 
 

@@ -15,10 +15,7 @@ CONSISTENT = 1e-9  # largest residual, relative to the sizes of the constraints 
 def columns(system: System, q0, v0) -> np.ndarray:
     """Initial states (n_q + n_v, batch) with quaternions normalised as by :meth:`gauss.System.state`.
 
-    Raises
-    ------
-    StateError
-        If shapes are wrong, a number is not finite, or a quaternion is not of unit length.
+    StateError if shapes are wrong, a number is not finite, or a quaternion is not of unit length.
     """
     parts = []
     for name, given, size in (("q0", q0, system.n_q), ("v0", v0, system.n_v)):

@@ -52,10 +52,7 @@ def fixed_step_code(
 ) -> "FixedStepBatchLoop | DeviceFixedStepLoop":
     """Machine code of fixed steps of a batch, cached with the system; with inputs that are held in each step, or without.
 
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled, or has links that the method does not take.
+    SimulationError if the system cannot be compiled, or has links that the method does not take.
     """
     if method.nonsmooth:
         refuse_links(system)
@@ -73,24 +70,12 @@ def fixed_step_code(
 
 
 def batch_program(system: System, laws: Laws, method: Integrator) -> type[Program]:
-    """Class of the functions of a system for a batch.
-
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled.
-    """
+    """Class of the functions of a system for a batch; SimulationError if the system cannot be compiled."""
     return program_of(BATCHES.plan(Question(system, laws, method=method)).dynamics)
 
 
 def machine_code(system: System, method: Integrator, kind: tuple, make: Callable[[Laws], T]) -> T:
-    """Machine code of the steps, cached with the system.
-
-    Raises
-    ------
-    SimulationError
-        If the system cannot be compiled.
-    """
+    """Machine code of the steps, cached with the system; SimulationError if the system cannot be compiled."""
     laws = Laws(system)
     batch_program(system, laws, method)
     return cached_on_disk(system, (machine_code, method_key(method), kind, laws.key), lambda: make(laws))

@@ -17,13 +17,8 @@ def repeat(
     """Repeat motions by :func:`gauss.simulate` with the settings ``run``, and warn of energy balances.
 
     Samples and imbalances are changed. Returned are why motions cannot continue, whose samples are NaN from there on, and
-    the trajectories of all that have any. An interruption has the samples so far as its ``samples``, NaN behind
-    them, and the trajectories as its ``again``.
-
-    Warns
-    -----
-    BalanceWarning
-        If there are any.
+    the trajectories of all that have any. An interruption has the samples so far as its ``samples``, NaN behind them, and
+    the trajectories as its ``again``.
     """
     failed: dict[int, str] = {}
     trajectories: dict[int, Trajectory] = {}
@@ -63,17 +58,9 @@ def _keep(samples: np.ndarray, start: np.ndarray, times: np.ndarray, so_far: Tra
 
 
 def tell_of_divergence(system: System, batch: int, reasons: dict[int, str], trajectories: dict[int, Trajectory]):
-    """Warn of motions that cannot continue, by their number and reason.
+    """Warn of motions that cannot continue, by their number and reason, if others reach the end.
 
-    Warns
-    -----
-    DivergenceWarning
-        If there are some, and others reach the end.
-
-    Raises
-    ------
-    SimulationError
-        If none reaches the end; its ``trajectory`` is the first motion so far.
+    SimulationError if none does; its ``trajectory`` is the first motion so far.
     """
     if not reasons:
         return

@@ -23,8 +23,7 @@ from gauss.interruption import interruption_keeps
 from gauss.simulation.arguments import numbers, sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
 from gauss.simulation.batch.batch_result import Rollout, kept_on_interruption
-from gauss.simulation.batch.device_batch import DeviceFixedStepBatch
-from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
+from gauss.simulation.batch.fixed_step_batch import DeviceFixedStepBatch, FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
 from gauss.simulation.batch.machine_code import STEPPED, batch_program, fixed_step_code, machine_code, one_by_one
 from gauss.simulation.batch.repeated_motions import repeat, tell_of_divergence
@@ -125,8 +124,10 @@ def rollout(
     """
     require(system, (System,), "rollout")
     refuse_changed(system)
-    _check_counts({"threads": threads})
+    if threads is not None:
+        checked_count("threads", threads)
     device = None if device is None else double_precision(device)
+    integrator = str(integrator)  # what is no name is none of a method
     if integrator in ADAPTIVE:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
         _refuse(integrator, "takes no control=: its steps are not those of the samples; use 'rk4'", control=control)
@@ -165,10 +166,10 @@ def _fixed(
     steps, step = _checked_steps(steps, step, every)
     starts = columns(system, q0, v0)
     _refuse_beyond_memory(system, starts, steps // every + 1, "give fewer motions or steps, or a larger every=")
+    t = step * every * np.arange(steps // every + 1)
     control = None if control is None else _checked_control(system, control, starts.shape[1], steps)
     if not system.n_v:
-        return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
-    t = step * every * np.arange(steps // every + 1)
+        return _constant(system, starts, t, steps)
     run = {"integrator": method.name, "step": step, "times": t}
     settings = run | {"duration": steps * step, "steps": steps, "every": every, "evaluations": method.evaluations}
     if device is None and one_by_one(system, method, control is not None):
@@ -203,9 +204,8 @@ def _checked_steps(steps: int | None, step: float | None, every: int) -> tuple[i
     """Number and length [s] of fixed steps."""
     check_tolerances(step=step)
     assert step is not None  # it is a positive number
-    if steps is None:
-        raise SimulationError("steps: expected a positive whole number, got None.")
-    _check_counts({"steps": steps, "every": every})
+    steps = checked_count("steps", steps)
+    checked_count("every", every)
     return steps, step
 
 
@@ -249,10 +249,7 @@ def _result(system: System, t: np.ndarray, samples: np.ndarray, **fields) -> Rol
 def _checked_control(system: System, control, batch: int, steps: int) -> np.ndarray:
     """Inputs (batch, k, n_u) of all motions.
 
-    Raises
-    ------
-    SimulationError
-        If the scene has no inputs, the shape is wrong, or a value is not finite.
+    SimulationError if the scene has no inputs, the shape is wrong, or a value is not finite.
     """
     names = tuple(system.scene.inputs)
     if not names:
@@ -317,10 +314,7 @@ def _adaptive(
 def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
     """Switching times of laws of time, and jumps of prescribed velocities.
 
-    Raises
-    ------
-    SimulationError
-        If a prescribed position jumps.
+    SimulationError if a prescribed position jumps.
     """
     switched = switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end)
     warn_of_times(system, switched.times)
@@ -356,10 +350,3 @@ def _refuse(integrator: str, why: str, **given):
     for name, value in given.items():
         if value is not None:
             raise SimulationError(f"{name}: integrator {integrator!r} {why}.")
-
-
-def _check_counts(counts: dict):
-    for name, value in counts.items():
-        if name == "threads" and value is None:
-            continue
-        checked_count(name, value)

@@ -16,6 +16,7 @@ from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.load_receiver import output_kernel
 from gauss.dynamics.outputs import shape_of, split
+from gauss.dynamics.projection import within_limits
 from gauss.dynamics.rules import Question
 from gauss.dynamics.scene_compilation import compile_scene
 from gauss.errors import SimulationError, StateError, did_you_mean, require
@@ -110,7 +111,7 @@ class SimulatorBatch:
         self.system = system = compile_scene(scene) if isinstance(scene, Scene) else scene
         whole, self.step_size, self.threads = system.scene, float(step), checked_count("threads", threads)
         self.inputs, self.output_names = tuple(whole.inputs), tuple(whole.outputs)
-        self.integrator = integrator or usual_fixed_step(whole)
+        self.integrator = usual_fixed_step(whole) if integrator is None else str(integrator)
         if self.integrator not in STEPPED:
             raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(self.integrator, STEPPED)}")
         method = STEPPED[self.integrator]
@@ -217,7 +218,8 @@ class SimulatorBatch:
     def _changed(self, start: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Neighbour (n_q + n_v,) of a state by a displacement and a change of rates, which meets the constraints."""
         q, v = np.split(start, [self.system.n_q])
-        state = self.system.projected(State(0.0, retract(self.system, q, change[0]), v + change[1]))
+        near = State(0.0, retract(self.system, q, change[0]), v + change[1])
+        state = self.system.projected(within_limits(self.system, near))
         return np.concatenate([state.q, state.v])
 
     def step(self, u=None, n: int = 1):
@@ -365,13 +367,7 @@ class SimulatorBatch:
 
 
 def _chosen(which, batch: int) -> np.ndarray:
-    """Numbers of some motions.
-
-    Raises
-    ------
-    StateError
-        If there are no such motions.
-    """
+    """Numbers of some motions; StateError if there are no such motions."""
     try:
         return np.ravel(np.arange(batch)[which])
     except (IndexError, ValueError, TypeError) as error:

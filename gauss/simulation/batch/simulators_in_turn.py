@@ -7,12 +7,13 @@ import numpy as np
 from gauss.codegen.kernels import WORST_RECORD
 from gauss.dynamics.initial_states import constraint_residual
 from gauss.errors import SimulationError
+from gauss.simulation.batch.fixed_step_batch import BatchPoints
 from gauss.simulation.simulator import Simulator
 from gauss.simulation.simulator_state import SimulatorState
 from gauss.system import State
 
 
-class SimulatorsInTurn:
+class SimulatorsInTurn(BatchPoints):
     """Points of motions, one column each, in the form of :class:`gauss.simulation.batch.fixed_step_batch.FixedStepBatch`.
 
     Parameters
@@ -38,31 +39,6 @@ class SimulatorsInTurn:
             self.contacts.append(begun.contacts)
             points.append(np.frombuffer(begun.point))
         self.control, self.points = begun.control, np.array(points).T
-
-    @property
-    def error(self) -> np.ndarray:
-        """Largest error of the accelerations, relative: the simulator checks each start itself."""
-        return self.worst[0]
-
-    @property
-    def residual(self) -> np.ndarray:
-        """Constraint residual of the initial states, relative to the sizes of the constraints."""
-        return self.worst[1]
-
-    @property
-    def unseen(self) -> np.ndarray:
-        """Zero: the simulator warns itself of conditions of laws that a step may have passed."""
-        return self.worst[2]
-
-    @property
-    def unsolved(self) -> np.ndarray:
-        """Zero: the simulator repeats steps whose equations are not solved."""
-        return self.worst[3]
-
-    @property
-    def reached(self) -> np.ndarray:
-        """States (n_q + n_v, batch) so far, NaN of motions that cannot continue."""
-        return self.points[self.states]
 
     def kept(self) -> tuple:
         """What motions continue from."""

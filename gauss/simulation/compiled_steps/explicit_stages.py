@@ -1,10 +1,9 @@
 """Steps of explicit pairs as machine code; the sums over stages are loops of :mod:`gauss.codegen.kernels.explicit`.
 
 Stages within a step have a small constraint residual, which is harmless but near configurations with rank-deficient
-constraint
-Jacobian, as a flat parallelogram: there, accelerations are off by the residual over the square of the smallest pivot. Stages
-with a small pivot are therefore projected onto the constraints before they are evaluated; motions on the constraints are the
-same.
+constraint Jacobian, as a flat parallelogram: there, accelerations are off by the residual over the square of the smallest
+pivot. Stages with a small pivot are therefore projected onto the constraints before they are evaluated; motions on the
+constraints are the same.
 
 Constraints that are redundant on the constraint manifold only, as those of an overconstrained spatial loop, are independent
 off it and contradict each other by the residual. Systems with such constraints have all their stages projected.

@@ -1,9 +1,8 @@
 """Fixed steps near singular configurations: all stages are projected onto the constraints before they are evaluated.
 
 Stages of a fixed step have a constraint residual of the order h³. Near a configuration with rank-deficient constraint
-Jacobian,
-as a flat parallelogram, accelerations are off by this residual over the square of the smallest pivot, in each stage by
-another amount.
+Jacobian, as a flat parallelogram, accelerations are off by this residual over the square of the smallest pivot, in each
+stage by another amount.
 """
 
 from collections.abc import Callable

@@ -2,9 +2,8 @@
 
 The Jacobian loses rank where branches of a motion meet, as in a flat parallelogram. The motion passes such a configuration
 smoothly, but accelerations lose digits near it: rounding ε of the constraints becomes v² ε / σ³ of them, σ being the
-smallest
-singular value of the Jacobian K M^(−1/2), over its length on free bodies; it is estimated by (Σ 1/pivot)^(−1/2). A stage
-very near the configuration spoils the step. Since σ is proportional to the time left, two stages predict its zero.
+smallest singular value of the Jacobian K M^(−1/2), over its length on free bodies; it is estimated by (Σ 1/pivot)^(−1/2). A
+stage very near the configuration spoils the step. Since σ is proportional to the time left, two stages predict its zero.
 """
 
 import numpy as np

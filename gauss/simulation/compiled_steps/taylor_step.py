@@ -15,9 +15,7 @@ from gauss.errors import SimulationError
 from gauss.integrators import WATCHED, Point, Tolerance, method_state_of, reach
 from gauss.system import State, System, coordinate_rates
 
-LARGEST_DEFECT = (
-    1e4  # of the rates at the end of a step, over the tolerance: a larger one shows that the series misses a law
-)
+LARGEST_DEFECT = 1e4  # of the rates after a step, over the tolerance: a larger one shows that the series misses a law
 
 
 def taylor_step(program: Program, shares=None) -> TaylorStep:

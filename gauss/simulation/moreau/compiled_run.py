@@ -21,8 +21,7 @@ from gauss.simulation.held_inputs import driven_as
 from gauss.simulation.moreau.compiled_step import compiled_steps, method_state_size
 from gauss.simulation.moreau.contact_events import ContactEvents
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
-from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, in_words, time_step
-from gauss.simulation.moreau.start_overlap import accepted_overlap
+from gauss.simulation.moreau.moreau_jean import KnownRates, MoreauRun, accepted_overlap, time_step, with_laws
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
@@ -45,7 +44,7 @@ class CompiledMoreauRun(CompiledFixedRun):
     """
 
     def __init__(self, problem: Problem, laws: Laws, dynamics: str = "compiled", removal: float = 0.0):
-        self.whole, self.stepper = problem, moreau_stepper(problem.system, removal=removal)
+        self.whole, self.stepper = problem, moreau_stepper(problem.system, removal=removal, laws=laws)
         self.stepper.refuse_penetration(problem.start, accepted_overlap(problem, bool(removal)))
         self.contacts, self.forces = ContactEvents(self.stepper.modes), self.stepper.lossy.size
         self.codes = self.stepper.modes.codes
@@ -69,10 +68,14 @@ class CompiledMoreauRun(CompiledFixedRun):
         self.run()
         fallback = lambda start, samples: self.python_steps.collect(start, samples, False)  # noqa: E731
         found = replace(self.finished(fallback), system=self.whole.system, step=self.step)
-        relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
-        warn_of_laws(self._law_error(), relaxed, found.stats.steps)
+        warn_of_laws(self._law_error(), self.relaxed, found.stats.steps)
         warn_of_unseen_contacts(found)
         return found
+
+    @property
+    def relaxed(self) -> int:
+        """Steps by the convex relaxation of Coulomb's law; Python makes all of them."""
+        return self.python_steps.relaxed if "python_steps" in vars(self) else 0
 
     def _law_error(self) -> float:
         """Largest residual of the laws of contact and friction so far; a law that raises at the start leaves no point."""
@@ -163,6 +166,5 @@ class CompiledMoreauRun(CompiledFixedRun):
     def trajectory(self) -> Trajectory:
         """Motion so far."""
         found = super().trajectory()
-        relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
-        method = in_words(self.step, self._law_error(), relaxed, found.stats.method)
-        return replace(found, system=self.whole.system, stats=found.stats._replace(method=method), step=self.step)
+        stats = with_laws(found.stats, self.step, self._law_error(), self.relaxed)
+        return replace(found, system=self.whole.system, stats=stats, step=self.step)

@@ -12,7 +12,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import write
 from gauss.codegen.kernels import FirstAccepted, Fixed, FixedStepBatchLoop, Notes
-from gauss.dynamics.contact.damped_step import traced_damping
+from gauss.dynamics.contact.implicit_damping import traced_damping
 from gauss.dynamics.contact.moreau_step import (
     MIDPOINT,
     MISSED_CLOSING_RATE,

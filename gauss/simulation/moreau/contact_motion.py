@@ -9,9 +9,8 @@ from gauss.codegen.kernels.step_memory import CHANGES_ROOM
 from gauss.dynamics.contact.contact_changes import ModeChange, RecordedChanges
 from gauss.dynamics.contact.contact_stepper import new_contact_stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
-from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
-from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
+from gauss.dynamics.contact.step_parts import FreeBodyStep, MechanismStep
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_events import event_of
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Iterable
 
 from gauss.dynamics.contact.paradox import Paradox
-from gauss.errors import ContactLawWarning, PainleveWarning
+from gauss.errors import ContactLawWarning, PainleveWarning, user_level
 
 LOOSE_LAWS = 1e-6  # relative residual of the laws of contact and friction, above which a motion is warned of
 
@@ -24,7 +24,7 @@ class ParadoxWarnings:
                 warnings.warn(
                     f"t = {t:.6g} s: {paradox}. The step goes on with an impulse that satisfies the law at its end.",
                     PainleveWarning,
-                    stacklevel=2,
+                    stacklevel=user_level(),
                 )
 
 
@@ -44,5 +44,5 @@ def warn_of_laws(error: float, relaxed: int, steps: int):
         warnings.warn(
             f"contact and friction: {'; '.join(found)}. Sliding contacts open a little there; give a smaller step.",
             ContactLawWarning,
-            stacklevel=2,
+            stacklevel=user_level(),
         )

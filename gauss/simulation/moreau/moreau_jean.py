@@ -1,14 +1,14 @@
 """Moreau–Jean time stepping: impacts, friction, and drives of limited force within steps of one length.
 
-A step takes the mean accelerations for which every contact and friction law holds at its end:
-v₁ = v₀ + h a,  q₁ = q₀ ⊕ h (s v₀ + (1 − s) v₁), with the share s of the old rates; the rates are those of
-:mod:`gauss.dynamics.contact.moreau_step`, the laws those of :mod:`gauss.dynamics.contact.contact_step` (Moreau 1988; Jean
-1999;
-Anitescu 2006). The order is 2 while the active contacts and the sticking ones do not change, for systems without loops and
-restitution; impacts and stick–slip transitions leave errors proportional to the step. Where no solution of Coulomb's law is
-found, the step of the convex relaxation is taken, and counted.
+A step takes the mean accelerations for which every contact and friction law holds at its end: v₁ = v₀ + h a,  q₁ = q₀ ⊕ h (s
+v₀ + (1 − s) v₁), with the share s of the old rates; the rates are those of :mod:`gauss.dynamics.contact.moreau_step`, the
+laws those of :mod:`gauss.dynamics.contact.contact_step` (Moreau 1988; Jean 1999; Anitescu 2006). The order is 2 while the
+active contacts and the sticking ones do not change, for systems without loops and restitution; impacts and stick–slip
+transitions leave errors proportional to the step. Where no solution of Coulomb's law is found, the step of the convex
+relaxation is taken, and counted.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple, cast
 
@@ -19,7 +19,7 @@ from gauss.backends.solution import Solution
 from gauss.codegen import Entry, Scalar
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.moreau_step import MoreauStep, advance_positions, moreau_stepper
-from gauss.dynamics.contact.overlaps import left_by_steps
+from gauss.dynamics.contact.overlaps import START_OVERLAP, left_by_steps
 from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.switching import Switching
@@ -29,6 +29,8 @@ from gauss.integrators import Cost, FixedStep, Point, Rates
 from gauss.simulation.moreau.contact_events import ContactEvents
 from gauss.simulation.moreau.contact_warnings import ParadoxWarnings, warn_of_laws
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
+from gauss.simulation.motion_records import Stats
+from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, retract
@@ -116,14 +118,30 @@ class MoreauRun(PythonRun):
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = super()._trajectory(kept, samples, began)
-        stats = whole.stats._replace(method=in_words(self.h, self.error, self.relaxed, whole.stats.method))
-        return replace(whole, stats=stats, step=self.h)
+        return replace(whole, stats=with_laws(whole.stats, self.h, self.error, self.relaxed), step=self.h)
 
 
-def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str:
-    """Description: step, residual of the laws, steps of the convex relaxation, source of the accelerations."""
+def accepted_overlap(problem: Problem, controlled: bool = False) -> float:
+    """Largest penetration at the start of a problem, relative to the scale of a gap.
+
+    Parameters
+    ----------
+    problem : Problem
+        Initial value problem.
+    controlled : bool
+        Whether the error of the steps is controlled: then they leave penetration within its tolerance.
+    """
+    system = problem.system
+    if controlled or problem.step is None:
+        return START_OVERLAP + problem.tolerance.share(system)
+    return left_by_steps(system, problem.start.v, problem.step)
+
+
+def with_laws(stats: Stats, step: float, error: float, relaxed: int) -> Stats:
+    """Statistics with the step, the residual of the laws of contact, and the steps of the convex relaxation."""
     by = f"; {relaxed} steps by the convex relaxation of Coulomb's law" if relaxed else ""
-    return f"time stepping of {step:g} s, laws of contact and friction met to {error:.0e} relative{by}; {accelerations}"
+    method = f"time stepping of {step:g} s, laws of contact and friction met to {error:.0e} relative{by}; {stats.method}"
+    return stats._replace(method=method, law_error=error)
 
 
 class KnownRates(NamedTuple):
@@ -158,10 +176,10 @@ TIME_STEPPING = FixedStep(
 NONSMOOTH = (TIME_STEPPING,)
 
 
-def step_at(trajectory: Trajectory, index: int, backend: str | Backend | type = "auto") -> MoreauStep:
-    """Step from a sample of a motion by time stepping."""
-    stepper = moreau_stepper(trajectory.system, backend, trajectory.removal)
-    return stepper.step(trajectory.state(index), cast(float, trajectory.step))
+def steps_at(trajectory: Trajectory) -> Callable[[int], MoreauStep]:
+    """Steps from the samples of a motion by time stepping, by the numbers of these."""
+    stepper, step = moreau_stepper(trajectory.system, removal=trajectory.removal), cast(float, trajectory.step)
+    return lambda index: stepper.step(trajectory.state(index), step)
 
 
 def contact_parts(motion: Kinematics, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,9 +17,8 @@ from gauss.integrators import FixedStep, Point, Rates
 from gauss.simulation.grid import grid_of, with_samples
 from gauss.simulation.moreau.contact_motion import ContactMotion
 from gauss.simulation.moreau.contact_warnings import warn_of_laws
-from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, in_words
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, accepted_overlap, with_laws
 from gauss.simulation.moreau.sleeping_motion import SleepingMotion
-from gauss.simulation.moreau.start_overlap import accepted_overlap
 from gauss.simulation.moreau.unseen_contacts import warn_of_unseen_contacts
 from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
@@ -152,8 +151,8 @@ class PairKernelRun(PythonRun):
         self.engine.evaluations = motion.steps
         self.events = sorted([*self.events, *motion.events], key=lambda event: event.t)
         whole = super()._trajectory(kept, samples, began)
-        method = in_words(self.h, motion.largest, motion.relaxed, whole.stats.method)
-        return replace(whole, stats=whole.stats._replace(method=method, sleep=motion.slept()), step=self.step)
+        stats = with_laws(whole.stats, self.h, motion.largest, motion.relaxed)
+        return replace(whole, stats=stats._replace(sleep=motion.slept()), step=self.step)
 
 
 def _divided(pairs: np.ndarray, changes: Iterable[int]) -> tuple[np.ndarray, list[tuple[int, int]]]:

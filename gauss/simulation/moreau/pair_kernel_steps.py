@@ -5,17 +5,17 @@ from math import inf, isfinite
 import numpy as np
 
 from gauss.codegen.kernels import Control, LoopStatus
-from gauss.dynamics.called_program import CalledProgram
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.contact.compiled_step_memory import KEPT_STEPS
-from gauss.dynamics.contact.contact_stepper import lent_stepper, new_contact_stepper
+from gauss.dynamics.contact.contact_stepper import lent_stepper
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
 from gauss.dynamics.contact.overlap_resolution import resolved
+from gauss.dynamics.programs import CalledProgram
 from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point, Rates
 from gauss.simulation.moreau.contact_motion import ContactMotion
-from gauss.simulation.moreau.start_overlap import accepted_overlap
+from gauss.simulation.moreau.moreau_jean import accepted_overlap
 from gauss.simulation.problem import Problem
 from gauss.system import State
 
@@ -43,10 +43,7 @@ class PairKernelSteps:
         assert isinstance(problem.method, FixedStep)
         held = problem.held is not None
         self.method, self.control = problem.method, Control()
-        self.motion, ask = (
-            ContactMotion(problem.system, held, new_contact_stepper(problem.system, held)),
-            smooth_question(problem.question),
-        )
+        self.motion, ask = ContactMotion(problem.system, held), smooth_question(problem.question)
         self.motion.stepper.refuse_penetration(problem.start, accepted_overlap(problem))
         self.motion.stepper.check(problem.start)
         measured = any(output.kind == "contact_force" for output in problem.system.scene.outputs.values())

@@ -10,7 +10,7 @@ from gauss.dynamics.contact.gap_laws import removal_time
 from gauss.errors import SimulationError
 from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
 from gauss.simulation.moreau.contact_motion import ContactMotion
-from gauss.simulation.moreau.start_overlap import accepted_overlap
+from gauss.simulation.moreau.moreau_jean import accepted_overlap
 from gauss.simulation.motion_records import Event
 from gauss.simulation.problem import Problem
 from gauss.system import State
@@ -97,7 +97,7 @@ class CompiledSingleSteps:
     @property
     def relaxed(self) -> int:
         """Steps by the convex relaxation of Coulomb's law."""
-        return self.run.python_steps.relaxed if "python_steps" in vars(self.run) else 0
+        return self.run.relaxed
 
     @property
     def acceleration_error(self) -> float:

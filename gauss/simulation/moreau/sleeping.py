@@ -1,8 +1,8 @@
 """Sleeping of bodies in time stepping: when an island of bodies is put to rest, and for which scenes."""
 
 from dataclasses import dataclass
-
-import numpy as np
+from math import inf
+from numbers import Real
 
 from gauss.dynamics.contact.sleepers import sleepers
 from gauss.errors import SimulationError, require
@@ -37,7 +37,9 @@ class Sleeping:
     def __post_init__(self):
         for name in ("speed", "duration"):
             value = getattr(self, name)
-            if value is not None and not (np.isreal(value) and np.isfinite(value) and value > 0.0):
+            if value is None and name == "speed":
+                continue
+            if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < float(value) < inf:
                 raise SimulationError(f"Sleeping: {name}: expected a number > 0, got {value!r}.")
 
     def speed_in(self, system: System) -> float:

@@ -15,9 +15,8 @@ from gauss.dynamics.contact.asleep_trees import TreeSleepers
 from gauss.dynamics.contact.contact_changes import ModeChange, RecordedChanges
 from gauss.dynamics.contact.contact_stepper import Stepper
 from gauss.dynamics.contact.free_body_step import FreeBodyStepper
-from gauss.dynamics.contact.free_body_step_parts import FreeBodyStep
 from gauss.dynamics.contact.mechanism_step import MechanismStepper
-from gauss.dynamics.contact.mechanism_step_parts import MechanismStep
+from gauss.dynamics.contact.step_parts import FreeBodyStep, MechanismStep
 from gauss.errors import GaussError
 from gauss.simulation.moreau.contact_motion import ContactMotion, ContactMotionState
 from gauss.simulation.moreau.sleeping import Sleeping

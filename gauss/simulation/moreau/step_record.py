@@ -77,6 +77,7 @@ class StepRecord:
             self._in_words(),
             unseen=self.unseen,
             opaque=", ".join(self.problem.switching.called) if sparse else "",
+            law_error=self.steps.law_error,
         )
         step = float(np.sqrt(self.shortest * self.longest)) if self.accepted else None
         found = Trajectory(self.problem.system, *self._parts(self.rows), stats, tuple(self.events), step=step)

@@ -28,59 +28,27 @@ CHANGED_LAW = (  # the value of one member would act on all
 
 @dataclass(frozen=True)
 class SweepTask:
-    """Simulation of every member of a sweep.
+    """Simulation of every member of a sweep."""
 
-    Parameters
-    ----------
-    scene : Scene or callable
-        Scene, or a function that makes scenes of parameter values by name.
-    members : Members
-        Parameter values.
-    times : ndarray, shape (k,)
-        Samples [s].
-    settings : dict
-        Integrator, step, rtol and atol.
-    measure : dict
-        Functions of the :class:`gauss.Trajectory` of a member that return a number.
-    threads : int
-        Number of threads.
-    device : str, optional
-        Name of devices; this CPU by default.
-    """
-
-    scene: Scene | Callable[..., Scene]
-    members: Members
-    times: np.ndarray
-    settings: dict
-    measure: dict[str, Callable[[Trajectory], float]] = field(default_factory=dict)
-    threads: int = 1
-    device: str | None = None
+    scene: Scene | Callable[..., Scene]  # scene, or a function that makes scenes of parameter values by name
+    members: Members  # parameter values
+    times: np.ndarray  # (k,) samples [s]
+    settings: dict  # integrator, step, rtol and atol
+    measure: dict[str, Callable[[Trajectory], float]] = field(default_factory=dict)  # functions of the motion of a member
+    threads: int = 1  # that share the motions
+    device: str | None = None  # name of devices; this CPU by default
 
 
 @dataclass
 class MemberResults:
-    """Motions of some members; NaN where a member failed.
+    """Motions of some members; NaN where a member failed."""
 
-    Parameters
-    ----------
-    q, v : ndarray, shape (batch, k, n_q), (batch, k, n_v)
-        Coordinates and rates.
-    status : ndarray, shape (batch,)
-        DONE or FAILED.
-    reason : ndarray, shape (batch,)
-        Reason of a failure.
-    energy_error : ndarray, shape (batch,)
-        Residual of the energy balance, relative to the largest energy of the member.
-    measured : dict
-        Numbers (batch,) by name.
-    """
-
-    q: np.ndarray
-    v: np.ndarray
-    status: np.ndarray
-    reason: np.ndarray
-    energy_error: np.ndarray
-    measured: dict[str, np.ndarray]
+    q: np.ndarray  # (batch, k, n_q) coordinates
+    v: np.ndarray  # (batch, k, n_v) rates
+    status: np.ndarray  # (batch,) DONE or FAILED
+    reason: np.ndarray  # (batch,) reason of a failure
+    energy_error: np.ndarray  # (batch,) residual of the energy balance, relative to the largest energy of the member
+    measured: dict[str, np.ndarray]  # numbers (batch,) by name
 
 
 @dataclass(frozen=True)

@@ -13,21 +13,11 @@ from gauss.simulation.memory_limit import refuse_beyond_memory
 
 @dataclass(frozen=True)
 class Members:
-    """Members of a sweep: every combination of the parameter values, or the i-th value of each parameter.
+    """Members of a sweep: every combination of the parameter values, or the i-th value of each parameter."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the parameters.
-    values : tuple of ndarray
-        Values of each parameter.
-    together : bool
-        Whether the i-th values of all parameters, which are equally many, make one member.
-    """
-
-    names: tuple[str, ...]
-    values: tuple[np.ndarray, ...]
-    together: bool = False
+    names: tuple[str, ...]  # of the parameters
+    values: tuple[np.ndarray, ...]  # of each parameter
+    together: bool = False  # whether the i-th values of all parameters, which are equally many, make one member
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -55,13 +45,7 @@ class Members:
 
 
 def members(vary: Mapping[str, Sequence[float] | np.ndarray], together: bool) -> Members:
-    """Members of a sweep, checked.
-
-    Raises
-    ------
-    SceneError
-        If there are no parameters, or values are not finite numbers.
-    """
+    """Members of a sweep, checked; SceneError if there are no parameters, or values are not finite numbers."""
     if not isinstance(vary, Mapping) or not vary:
         raise SceneError(f"vary: expected names with their values, e.g. {{'crank.mass': [1.0, 1.5, 2.0]}}, got {vary!r}.")
     found = []

@@ -37,11 +37,7 @@ def empty(task: SweepTask, system: System, about: dict):
     """Empty dataset (xarray) of a sweep.
 
     Dimensions are the parameters, or ``member`` if all are varied together, then ``time`` and ``coordinate`` or ``rate``.
-
-    Raises
-    ------
-    SimulationError
-        If a measured quantity has the name of another variable of the dataset.
+    SimulationError if a measured quantity has the name of another variable of the dataset.
     """
     xarray, members = library("xarray"), task.members
     coordinates, rates = coordinate_units(system), rate_units(system)
@@ -79,13 +75,7 @@ def empty(task: SweepTask, system: System, about: dict):
 
 
 class InMemory:
-    """Dataset in memory.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Empty dataset; it is copied.
-    """
+    """Dataset in memory, a copy of an empty one."""
 
     def __init__(self, dataset):
         self.dataset = dataset.copy(deep=True)
@@ -103,21 +93,9 @@ class InMemory:
 
 
 class OnDisk:
-    """Dataset in a Zarr folder, which continues an interrupted sweep.
+    """Dataset in a Zarr folder called ….zarr: an empty one to begin with, or that of an interrupted sweep, which goes on.
 
-    Parameters
-    ----------
-    path : Path
-        Folder, ending in .zarr.
-    dataset : Dataset
-        Empty dataset.
-    piece : dict
-        Sizes of a block by dimension.
-
-    Raises
-    ------
-    FileError
-        If something else is there.
+    ``piece``: sizes of a block by dimension. FileError if something else is there.
     """
 
     def __init__(self, path: Path, dataset, piece: dict[str, slice]):

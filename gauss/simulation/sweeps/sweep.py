@@ -5,11 +5,12 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
-from gauss.arguments import named_arguments
+from gauss.arguments import named_arguments, table
 from gauss.codegen.gpu.devices import double_precision
 from gauss.dynamics import compile_scene
 from gauss.dynamics.laws.traced_laws import Laws
@@ -118,6 +119,9 @@ def sweep(
     KeyboardInterrupt
         On Ctrl-C; its ``dataset`` holds the members that are done, the others have ``status`` 0; None before the first one.
     """
+    measure = table(measure, "sweep: measure", "functions of a trajectory by name")
+    if path is not None:
+        require(path, (str, PathLike), "sweep: path")
     _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers)
     library("xarray")
     chosen = members(vary, together)
@@ -130,7 +134,7 @@ def sweep(
         members=chosen,
         times=np.linspace(0.0, duration, samples),
         settings=settings,
-        measure=dict(measure or {}),
+        measure=measure,
         threads=cores() if workers is None else 1,
         device=None if device is None else double_precision(device),
     )
@@ -177,6 +181,7 @@ def load_sweep(path):
     FileError
         If it holds no sweep.
     """
+    require(path, (str, PathLike), "load_sweep")
     if not Path(path).exists():
         raise FileError(f"{path}: there is no such folder or file.")
     engine = "h5netcdf" if Path(path).suffix.lower() in NETCDF else "zarr"
@@ -199,7 +204,7 @@ def _check(scene, duration, samples, integrator, step, rtol, atol, measure, work
     if not isinstance(samples, int) or not 2 <= samples <= sys.maxsize:
         raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r:.80}.")
     _check_workers(workers)
-    for name, function in (measure or {}).items():
+    for name, function in measure.items():
         if not callable(function):
             raise SimulationError(f"measure: {name!r}: expected a function of a trajectory, got {function!r}.")
 

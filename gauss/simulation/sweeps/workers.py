@@ -12,22 +12,10 @@ RESTARTS = 3  # of dead workers; after more of them the work itself is taken to 
 
 
 def results_of(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[tuple, Any]]:
-    """Pieces with the results of ``work(*piece)``, in the order of completion.
+    """Pieces with the results of ``work(*piece)``, in the order of completion; the work is pickled for the workers.
 
-    Parameters
-    ----------
-    work : callable
-        Function of a piece; it is pickled for the workers.
-    pieces : list of tuple
-        Arguments.
-    workers : None, int, executor or client
-        None: this process. A number: so many processes of this machine. An object with ``submit`` as those of
-        :mod:`concurrent.futures`, or a client of Dask: its workers.
-
-    Raises
-    ------
-    SimulationError
-        If workers die repeatedly.
+    ``workers``: None for this process, a number for so many processes of this machine, or an object with ``submit`` as those
+    of :mod:`concurrent.futures`, or a client of Dask. SimulationError if they die repeatedly.
     """
     if workers is None:
         for piece in pieces:

@@ -16,16 +16,8 @@ def propagated(
 ) -> dict[int, np.ndarray] | None:
     """Vector of every body, by its index; None if there is none across some joint, or two paths to a body disagree.
 
-    Parameters
-    ----------
-    joints : iterable of PlacedJoint
-        Joints that connect the bodies.
-    seed : tuple of int and ndarray
-        A body and its vector.
-    across : callable
-        ``across(joint, body, vector)`` is the vector of the other body of a joint; None if it has none.
-    tolerance : float
-        Largest difference of two vectors of one body.
+    ``seed``: a body and its vector. ``across``: ``across(joint, body, vector)`` is the vector of the other body of a joint;
+    None if it has none. ``tolerance``: largest difference of two vectors of one body.
     """
     found, waiting, beside = dict([seed]), deque([seed[0]]), neighbours(joints)
     while waiting:

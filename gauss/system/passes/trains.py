@@ -14,9 +14,9 @@ from gauss.system.subsystem import Subsystem, Train
 class Line(NamedTuple):
     """Coordinate of a joint over that of the first joint of its train: q = ratio · q_first + offset."""
 
-    first: str
+    first: str  # name of the first joint
     ratio: float = 1.0
-    offset: float = 0.0
+    offset: float = 0.0  # [rad, m]
 
 
 def trains(subsystem: Subsystem) -> tuple[list[Subsystem], list[str]]:

@@ -42,12 +42,7 @@ def follow(subsystem: Subsystem, locked: dict[str, np.ndarray]) -> dict[str, np.
 def welded(subsystem: Subsystem, locked: dict[str, np.ndarray]) -> Subsystem:
     """Subsystem with the bodies on both sides of locked joints welded; joints that thereby cannot move are removed, too.
 
-    Parameters
-    ----------
-    subsystem : Subsystem
-        The subsystem.
-    locked : dict
-        Coordinates (k,) at which joints are held, by name.
+    ``locked``: coordinates (k,) at which joints are held, by name.
     """
     poses = _poses(subsystem, locked)
     roots = [body for body in range(subsystem.n_bodies) if poses[body][0] == body]

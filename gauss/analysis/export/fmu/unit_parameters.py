@@ -11,8 +11,7 @@ from itertools import product
 import numpy as np
 
 from gauss.dynamics import compile_scene
-from gauss.dynamics.parameters import numbers
-from gauss.dynamics.parametrised_system import parametrised
+from gauss.dynamics.parameters import numbers, parametrised
 from gauss.errors import ArgumentError
 from gauss.scene.named_numbers import is_start, scene_of, value_of
 from gauss.system import System
