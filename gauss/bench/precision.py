@@ -100,10 +100,7 @@ def reference(system: System, duration: float, steps: int | None = None) -> Refe
     Where contacts have friction, it is extrapolated from time stepping with up to so many ``steps``, ``STEPS`` when not
     given; see :mod:`gauss.bench.extrapolation`.
 
-    Raises
-    ------
-    SimulationError
-        If the motion cannot be computed.
+    SimulationError if the motion cannot be computed.
     """
     run: dict[str, Any] = {"times": [duration], "progress": False}
     if _slides(system):

@@ -62,10 +62,7 @@ class ReferenceSolution:
 def reference(compulsion: Compulsion) -> ReferenceSolution:
     """Solve a compulsion to 25 digits.
 
-    Raises
-    ------
-    BackendError
-        If refinement does not converge, or no guess of the active rows is confirmed.
+    BackendError if refinement does not converge, or no guess of the active rows is confirmed.
     """
     if not compulsion.h.size:
         return _refined(compulsion, np.zeros(0, dtype=int))

@@ -124,10 +124,7 @@ class SuiteInstance:
     def proof(self) -> SuiteReference:
         """Its reference.
 
-        Raises
-        ------
-        BackendError
-            If it has none.
+        BackendError if it has none.
         """
         if self.reference is None:
             raise BackendError(f"{self.name}: has no reference.")

@@ -99,10 +99,7 @@ def pose(source: Source, element: Element | None) -> Pose:
 def numbers(source: Source, element: Element, count: int) -> list[float]:
     """So many finite numbers of an element.
 
-    Raises
-    ------
-    FileError
-        If it holds something else.
+    FileError if it holds something else.
     """
     found = decimal.numbers(element.text, count)
     if found is None:
@@ -114,10 +111,7 @@ def numbers(source: Source, element: Element, count: int) -> list[float]:
 def value(source: Source, element: Element | None, tag: str, default: float = 0.0) -> float:
     """Number of a child of an element; the default where there is none.
 
-    Raises
-    ------
-    FileError
-        If the child holds something else.
+    FileError if the child holds something else.
     """
     found = None if element is None else element.find(tag)
     return default if found is None else numbers(source, found, 1)[0]

@@ -51,10 +51,7 @@ Tree = dict[str, tuple[str, Element]]  # link → the link that it hangs on, and
 def refuse_couplings(source: Source):
     """Refuse what makes another mechanism of the tree, elements that look like misspelt ones, and repeated ones.
 
-    Raises
-    ------
-    FileError
-        Naming every coupling, or the first misspelt or second element, with file and line.
+    FileError naming every coupling, or the first misspelt or second element, with file and line.
     """
     parts = [part for part in source.root if part.tag in KNOWN]
     inertials = [inertial for part in parts for inertial in part.findall("inertial")]
