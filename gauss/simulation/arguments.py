@@ -158,7 +158,10 @@ def _start(system: System, state: State | None) -> State:
     """Consistent initial state: that of the scene, cached, or a given one, projected."""
     if system.written:
         refuse_changed(system)
-    return cached(system, (_start, given_starts(system)), system.initial_state) if state is None else system.projected(state)
+    if state is not None:
+        return system.projected(state)
+    found = cached(system, (_start, given_starts(system)), system.initial_state)
+    return State(found.t, found.q.copy(), found.v.copy())  # a law may write to it
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:

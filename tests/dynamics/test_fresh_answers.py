@@ -141,6 +141,24 @@ def test_the_law_of_an_input_is_followed_wherever_it_looks_up_a_number(what):
     Setting.k = BEFORE
 
 
+def test_a_law_that_writes_to_its_state_does_not_move_the_start_of_other_motions():
+    writes = [False]
+
+    def law(t, motion):
+        if writes[0] and isinstance(motion.state.q[0], float):
+            motion.state.q[:] = motion.state.q + 1.0
+        return float(np.sin(float(t)))
+
+    scene = gauss.load("double_pendulum")
+    scene.drive("A", torque=law)
+    system = gauss.compile_scene(scene)
+    before = system.initial_state().q
+    writes[0] = True
+    gauss.simulate(system, 0.01, integrator="rk4", step=0.005)
+    writes[0] = False
+    np.testing.assert_array_equal(gauss.simulate(system, 0.01, integrator="rk4", step=0.005).q[0], before)
+
+
 LATER = {
     "start": lambda scene: scene.start("A", position=0.5, rate=2.0),
     "force": lambda scene: scene.force("push", "rod 1", force=(3.0, 1.0, 0.0)),

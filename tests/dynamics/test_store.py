@@ -2,10 +2,12 @@
 
 import gc
 import time
+from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Barrier
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -165,6 +167,54 @@ def test_values_that_change_in_place_change_the_key(monkeypatch):
     monkeypatch.setitem(globals(), "SCALE", 3.0)
     for old, new in zip(before, (content_key(array), content_key(plain), content_key(_names_a_global)), strict=True):
         assert old != new
+
+
+class Slots:
+    """An object without a dictionary."""
+
+    __slots__ = ("value",)
+
+
+class Class:
+    """A class as a place of settings."""
+
+
+class MoreThanFields(Record):
+    """A record with an attribute that is no field of it."""
+
+
+def _places():
+    """Things and where a number of theirs is, by name."""
+    module, slots, queue, more = ModuleType("settings"), Slots(), deque([0.0]), MoreThanFields("a", np.zeros(1))
+
+    def own(x):
+        return own.value * x
+
+    return {
+        "attribute of a function": (own, own),
+        "attribute of a class": (lambda x: Class.value * x, Class),
+        "attribute of a module": (lambda x: module.value * x, module),
+        "slot": (lambda x: slots.value * x, slots),
+        "queue": (lambda x: queue[0] * x, queue),
+        "attribute of a record": (lambda x: more.value * x, more),
+        "attribute of a class in a module": (lambda x: module.settings.value * x, SimpleNamespace(module=module)),
+    }
+
+
+@pytest.mark.parametrize("place", _places())
+def test_what_a_function_looks_up_elsewhere_is_in_its_key(place):
+    function, owner = _places()[place]
+    keys = []
+    for value in (1.0, 2.0, 1.0):
+        if isinstance(owner, deque):
+            owner[0] = value
+        elif isinstance(owner, SimpleNamespace):
+            owner.module.settings = Class
+            Class.value = value
+        else:
+            object.__setattr__(owner, "value", value) if isinstance(owner, Record) else setattr(owner, "value", value)
+        keys.append(content_key(function))
+    assert keys[0] != keys[1] and keys[0] == keys[2]
 
 
 def test_what_refers_to_itself_has_a_key():
