@@ -11,22 +11,13 @@ from scipy.stats import kendalltau
 
 
 class Agreement(NamedTuple):
-    """Agreement of verdicts.
+    """Agreement of verdicts."""
 
-    Parameters
-    ----------
-    same, count : int
-        Equal verdicts, and all.
-    tau : float
-        Kendall's τ of the solvers by share of problems solved; nan of a single solver.
-    shares : dict
-        Shares solved by both judges, by solver.
-    """
-
+    # same, count: equal verdicts, and all
     same: int
     count: int  # type: ignore[assignment]  # the method of tuples of that name is not called
-    tau: float
-    shares: Mapping[str, tuple[float, float]]
+    tau: float  # Kendall's τ of the solvers by share of problems solved; nan of a single solver
+    shares: Mapping[str, tuple[float, float]]  # shares solved by both judges, by solver
 
 
 def agreement(verdicts: Iterable[tuple[str, bool, bool]]) -> Agreement:

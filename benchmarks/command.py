@@ -58,10 +58,7 @@ def command(
 def chosen(only: str, names: Iterable[str]) -> list[str]:
     """Names that hold a part in upper or lower case; all of them if it is empty.
 
-    Raises
-    ------
-    SystemExit
-        If there are none: the message lists the names.
+    SystemExit if there are none: the message lists the names.
     """
     names = list(names)
     found = [name for name in names if only.lower() in name.lower()]

@@ -62,31 +62,16 @@ RELAXATION_STEPS = 200  # steps of MuJoCo before it is asked for accelerations
 
 @dataclass(frozen=True)
 class Way:
-    """One way to make a motion, or to evaluate accelerations.
+    """One way to make a motion, or to evaluate accelerations."""
 
-    Parameters
-    ----------
-    scene, method : str
-        What is done, and how.
-    run : callable
-        Does it and returns a trajectory, MuJoCo's data, or nothing.
-    error : callable
-        Error of what ``run`` returns.
-    steps : int
-        Number of steps of one length, 0 of others.
-    warm : int
-        How often it is done before it is timed.
-    calls : int
-        How often it is done at a time.
-    """
-
+    # scene, method: what is done, and how
     scene: str
     method: str
-    run: Callable
-    error: Callable
-    steps: int = 0
-    warm: int = 0
-    calls: int = 1
+    run: Callable  # does it and returns a trajectory, MuJoCo's data, or nothing
+    error: Callable  # error of what ``run`` returns
+    steps: int = 0  # number of steps of one length, 0 of others
+    warm: int = 0  # how often it is done before it is timed
+    calls: int = 1  # how often it is done at a time
 
     @property
     def is_peer(self) -> bool:

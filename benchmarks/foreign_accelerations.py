@@ -34,10 +34,7 @@ class NotCompared(Exception):
 def deviation(path, scene: gauss.Scene) -> float:
     """Largest difference of accelerations, relative to the largest acceleration.
 
-    Raises
-    ------
-    NotCompared
-        If there are none to compare, as of a scene of which nothing moves.
+    NotCompared if there are none to compare, as of a scene of which nothing moves.
     """
     model = mujoco.MjModel.from_xml_path(str(path))
     for name in OFF:

@@ -23,10 +23,7 @@ OPTIONS: tuple[dict, ...] = ({}, {"root": "free"}, {"inertia": "as given"}, {"ro
 def opened_urdf(path) -> tuple[gauss.Scene, dict]:
     """Scene of a file, by the first options that open it, and these.
 
-    Raises
-    ------
-    GaussError
-        Of the last options.
+    GaussError of the last options.
     """
     for options in OPTIONS[:-1]:
         try:
@@ -48,10 +45,7 @@ def is_refused_by_parser(path) -> bool:
 def deviation_of_urdf(path, options: dict) -> float:
     """Largest difference of accelerations, relative to the largest acceleration.
 
-    Raises
-    ------
-    NotCompared
-        If there are none, as where a link that moves has no inertia.
+    NotCompared if there are none, as where a link that moves has no inertia.
     """
     text, base = for_parser(guarded(path)), base_of(options.get("root", "fixed"))
     model = pin.buildModelFromXML(text, *base)

@@ -63,34 +63,17 @@ MECHANISMS: dict[str, Callable[[], gauss.Scene]] = {
 
 @dataclass(frozen=True)
 class Peers:
-    """A mechanism in one state in Pinocchio and in MuJoCo; no MuJoCo where it has no counterpart.
+    """A mechanism in one state in Pinocchio and in MuJoCo; no MuJoCo where it has no counterpart."""
 
-    Parameters
-    ----------
-    pair : Twin
-        The mechanism in Pinocchio.
-    at : Configuration
-        The state there.
-    data : pinocchio.Data
-        Its workspace.
-    loops : LoopContacts
-        Its constraint dynamics; None of a tree.
-    frame : int
-        The frame of kinematics.
-    model, state : mujoco.MjModel, mujoco.MjData
-        The mechanism in MuJoCo, in this state; None without.
-    body : int
-        Its body.
-    """
-
-    pair: Twin
-    at: Configuration
-    data: pin.Data
-    loops: LoopContacts | None
-    frame: int
+    pair: Twin  # the mechanism in Pinocchio
+    at: Configuration  # the state there
+    data: pin.Data  # its workspace
+    loops: LoopContacts | None  # its constraint dynamics; None of a tree
+    frame: int  # the frame of kinematics
+    # model, state: the mechanism in MuJoCo, in this state; None without
     model: Any = None
     state: Any = None
-    body: int = 0
+    body: int = 0  # its body
 
 
 def _momentum(A):

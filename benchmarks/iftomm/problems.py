@@ -24,46 +24,21 @@ NONE = "not found"
 
 @dataclass(frozen=True)
 class BenchmarkProblem:
-    """A problem of the library.
+    """A problem of the library."""
 
-    Parameters
-    ----------
-    name : str
-        Its number, what moves, and for how long.
-    make : callable
-        () → Scene.
-    duration : float
-        Of the motion [s].
-    seen : callable
-        Trajectory → what is looked at (k, m).
-    exact : callable
-        () → what that should be at the samples.
-    what, against : str
-        What is looked at, and where the reference comes from.
-    by : str
-        Who asks, as in the list of sources.
-    steps : int
-        Output steps.
-    energy : float, optional
-        Change of energy allowed, where this is what is asked [J].
-    submitted : str
-        CPU times that were reported.
-    settings : dict
-        Further arguments of :func:`gauss.simulate`.
-    """
-
-    name: str
-    make: Callable
-    duration: float
-    seen: Callable
-    exact: Callable
+    name: str  # its number, what moves, and for how long
+    make: Callable  # () → Scene
+    duration: float  # of the motion [s]
+    seen: Callable  # trajectory → what is looked at (k, m)
+    exact: Callable  # () → what that should be at the samples
+    # what, against: what is looked at, and where the reference comes from
     what: str
     against: str
-    by: str = "–"
-    steps: int = STEPS
-    energy: float | None = None
-    submitted: str = NONE
-    settings: dict = field(default_factory=dict)
+    by: str = "–"  # who asks, as in the list of sources
+    steps: int = STEPS  # output steps
+    energy: float | None = None  # change of energy allowed, where this is what is asked [J]
+    submitted: str = NONE  # CPU times that were reported
+    settings: dict = field(default_factory=dict)  # further arguments of :func:`gauss.simulate`
 
     @property
     def times(self) -> np.ndarray:

@@ -38,18 +38,10 @@ STIFF = {"solref": (1e-6, 1.0), "solimp": (0.9999, 0.9999, 0.001, 0.5, 2.0)}  # 
 
 @dataclass(frozen=True)
 class Peer:
-    """A competitor in one state.
+    """A competitor in one state."""
 
-    Parameters
-    ----------
-    run : callable
-        Computes the accelerations.
-    error : float
-        Of these, as :meth:`Instant.error`.
-    """
-
-    run: Callable[[], object]
-    error: float
+    run: Callable[[], object]  # computes the accelerations
+    error: float  # of these, as :meth:`Instant.error`
 
 
 def peers(system: System, instant: Instant) -> dict[str, Peer]:

@@ -18,24 +18,12 @@ WXYZ = [3, 0, 1, 2]  # of a quaternion (x, y, z, w)
 
 @dataclass(frozen=True)
 class Instant:
-    """A state of a robot with its loads and the reference.
+    """A state of a robot with its loads and the reference."""
 
-    Parameters
-    ----------
-    state : State
-        Consistent coordinates and rates.
-    load : ndarray, shape (n_v,)
-        Generalised forces [N m, N].
-    expected : ndarray, shape (k,)
-        Reference accelerations of the joints of the file.
-    columns : ndarray of int, shape (k,)
-        Their places among the rates.
-    """
-
-    state: State
-    load: np.ndarray
-    expected: np.ndarray
-    columns: np.ndarray
+    state: State  # consistent coordinates and rates
+    load: np.ndarray  # (n_v,): generalised forces [N m, N]
+    expected: np.ndarray  # (k,): reference accelerations of the joints of the file
+    columns: np.ndarray  # (k,): their places among the rates
 
     def error(self, accelerations) -> float:
         """Largest difference to the reference relative to the largest acceleration."""
@@ -44,18 +32,10 @@ class Instant:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot of the folder.
+    """A robot of the folder."""
 
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    given : dict
-        Its entry in the references.
-    """
-
-    folder: Path
-    given: dict
+    folder: Path  # the folder
+    given: dict  # its entry in the references
 
     @property
     def name(self) -> str:

@@ -30,10 +30,7 @@ Z = np.array([0.0, 0.0, 1.0])
 class DrakeModel:
     """A system in Drake; body frames are principal and central.
 
-    Raises
-    ------
-    NotBuiltError
-        If it is no tree, or has something that is not built here.
+    NotBuiltError if it is no tree, or has something that is not built here.
     """
 
     def __init__(self, system: System):

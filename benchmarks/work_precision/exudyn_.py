@@ -15,10 +15,7 @@ GROUND = -1
 class ExudynModel:
     """A system in Exudyn; body frames are principal and central.
 
-    Raises
-    ------
-    NotBuiltError
-        If it has something that is not built here.
+    NotBuiltError if it has something that is not built here.
     """
 
     def __init__(self, system: System):

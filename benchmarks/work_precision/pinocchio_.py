@@ -17,10 +17,7 @@ LEAST = 2.3e-14  # what SciPy takes
 class PinocchioModel:
     """A system in Pinocchio.
 
-    Raises
-    ------
-    NotBuiltError
-        If it has loops, or joints of more than one freedom.
+    NotBuiltError if it has loops, or joints of more than one freedom.
     """
 
     def __init__(self, system: System):

@@ -17,24 +17,12 @@ class NotBuiltError(Exception):
 
 @dataclass(frozen=True)
 class TimedScene:
-    """A scene to be moved.
+    """A scene to be moved."""
 
-    Parameters
-    ----------
-    name : str
-        What it is called.
-    make : callable
-        () → Scene.
-    duration : float
-        How long [s].
-    windows : int
-        Windows of a ladder, 0 for other scenes.
-    """
-
-    name: str
-    make: Callable
-    duration: float
-    windows: int = 0
+    name: str  # what it is called
+    make: Callable  # () → Scene
+    duration: float  # how long [s]
+    windows: int = 0  # windows of a ladder, 0 for other scenes
 
 
 def _panda() -> gauss.Scene:

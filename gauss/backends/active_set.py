@@ -24,10 +24,7 @@ def active_set(
 ) -> tuple[KKTFactor, Answer, Correction]:
     """Factorisation with the active rows, the answer without its undetermined multipliers, and its correction.
 
-    Raises
-    ------
-    BackendError
-        If the exchange of rows does not end.
+    BackendError if the exchange of rows does not end.
     """
     G, h, sizes = compulsion.G, compulsion.h, compulsion.row_scales
     factor = factor or factored(compulsion, active_rows(compulsion, answer))

@@ -82,10 +82,7 @@ def _factored_answer(
 def checked_answer(compulsion: Compulsion, said) -> Answer:
     """Answer of a backend as arrays of the shapes of the compulsion; multipliers of None are zero.
 
-    Raises
-    ------
-    BackendError
-        If it is no answer, or holds other things than real numbers of these shapes.
+    BackendError if it is no answer, or holds other things than real numbers of these shapes.
     """
     if not isinstance(said, Answer):
         raise BackendError(f"failed: it returned {kind(said)}, expected a gauss.backends.Answer.")
@@ -103,10 +100,7 @@ def checked_answer(compulsion: Compulsion, said) -> Answer:
 def checked_refinement(factor: KKTFactor, said) -> tuple[Answer, Correction]:
     """Answer and last correction of a backend that takes a factorisation.
 
-    Raises
-    ------
-    BackendError
-        If it returns something else.
+    BackendError if it returns something else.
     """
     if not (isinstance(said, tuple) and len(said) == 2 and isinstance(said[1], tuple) and len(said[1]) == 4):
         raise BackendError(f"failed: it returned {kind(said)}, expected an Answer and a correction (a, qdd, λ, μ).")

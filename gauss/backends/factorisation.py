@@ -24,10 +24,7 @@ def factors(compulsion: Compulsion) -> tuple[Callable[..., KKTFactor], ...]:
 def factored(compulsion: Compulsion, active: Sequence | np.ndarray = ()) -> KKTFactor:
     """Factorisation of a compulsion: by the tree, or of the whole matrix where a joint of the tree moves no inertia.
 
-    Raises
-    ------
-    BackendError
-        If some acceleration is undetermined.
+    BackendError if some acceleration is undetermined.
     """
     for factor in factors(compulsion):
         with suppress(BackendError):

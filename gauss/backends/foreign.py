@@ -15,10 +15,7 @@ REAL_KINDS = "fiu"  # kinds of arrays of real numbers; others might be converted
 class ForeignCode:
     """Context of a call of somebody else's code: whatever it raises is a BackendError.
 
-    Raises
-    ------
-    BackendError
-        At its end, in place of any other error; not of Ctrl-C.
+    BackendError at its end, in place of any other error; not of Ctrl-C.
     """
 
     def __enter__(self):
@@ -48,10 +45,7 @@ def raised(error: BaseException) -> str:
 def real_array(name: str, given, size: int) -> np.ndarray:
     """Copy of real numbers, shape (size,).
 
-    Raises
-    ------
-    BackendError
-        If they are not real numbers of this shape.
+    BackendError if they are not real numbers of this shape.
     """
     if type(given) is np.ndarray and given.dtype is DOUBLE and given.shape == (size,):
         return given.copy()
@@ -68,10 +62,7 @@ def real_array(name: str, given, size: int) -> np.ndarray:
 def truth(found) -> bool:
     """Whether a backend claims success, as a bool.
 
-    Raises
-    ------
-    BackendError
-        If it is neither True nor False.
+    BackendError if it is neither True nor False.
     """
     if not isinstance(found, bool | np.bool_):
         raise BackendError(f"failed: found is {kind(found)}, expected True or False.")
@@ -81,10 +72,7 @@ def truth(found) -> bool:
 def whole_number(iterations) -> int:
     """Number of iterations of a backend.
 
-    Raises
-    ------
-    BackendError
-        If it is no whole number.
+    BackendError if it is no whole number.
     """
     if not isinstance(iterations, int | np.integer):
         raise BackendError(f"failed: iterations is {kind(iterations)}, expected a whole number.")

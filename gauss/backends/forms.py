@@ -91,10 +91,7 @@ class Eliminated:
 def eliminated(compulsion: Compulsion) -> Eliminated:
     """F2 of a compulsion, in its own units.
 
-    Raises
-    ------
-    BackendError
-        If a body has no mass (its acceleration has no weight), or the rows leave a q̈ free.
+    BackendError if a body has no mass (its acceleration has no weight), or the rows leave a q̈ free.
     """
     structure = compulsion.structure
     Phi = _filled(compulsion)
@@ -126,10 +123,7 @@ def eliminated(compulsion: Compulsion) -> Eliminated:
 def scaled(compulsion: Compulsion) -> Eliminated:
     """F2s of a compulsion: F2 in x = Φ^½ a, with rows of unit length.
 
-    Raises
-    ------
-    BackendError
-        As :func:`eliminated`.
+    BackendError as :func:`eliminated`.
     """
     form = eliminated(compulsion)
     root = np.sqrt(form.weights)

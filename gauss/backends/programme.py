@@ -138,10 +138,7 @@ class Solver(Protocol):
 def apply_settings(target, settings: dict, solver: str):
     """Set attributes of a solver's settings.
 
-    Raises
-    ------
-    BackendError
-        If it has no such setting.
+    BackendError if it has no such setting.
     """
     for name, value in settings.items():
         if not hasattr(target, name):

@@ -63,10 +63,8 @@ def attempt(solver: Solver, programme: Programme) -> Outcome:
 def checked_outcome(said, programme: Programme) -> Outcome:
     """Outcome with vectors of the sizes of its programme.
 
-    Raises
-    ------
-    BackendError
-        If it is no outcome, or holds other things than real numbers of these shapes, a claim and a number of iterations.
+    BackendError if it is no outcome, or holds other things than real numbers of these shapes, a claim and a number of
+    iterations.
     """
     if not isinstance(said, Outcome):
         raise BackendError(f"failed: it returned a {type(said).__name__}, expected a gauss.backends.programme.Outcome.")

@@ -7,12 +7,11 @@ import numpy as np
 
 from gauss.bench.instances import GROUPS, MAIN_FORM, Instance, group_of, of_selection
 from gauss.bench.levels import MAIN_LEVEL
-from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.qp import NAME, compare, quick_backends
 from gauss.bench.suite import CLASSES, recipes
 from gauss.bench.suite_instances import SUITE, of_suite, suite_class
-from gauss.bench.table import ResultTable
+from gauss.bench.table import ResultTable, chosen
 
 QUICK_PROBLEMS = 8  # problems of a class in a quick run, and of levels other than the main one, evenly spread
 OTHER_LEVELS = ("low", "mid")

@@ -19,8 +19,7 @@ from gauss.bench.atlas.methods import Believing
 from gauss.bench.contestants import backend as contestant
 from gauss.bench.levels import LEVELS, OWN
 from gauss.bench.markdown import head, table
-from gauss.bench.measurement import Measurement, chosen
-from gauss.bench.table import ResultTable
+from gauss.bench.table import Measurement, ResultTable, chosen
 from gauss.bench.worker import Workers
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import position_residual

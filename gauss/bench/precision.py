@@ -19,7 +19,7 @@ from gauss.backends import available
 from gauss.bench.contest import with_time
 from gauss.bench.extrapolation import extrapolated
 from gauss.bench.levels import AUTO
-from gauss.bench.measurement import chosen
+from gauss.bench.table import chosen
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import position_residual
 from gauss.errors import BalanceWarning, GaussError, SimulationError, did_you_mean
@@ -100,10 +100,7 @@ def reference(system: System, duration: float, steps: int | None = None) -> Refe
     Where contacts have friction, it is extrapolated from time stepping with up to so many ``steps``, ``STEPS`` when not
     given; see :mod:`gauss.bench.extrapolation`.
 
-    Raises
-    ------
-    SimulationError
-        If the motion cannot be computed.
+    SimulationError if the motion cannot be computed.
     """
     run: dict[str, Any] = {"times": [duration], "progress": False}
     if _slides(system):

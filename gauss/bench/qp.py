@@ -15,10 +15,9 @@ from gauss.bench.instances import Instance, of_selection
 from gauss.bench.levels import AUTO, LEVELS, LIMIT, OURS, OWN, promise, settings
 from gauss.bench.machine import header, libraries, write_lock
 from gauss.bench.measure import FIGURES, TERM_ROUNDING_RELATIVE, forms_of, measure, unanswered
-from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.suite import VERSION
-from gauss.bench.table import ResultTable
+from gauss.bench.table import ResultTable, chosen
 from gauss.bench.worker import Reply, Workers
 from gauss.errors import BackendError
 

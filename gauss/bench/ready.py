@@ -11,22 +11,12 @@ from gauss.bench import clocks
 
 @dataclass(frozen=True)
 class Ready:
-    """A QP solver with a problem in the form that it takes.
+    """A QP solver with a problem in the form that it takes."""
 
-    Parameters
-    ----------
-    call : callable
-        Set-up and solve from nothing; what the clock runs.
-    read : callable
-        ``read(found)`` turns what the call returned into an :class:`gauss.backends.programme.Outcome`.
-    library : callable
-        ``library(found)`` returns the times of set-up, solve, and both [s] that the library itself reports; nan where it
-        reports none.
-    around : context manager
-        What holds while the solver is called.
-    """
-
-    call: Callable[[], Any]
+    call: Callable[[], Any]  # set-up and solve from nothing; what the clock runs
+    # read: ``read(found)`` turns what the call returned into an :class:`gauss.backends.programme.Outcome`
     read: Callable[[Any], Outcome]
+    # library: ``library(found)`` returns the times of set-up, solve, and both [s] that the library itself reports; nan where
+    # it reports none
     library: Callable[[Any], clocks.Times] = lambda found: clocks.UNKNOWN
-    around: AbstractContextManager = nullcontext()
+    around: AbstractContextManager = nullcontext()  # what holds while the solver is called

@@ -27,27 +27,17 @@ GUESSES = ("daqp", "clarabel", "piqp")  # of the active rows, in turn until one 
 
 @dataclass(frozen=True)
 class ReferenceSolution:
-    """Solution to far more digits than a double holds.
+    """Solution to far more digits than a double holds."""
 
-    Parameters
-    ----------
-    a, qdd : ndarray, shape (6n,), (p,)
-        Accelerations, rounded to doubles.
-    active : ndarray of int
-        Independent inequality rows that hold.
-    last : float
-        Last correction, relative: what is still unknown.
-    contradiction : float
-        Largest residual of the rows that remains, relative: by so much redundant rows contradict each other.
-    multipliers, inequality_multipliers : ndarray, shape (r,), (s,)
-        Multipliers, rounded to doubles; one choice of many where rows are redundant.
-    """
-
+    # a, qdd (6n,), (p,): accelerations, rounded to doubles
     a: np.ndarray
     qdd: np.ndarray
-    active: np.ndarray
-    last: float
+    active: np.ndarray  # independent inequality rows that hold
+    last: float  # last correction, relative: what is still unknown
+    # contradiction: largest residual of the rows that remains, relative: by so much redundant rows contradict each other
     contradiction: float
+    # multipliers, inequality_multipliers (r,), (s,): multipliers, rounded to doubles; one choice of many where rows are
+    # redundant
     multipliers: np.ndarray
     inequality_multipliers: np.ndarray
 
@@ -62,10 +52,7 @@ class ReferenceSolution:
 def reference(compulsion: Compulsion) -> ReferenceSolution:
     """Solve a compulsion to 25 digits.
 
-    Raises
-    ------
-    BackendError
-        If refinement does not converge, or no guess of the active rows is confirmed.
+    BackendError if refinement does not converge, or no guess of the active rows is confirmed.
     """
     if not compulsion.h.size:
         return _refined(compulsion, np.zeros(0, dtype=int))

@@ -20,10 +20,9 @@ from gauss.bench.contest import with_time
 from gauss.bench.contestants import ready
 from gauss.bench.levels import settings
 from gauss.bench.markdown import in_time, number, table
-from gauss.bench.measurement import Measurement
 from gauss.bench.problems import MechanismProblem, make_problem
 from gauss.bench.reference import reference
-from gauss.bench.table import ResultTable
+from gauss.bench.table import Measurement, ResultTable
 from gauss.bench.worker import Worker
 from gauss.dynamics.assemble import assemble
 from gauss.simulation import simulate

@@ -146,8 +146,7 @@ def stability(
     fresh: Fresh = False,
 ):
     """See where methods fail, and whether they say so: cases by methods. Goes on where it was interrupted."""
-    from gauss.bench.atlas.report import publish
-    from gauss.bench.atlas.run import explore
+    from gauss.bench.atlas.run import explore, publish
 
     table = explore(output, cases=case, methods=method, fresh=fresh)
     _report(table, publish(output, table.path))
@@ -165,11 +164,10 @@ def fuzz(
     fresh: Fresh = False,
 ):
     """Solve random problems with every backend: is an answer ever worse than its certificate says? Goes on where it was."""
-    from gauss.bench.fuzz import report
     from gauss.bench.fuzz import run as examination
 
     table = examination.fuzz(output, count=count, seed=seed, backends=backend, share=share, fresh=fresh)
-    _report(table, report.publish(output, table.path))
+    _report(table, examination.publish(output, table.path))
 
 
 @bench.command()

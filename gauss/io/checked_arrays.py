@@ -51,10 +51,7 @@ def require_small(size: float):
 def require_sparse(name: str, matrix):
     """Refuse a sparse matrix with indices beyond its shape.
 
-    Raises
-    ------
-    ValueError
-        Naming the matrix.
+    ValueError naming the matrix.
     """
     if not sparse.issparse(matrix) or matrix.format not in ("csc", "csr"):
         return
@@ -67,10 +64,7 @@ def require_sparse(name: str, matrix):
 def require_real(**parts):
     """Refuse matrices and vectors that hold other things than real numbers, or nan.
 
-    Raises
-    ------
-    ValueError
-        Naming the first of them.
+    ValueError naming the first of them.
     """
     for name, part in parts.items():
         values = part.data if sparse.issparse(part) else np.asarray(part)
@@ -83,10 +77,7 @@ def require_real(**parts):
 def require_symmetric(name: str, matrix):
     """Refuse a matrix that is not symmetric, as one triangle: solvers read the one or the other, or both.
 
-    Raises
-    ------
-    ValueError
-        Naming the matrix.
+    ValueError naming the matrix.
     """
     found = sparse.csc_array(matrix)
     if found.shape[0] != found.shape[1]:

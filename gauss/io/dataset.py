@@ -12,9 +12,9 @@ import numpy as np
 from gauss.dynamics import Plan, compile_scene
 from gauss.errors import ArgumentError, FileError, MissingPackageError, require
 from gauss.io.columns import COLUMNS, as_dataset, columns
-from gauss.io.joined_names import separated
 from gauss.io.labelled import of_motion, of_rollout, of_rotors, of_tracking
 from gauss.io.load import LABELLED, RESULTS
+from gauss.io.results import separated
 from gauss.rotors import RotorMotion
 from gauss.scene.toml import from_tables
 from gauss.servo import Tracking

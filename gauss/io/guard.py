@@ -71,10 +71,7 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = (), loose_c
 def require_inside(source: Source, element: Element, home: Path, named: str, root_folder: Path | None = None):
     """Refuse a file that is neither in a folder nor in the one that the user named.
 
-    Raises
-    ------
-    FileError
-        Naming the file and where it is asked for; also of a pipe or device, from which reading may not end.
+    FileError naming the file and where it is asked for; also of a pipe or device, from which reading may not end.
     """
     file = resolved(home / named, source.place(element))
     allowed = [folder for folder in (home, root_folder) if folder is not None]

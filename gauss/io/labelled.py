@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from gauss.analysis import energy, reactions
-from gauss.io.joined_names import joined
+from gauss.io.results import joined
 from gauss.io.rotors import toml_text
 from gauss.rotations import AXIS_NAMES
 from gauss.rotors import RotorMotion

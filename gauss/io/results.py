@@ -2,14 +2,16 @@
 
 import csv
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gauss.errors import FileError, writing
-from gauss.io.joined_names import joined
 from gauss.simulation import Trajectory
+
+BETWEEN = ", "
 
 
 def write_npz(trajectory: Trajectory, path: Path) -> Path:
@@ -80,3 +82,14 @@ def write_arrays(columns: dict[str, np.ndarray], path: Path) -> Path:
     with open(path, "wb") as file:
         np.savez_compressed(file, **named)
     return path
+
+
+def joined(names: Sequence[str]) -> str:
+    """One text of several names, which :func:`separated` takes apart again."""
+    plain = not any(BETWEEN in name or name.startswith("[") for name in names)
+    return BETWEEN.join(names) if plain else json.dumps(list(names), ensure_ascii=False)
+
+
+def separated(text: str) -> tuple[str, ...]:
+    """Names of a text."""
+    return tuple(json.loads(text) if text.startswith("[") else text.split(BETWEEN) if text else ())

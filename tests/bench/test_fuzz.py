@@ -9,8 +9,7 @@ from gauss.backends.active_set import active_set
 from gauss.backends.estimate import acceleration_errors
 from gauss.bench.fuzz.examine import COUNTS, examine
 from gauss.bench.fuzz.problems import KINDS, fuzzed
-from gauss.bench.fuzz.report import markdown
-from gauss.bench.fuzz.run import _block, fuzz
+from gauss.bench.fuzz.run import _block, fuzz, markdown
 from gauss.bench.reference import reference
 from gauss.bench.worker import Reply
 from gauss.cli import app

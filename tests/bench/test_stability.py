@@ -11,8 +11,7 @@ from gauss.backends import make
 from gauss.bench.atlas import CASES, METHODS
 from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, FailureCase, judged
 from gauss.bench.atlas.methods import DEFAULT, Method
-from gauss.bench.atlas.report import markdown
-from gauss.bench.atlas.run import explore
+from gauss.bench.atlas.run import explore, markdown
 from gauss.bench.problems import make_problem
 from gauss.cli import app
 from gauss.errors import BackendError, BalanceWarning, SimulationError

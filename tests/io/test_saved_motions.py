@@ -8,7 +8,7 @@ import pytest
 
 import gauss
 from gauss.errors import FileError, NotImportedWarning, SceneError
-from gauss.io.joined_names import joined, separated
+from gauss.io.results import joined, separated
 
 pytest.importorskip("h5netcdf")
 MESH = """solid s

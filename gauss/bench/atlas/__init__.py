@@ -1,11 +1,11 @@
 """The stability atlas: where methods fail, and whether they report it."""
 
+from gauss.bench.atlas.acting import SWITCHED
 from gauss.bench.atlas.case import FailureCase
 from gauss.bench.atlas.contacts import CONTACTS
 from gauss.bench.atlas.instants import INSTANTS
 from gauss.bench.atlas.methods import METHODS
 from gauss.bench.atlas.motions import MOTIONS
-from gauss.bench.atlas.switching_constraints import SWITCHED
 
 __all__ = ["CASES", "METHODS"]
 

@@ -16,31 +16,17 @@ VERDICTS = (PASSED, DEGRADED, HONEST, SLOW, SILENT)
 
 @dataclass(frozen=True)
 class FailureCase:
-    """Case in which a method may fail.
+    """Case in which a method may fail."""
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    criterion : str
-        The physical figure by which methods are judged, in words.
-    figure : callable
-        ``figure(method, data)`` computes it; raises a GaussError if the method says that it fails.
-    prepare : callable
-        Makes the data, once for all methods; it can be sent to another process.
-    passes, fails : float
-        A figure up to the first passes, beyond the second it fails; between them it is degraded.
-    solvable : bool
-        Whether there is a solution; if not, a method passes by saying so.
-    """
-
-    name: str
-    criterion: str
+    name: str  # its name
+    criterion: str  # the physical figure by which methods are judged, in words
+    # figure: ``figure(method, data)`` computes it; raises a GaussError if the method says that it fails
     figure: Callable[[Method, Any], float]
-    prepare: Callable[[], Any] = lambda: None
+    prepare: Callable[[], Any] = lambda: None  # makes the data, once for all methods; it can be sent to another process
+    # passes, fails: a figure up to the first passes, beyond the second it fails; between them it is degraded
     passes: float = 1e-9
     fails: float = 1e-3
-    solvable: bool = True
+    solvable: bool = True  # whether there is a solution; if not, a method passes by saying so
 
 
 def judged(case: FailureCase, method: Method, data) -> dict:

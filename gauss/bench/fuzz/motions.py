@@ -11,8 +11,7 @@ from gauss import save
 from gauss.bench.fuzz.routes import BAD, examine_motion
 from gauss.bench.fuzz.scenes import moved_scene
 from gauss.bench.markdown import head, table
-from gauss.bench.measurement import Measurement
-from gauss.bench.table import ResultTable
+from gauss.bench.table import Measurement, ResultTable
 from gauss.bench.worker import Worker
 from gauss.errors import GaussError
 

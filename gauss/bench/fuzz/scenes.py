@@ -24,37 +24,20 @@ MASSLESS = 0.08  # share of scenes with a cross without mass
 class MovedScene:
     """A random scene, and the settings of its motion.
 
-    Parameters
-    ----------
-    scene : Scene
-        What moves.
-    base : str
-        What it was made from.
-    elements : tuple of str
-        What was put on it.
-    size : float
-        Of its bodies [m].
-    duration : float
-        How long it moves [s].
-    times : ndarray
-        Samples [s].
-    step : float, optional
-        Step of methods that have one [s].
-
     Attributes
     ----------
     system : System
         The compiled scene, made when it is first asked for; all routes move it.
     """
 
-    scene: Scene
-    base: str
-    elements: tuple
-    size: float
-    duration: float
-    times: np.ndarray
+    scene: Scene  # what moves
+    base: str  # what it was made from
+    elements: tuple  # what was put on it
+    size: float  # of its bodies [m]
+    duration: float  # how long it moves [s]
+    times: np.ndarray  # samples [s]
     integrator: str
-    step: float | None
+    step: float | None  # step of methods that have one [s]
 
     @cached_property
     def system(self) -> System:  # noqa: D102 (an attribute)

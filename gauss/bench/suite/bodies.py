@@ -16,26 +16,19 @@ GRAVITY = 10.0  # [m/s²]; a number that binary digits hold
 
 @dataclass(frozen=True)
 class Heap:
-    """Bodies and the points where they touch.
+    """Bodies and the points where they touch."""
 
-    Parameters
-    ----------
-    mass, inertia, position : ndarray, shape (k,), (k, 3), (k, 3)
-        Masses [kg], principal moments [kg m²] about the world's axes, and centres of mass [m].
-    pairs : ndarray of int, shape (c, 2)
-        Bodies of each contact; −1 is the ground. The first is pushed along the normal, the second against it.
-    point, normal : ndarray, shape (c, 3)
-        Where they touch [m], and unit normals.
-    load : ndarray, shape (k, 6)
-        Moments [N m] and forces [N], gravity included.
-    """
-
+    # mass, inertia, position (k,), (k, 3), (k, 3): masses [kg], principal moments [kg m²] about the world's axes, and
+    # centres of mass [m]
     mass: np.ndarray
     inertia: np.ndarray
     position: np.ndarray
+    # pairs (c, 2): bodies of each contact; −1 is the ground. The first is pushed along the normal, the second against it.
     pairs: np.ndarray
+    # point, normal (c, 3): where they touch [m], and unit normals
     point: np.ndarray
     normal: np.ndarray
+    # load (k, 6): moments [N m] and forces [N], gravity included
     load: np.ndarray = field(default_factory=lambda: np.zeros((0, 6)))
 
     @property

@@ -84,10 +84,7 @@ def made(classes: Iterable[str] | None = None, names: Iterable[str] | None = Non
 def recipes(kind: str) -> tuple[Recipe, ...]:
     """Names of the instances of a class, and how they are made: nothing is computed yet.
 
-    Raises
-    ------
-    BackendError
-        If there is no such class.
+    BackendError if there is no such class.
     """
     if kind not in CLASSES:
         raise BackendError(f"no class {kind!r} of problems. {did_you_mean(kind, CLASSES)}")
@@ -98,10 +95,7 @@ def recipes(kind: str) -> tuple[Recipe, ...]:
 def checked(instance: SuiteInstance) -> SuiteInstance:
     """The instance with its reference, confirmed.
 
-    Raises
-    ------
-    BackendError
-        If the reference, the certificate or the ray does not hold.
+    BackendError if the reference, the certificate or the ray does not hold.
     """
     if instance.verdict == SOLVED:
         reference = instance.reference or (refined_with_cones(instance) if instance.cones else refined(instance))

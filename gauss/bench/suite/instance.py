@@ -24,74 +24,40 @@ SOLVED, INFEASIBLE, UNBOUNDED = "solved", "infeasible", "unbounded"
 
 @dataclass(frozen=True, eq=False)
 class SuiteReference:
-    """Solution to far more digits than a double holds, or the proof that there is none.
+    """Solution to far more digits than a double holds, or the proof that there is none."""
 
-    Parameters
-    ----------
-    x, y, z, z_box : Doubled
-        Solution and multipliers. Of an infeasible instance the multipliers are a Farkas certificate: they add up its rows to
-        0 ≤ something negative. Of an unbounded one x is a feasible point, and ``ray`` leads downhill for ever.
-    active : ndarray of int
-        Rows of G that hold with equality, of a cone its first row.
-    active_bounds : ndarray of int
-        Variables at a bound.
-    residual : float
-        Largest of :func:`gauss.bench.suite.optimality.residuals`, relative.
-    digits : float
-        Digits of x that are known; fewer than ten where rows contradict each other by rounding and are near dependent.
-    contradiction : float
-        Residual of the rows that remains, relative: redundant rows that were rounded contradict each other by so much.
-    unique : bool
-        Whether the multipliers are: active rows are independent. Otherwise those here are one choice of many.
-    ray : ndarray, shape (n,)
-        Direction of descent without end; empty if there is none.
-    """
-
+    # x, y, z, z_box: solution and multipliers. Of an infeasible instance the multipliers are a Farkas certificate: they add
+    # up its rows to 0 ≤ something negative. Of an unbounded one x is a feasible point, and ``ray`` leads downhill for ever.
     x: Doubled
     y: Doubled
     z: Doubled
     z_box: Doubled
+    # active: rows of G that hold with equality, of a cone its first row
     active: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    active_bounds: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    residual: float = 0.0
+    active_bounds: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))  # variables at a bound
+    residual: float = 0.0  # largest of :func:`gauss.bench.suite.optimality.residuals`, relative
+    # digits: digits of x that are known; fewer than ten where rows contradict each other by rounding and are near dependent
     digits: float = 0.0
+    # contradiction: residual of the rows that remains, relative: redundant rows that were rounded contradict each other by
+    # so much
     contradiction: float = 0.0
+    # unique: whether the multipliers are: active rows are independent. Otherwise those here are one choice of many.
     unique: bool = True
+    # ray (n,): direction of descent without end; empty if there is none
     ray: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
 class SuiteInstance:
-    """One programme: data, meaning, verdict and reference.
+    """One programme: data, meaning, verdict and reference."""
 
-    Parameters
-    ----------
-    name, kind, story : str
-        Its name, its class, and what it is and what is hard about it.
-    P, A, G : csc_matrix, shape (n, n), (m, n), (s, n)
-        Hessian (both triangles), equality rows, inequality rows.
-    q, b, h, lb, ub : ndarray, shape (n,), (m,), (s,), (n,), (n,)
-        Linear term, right-hand sides and bounds, ±inf where there is none.
-    variables, units : tuple of str
-        Names of the variables and their units.
-    cones : tuple of int
-        Sizes of the second-order cones that the last rows of G form.
-    friction : ndarray, shape (c,)
-        Coefficients of friction of a complementarity problem, one a cone of three rows; empty if there is none.
-    stages : tuple of int
-        Of optimal control: number of steps, states and inputs of a step, in this order; empty if there are none.
-    sequence : str
-        Name of the sequence that the instance is a step of, in the order of the names; empty if it stands alone.
-    verdict : str
-        "solved", "infeasible" or "unbounded".
-    reference : SuiteReference, optional
-        What is right.
-    """
-
+    # name, kind, story: its name, its class, and what it is and what is hard about it
     name: str
     kind: str
     story: str
+    # P, A, G (n, n), (m, n), (s, n): Hessian (both triangles), equality rows, inequality rows
     P: sparse.csc_matrix
+    # q, b, h, lb, ub (n,), (m,), (s,), (n,), (n,): linear term, right-hand sides and bounds, ±inf where there is none
     q: np.ndarray
     A: sparse.csc_matrix
     b: np.ndarray
@@ -99,14 +65,18 @@ class SuiteInstance:
     h: np.ndarray
     lb: np.ndarray
     ub: np.ndarray
+    # variables, units: names of the variables and their units
     variables: tuple[str, ...]
     units: tuple[str, ...]
-    cones: tuple[int, ...] = ()
+    cones: tuple[int, ...] = ()  # sizes of the second-order cones that the last rows of G form
+    # friction (c,): coefficients of friction of a complementarity problem, one a cone of three rows; empty if there is none
     friction: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    # stages: of optimal control: number of steps, states and inputs of a step, in this order; empty if there are none
     stages: tuple[int, ...] = ()
+    # sequence: name of the sequence that the instance is a step of, in the order of the names; empty if it stands alone
     sequence: str = ""
-    verdict: str = SOLVED
-    reference: SuiteReference | None = None
+    verdict: str = SOLVED  # "solved", "infeasible" or "unbounded"
+    reference: SuiteReference | None = None  # what is right
 
     def __post_init__(self):
         """Refuse names and units that are not one a variable; BackendError if their numbers differ."""
@@ -124,10 +94,7 @@ class SuiteInstance:
     def proof(self) -> SuiteReference:
         """Its reference.
 
-        Raises
-        ------
-        BackendError
-            If it has none.
+        BackendError if it has none.
         """
         if self.reference is None:
             raise BackendError(f"{self.name}: has no reference.")

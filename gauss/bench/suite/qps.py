@@ -164,12 +164,8 @@ def read_qps(path: Path) -> SuiteInstance:
 
     Rows with a range become two inequality rows, rows ≥ are turned round; a constant of the cost is left out.
 
-    Raises
-    ------
-    FileError
-        If a section or a kind of bound is not known, or names do not belong together.
-    ValueError
-        If a number is none, or QMATRIX is not symmetric.
+    FileError if a section or a kind of bound is not known, or names do not belong together. ValueError if a number is none,
+    or QMATRIX is not symmetric.
     """
     found = _QpsReader(path)
     found.read(path.read_text(encoding="utf-8"))

@@ -40,10 +40,7 @@ class Held(NamedTuple):
 def refined(instance: SuiteInstance) -> SuiteReference:
     """Solution of a quadratic programme without cones.
 
-    Raises
-    ------
-    BackendError
-        If no active set is confirmed, or refinement does not converge.
+    BackendError if no active set is confirmed, or refinement does not converge.
     """
     rows, right = instance.plain_rows()
     x, _, plain, _ = guessed(instance) if right.size else (np.zeros(instance.n), None, np.zeros(0), None)

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 import warnings
 from importlib import import_module
 from pathlib import Path
@@ -48,7 +49,8 @@ def build(output: Path, program, gallery: bool = True, strict: bool = False) -> 
     work = output / ".build"
     with writing(output):
         collect(work / "pages", program)
-    command = ["-b", "html", "-q", "-j", str(min(2, os.cpu_count() or 1)), "-c", str(HERE), "-d", str(work / "doctrees")]
+    command = [] if sys.stdout.isatty() else ["-q"]  # a terminal shows how far Sphinx is
+    command += ["-b", "html", "-j", str(min(2, os.cpu_count() or 1)), "-c", str(HERE), "-d", str(work / "doctrees")]
     command += ["-D", f"plot_gallery={int(gallery)}"] + (["-W", "--keep-going"] if strict else [])
     with warnings.catch_warnings():
         for kind in (DeprecationWarning, PendingDeprecationWarning):  # of what extensions call of Sphinx

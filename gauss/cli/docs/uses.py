@@ -42,7 +42,7 @@ def names_in(code: str) -> set[str]:
     nodes = list(ast.walk(ast.parse(code)))
     chains = {_dotted(node) for node in nodes if isinstance(node, ast.Attribute)}
     direct = _full(chains, {"gauss": "gauss"} | _imported(nodes))
-    used = {name for group in GROUPS for name in group.names if any(_is_or_in(chain, name) for chain in direct)}
+    used = {_by_alias()[part] for chain in direct for part in _beginnings(chain) if part in _by_alias()}
     methods = {f".{chain.rpartition('.')[2]}" for chain in chains}
     return used | {name for name, maker in MADE_BY.items() if maker in used | methods}
 
@@ -59,17 +59,22 @@ def _imported(nodes: list[ast.AST]) -> dict[str, str]:
     return {alias.asname or alias.name: f"{line.module}.{alias.name}" for line in lines for alias in line.names}
 
 
-def _is_or_in(chain: str, name: str) -> bool:
-    """Whether a dotted name is a public one, by any of its full names, or an attribute of it."""
-    return any(chain == alias or chain.startswith(f"{alias}.") for alias in _aliases(name))
+def _beginnings(chain: str) -> Iterator[str]:
+    """Dotted names that a dotted name begins with, and itself."""
+    parts = chain.split(".")
+    return (".".join(parts[:k]) for k in range(1, len(parts) + 1))
 
 
 @cache
-def _aliases(name: str) -> set[str]:
-    """Full names of the same object in the packages that one types."""
-    module, _, last = name.rpartition(".")
-    thing = getattr(import_module(module), last)
-    return {name, *(f"{package}.{last}" for package in PACKAGES if getattr(import_module(package), last, None) is thing)}
+def _by_alias() -> dict[str, str]:
+    """Public names by their full names in the packages that one types."""
+    found: dict[str, str] = {}
+    for name in (name for group in GROUPS for name in group.names):
+        module, _, last = name.rpartition(".")
+        thing = getattr(import_module(module), last)
+        same = [package for package in PACKAGES if getattr(import_module(package), last, None) is thing]
+        found |= {name: name} | {f"{package}.{last}": name for package in same}
+    return found
 
 
 def _dotted(node: ast.expr) -> str:

@@ -58,22 +58,15 @@ class Activation:
 
 @dataclass(frozen=True)
 class MuscleCurves:
-    """Force of a muscle by its length and rate.
+    """Force of a muscle by its length and rate."""
 
-    Parameters
-    ----------
-    shortest, optimal, first : float
-        Least length and optimal length of the muscle [m], and the least length in optimal ones.
-    force : float
-        Greatest active force at rest [N].
-    lmin, lmax, vmax, fpmax, fvmax : float
-        MuJoCo's parameters of the curves, in optimal lengths, optimal lengths a second, and greatest forces.
-    """
-
+    # shortest, optimal, first: least length and optimal length of the muscle [m], and the least length in optimal ones
     shortest: float
     optimal: float
     first: float
-    force: float
+    force: float  # greatest active force at rest [N]
+    # lmin, lmax, vmax, fpmax, fvmax: muJoCo's parameters of the curves, in optimal lengths, optimal lengths a second, and
+    # greatest forces
     lmin: float
     lmax: float
     vmax: float

@@ -25,8 +25,7 @@ from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, WELD, is_closed, left_
 from gauss.io.mjcf.sensors import add_sensors
 from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
-from gauss.io.mjcf.tendon_path import tendon_path
-from gauss.io.mjcf.tendons import add_tendon, couple_tendons, hold_tendon
+from gauss.io.mjcf.tendons import add_tendon, couple_tendons, hold_tendon, tendon_path
 from gauss.io.mjcf.touching import add_contacts, add_stops
 from gauss.io.numbers import LIMITS, bounds, check_option
 from gauss.scene import GROUND, Body, Scene

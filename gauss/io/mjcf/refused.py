@@ -21,7 +21,7 @@ from gauss.io.mjcf.actuators import (
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
 from gauss.io.mjcf.start import START, key_of
 from gauss.io.mjcf.switches import is_off
-from gauss.io.mjcf.tendon_path import tendon_path
+from gauss.io.mjcf.tendons import tendon_path
 from gauss.io.mjcf.transmissions import JOINT as ON_JOINT
 from gauss.io.mjcf.transmissions import JOINT_IN_PARENT, ActuatorTransmission, transmission
 

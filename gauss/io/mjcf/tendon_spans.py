@@ -13,6 +13,7 @@ import numpy as np
 
 from gauss import math
 from gauss.io.mjcf.wrap_circle import LEAST, PlanePath, around, holds, through
+from gauss.rotations import cross
 from gauss.scene import GROUND, Force
 
 LEAST_SQUARE = 1e-30  # m², below which the root of a squared length is not taken: the points meet but for rounding
@@ -89,7 +90,7 @@ class PathSpan:
         if self.over is not None:
             body = self.over.body
             omega, moving = at.angular_velocity(body), at.velocity(body, (0.0, 0.0, 0.0))
-            moved = moved + e_p @ (moving + _cross(omega, w)) - e_q @ (moving + _cross(omega, v))
+            moved = moved + e_p @ (moving + cross(omega, w)) - e_q @ (moving + cross(omega, v))
         return self.share * moved
 
     def forces(self, name: str, number: int) -> Iterator[Force]:
@@ -111,7 +112,7 @@ class PathSpan:
 
     def _turning_surface(self, t, motion):
         _, e_p, e_q, w, v = self._shape(motion)
-        return self.share * (_cross(w, e_p) - _cross(v, e_q))
+        return self.share * (cross(w, e_p) - cross(v, e_q))
 
     def _shape(self, at) -> tuple:
         """Length, unit vectors at both ends, and arms, from the origin of the body, of the points on the surface."""
@@ -147,18 +148,14 @@ class PathSpan:
 def _plane(p: np.ndarray, q: np.ndarray) -> tuple:
     """Unit vectors that span the plane of two points and the origin, the first towards p."""
     first = p / _length(p)
-    normal = _cross(p, q)
+    normal = cross(p, q)
     aligned = normal @ normal < LEAST**2
     x, y, z = (math.abs(component) for component in first)
     second, third = holds(y > x) * holds(y > z), holds(z > x) * holds(z > y)  # largest: zero there, as MuJoCo has it
     other = [second + third, 1.0 - second, 1.0 - third]
-    normal = math.where(aligned, _cross(first, np.array(other)), normal)
-    across = _cross(normal, first)
+    normal = math.where(aligned, cross(first, np.array(other)), normal)
+    across = cross(normal, first)
     return first, across / _length(across)
-
-
-def _cross(a, b) -> np.ndarray:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _length(vector):

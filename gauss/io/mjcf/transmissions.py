@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss.io.mjcf.actuators import gear
 from gauss.io.mjcf.names import SCALAR, Named
-from gauss.io.mjcf.tendon_path import Law, tendon_path
+from gauss.io.mjcf.tendons import Law, tendon_path, times
 from gauss.rotations import from_quaternion
 from gauss.scene import PAIRS, Force, Scene
 
@@ -38,11 +38,11 @@ class ActuatorTransmission:
             owner = joint if joint in scene.joints else joint.rpartition(".")[0]
             rates = scene.joints[owner].pair.rates
             along = np.array([factor * (joint in (owner, f"{owner}.{rate}")) for rate in rates])
-            effort = float(factor * force) if len(rates) == 1 and not callable(force) else _times(along, force)
+            effort = float(factor * force) if len(rates) == 1 and not callable(force) else times(along, force)
             scene.drive(owner, name=called, torque=effort)
         for number, one in enumerate(self.forces):
             called = name if len(self.forces) == 1 else f"{name} on {one.body}, {number + 1}"
-            parts = (_times(part, force) for part in (one.force, one.moment))
+            parts = (times(part, force) for part in (one.force, one.moment))
             scene.force(called, one.body, *parts, at=one.at, axes=one.axes)
 
 
@@ -82,7 +82,7 @@ def _of_tendon(named: Named, i: int, number: int) -> ActuatorTransmission:
     if path.is_fixed:
         return ActuatorTransmission({joint: ratio * x for joint, x in path.terms.items()}, (), length, rate, bounds)
     forces = [
-        Force(one.name, one.body, _times(one.force, ratio), _times(one.moment, ratio), at=one.at)
+        Force(one.name, one.body, times(one.force, ratio), times(one.moment, ratio), at=one.at)
         for one in path.unit_forces("force")
     ]
     return ActuatorTransmission({}, tuple(forces), length, rate, bounds)
@@ -108,12 +108,3 @@ def _of_site(named: Named, i: int, site: int, other: int) -> ActuatorTransmissio
 
 def _bounds(pair) -> tuple[float, float]:
     return float(pair[0]), float(pair[1])
-
-
-def _times(part, force):
-    """Vector, or a law of one, times a number or a law."""
-    if not callable(part) and not callable(force):
-        return tuple(float(force) * np.array(part))
-    of_vector = part if callable(part) else lambda t, motion: np.array(part)
-    of_force = force if callable(force) else lambda t, motion: force
-    return lambda t, motion: of_force(t, motion) * of_vector(t, motion)

@@ -34,29 +34,18 @@ STEPS = {
 
 @dataclass(frozen=True)
 class ElementaryJoint:
-    """One joint of MuJoCo.
+    """One joint of MuJoCo."""
 
-    Parameters
-    ----------
-    name, kind : str
-        Its name, and hinge, slide, ball or free.
-    axis : ndarray or None
-        Axis (3,) in the frame of the body that it moves.
-    pos : ndarray
-        Joint point (3,) there [m].
-    position, rate : callable
-        Its entries of qpos and of qvel, functions of a motion of the system.
-    gear : ndarray or None
-        Its generalised forces for unit efforts along the rates of the joint of the scene, one column for each; None when
-        they depend on the state.
-    """
-
+    # name, kind: its name, and hinge, slide, ball or free
     name: str
     kind: str
-    axis: np.ndarray | None
-    pos: np.ndarray
+    axis: np.ndarray | None  # axis (3,) in the frame of the body that it moves
+    pos: np.ndarray  # joint point (3,) there [m]
+    # position, rate: its entries of qpos and of qvel, functions of a motion of the system
     position: Callable
     rate: Callable
+    # gear: its generalised forces for unit efforts along the rates of the joint of the scene, one column for each; None when
+    # they depend on the state
     gear: np.ndarray | None
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.io.collision_meshes import mesh_path, mesh_vertices
 from gauss.io.guard import Source
-from gauss.io.sdf.poses import numbers, text
+from gauss.io.sdf.elements import numbers, text
 from gauss.scene import Box, Capsule, Collider, Cone, ConvexMesh, Cylinder, Ellipsoid, HalfSpace, Sphere
 from gauss.system.frames import Pose
 

@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element
 from gauss.errors import FileError
 from gauss.io.guard import MOST_INCLUDES, Source, read_xml, require_inside
 from gauss.io.numbers import number
-from gauss.io.sdf.poses import TRUE, text
+from gauss.io.sdf.elements import TRUE, text
 from gauss.io.sdf.scopes import MODEL, NAMED, Scope
 
 MOST_FOLDERS = 100_000  # folders that are searched for a model

@@ -14,7 +14,7 @@ import numpy as np
 
 from gauss.errors import FileError
 from gauss.io.guard import Source
-from gauss.io.sdf.poses import TRUE, numbers, pose, value
+from gauss.io.sdf.elements import TRUE, numbers, pose, value
 from gauss.system.frames import IDENTITY, Pose
 
 DENSITY = 1000.0  # kg/m³, of a collision without one

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 from gauss.errors import FileError
 from gauss.io.guard import Source
 from gauss.io.numbers import bounds, number
-from gauss.io.sdf.poses import TRUE, numbers, text, value
+from gauss.io.sdf.elements import TRUE, numbers, text, value
 from gauss.io.sdf.scopes import MODEL, Scope
 from gauss.scene import Scene
 from gauss.system.frames import compose

@@ -12,11 +12,10 @@ from gauss.errors import FileError, NotImportedWarning, SceneError
 from gauss.io.guard import Source, checked_root, read_xml
 from gauss.io.numbers import LIMITS, add_stop, check_option
 from gauss.io.sdf.collisions import shape_of
-from gauss.io.sdf.elements import WARNED, check, check_link
+from gauss.io.sdf.elements import WARNED, check, check_link, numbers, pose, text
 from gauss.io.sdf.includes import UNBOUNDED, Includes
 from gauss.io.sdf.inertia import of_link
 from gauss.io.sdf.joints import JointReader
-from gauss.io.sdf.poses import numbers, pose, text
 from gauss.io.sdf.scopes import Scope
 from gauss.scene import GROUND, Scene
 from gauss.system.frames import compose, invert

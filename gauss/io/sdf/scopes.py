@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError, did_you_mean
 from gauss.io.guard import Source
-from gauss.io.sdf.poses import TRUE, pose, text
+from gauss.io.sdf.elements import TRUE, pose, text
 from gauss.system.frames import IDENTITY, Pose, compose, invert
 
 MODEL, WORLD, JOINT = "__model__", "world", "::"

@@ -42,10 +42,7 @@ def placed(source: Source, element: Element):
 def require_own_meshes(source: Source):
     """Refuse meshes outside of the package of a file.
 
-    Raises
-    ------
-    FileError
-        Naming the first, and where it is asked for.
+    FileError naming the first, and where it is asked for.
     """
     home = source.path.resolve().parent
     for element in source.root.iter("mesh"):

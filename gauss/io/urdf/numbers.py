@@ -68,10 +68,7 @@ def for_parser(source: Source) -> str:
 def values(source: Source, element: Element, key: str, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
     """Numbers of an attribute.
 
-    Raises
-    ------
-    FileError
-        If it holds something else, or is missing and has no default.
+    FileError if it holds something else, or is missing and has no default.
     """
     text, count = element.get(key), COUNTS[element.tag][key]
     if text is None and default is not None:

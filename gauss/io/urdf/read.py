@@ -16,10 +16,9 @@ from gauss.io.guard import Source
 from gauss.io.numbers import UNIT_VECTORS
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.joint_file import joint_file
-from gauss.io.urdf.link_tree import require_tree
 from gauss.io.urdf.numbers import for_parser, value, values
 from gauss.io.urdf.plus import add_loops_and_couplings
-from gauss.io.urdf.unknown import refuse_couplings
+from gauss.io.urdf.unknown import refuse_couplings, require_tree
 from gauss.scene import GROUND, Scene
 from gauss.scene.body import unphysical
 

@@ -1,7 +1,8 @@
-"""Elements of a file that are no URDF: couplings between links and misspelt ones are refused; a warning names the rest.
+"""What is refused before the parser: elements that are no URDF, and links and joints that make no tree.
 
 URDF is a tree. Loops, couplings and the like are elements of dialects (URDF+, Drake, Gazebo); without them a robot is
-another one. What moves a mechanism only in one simulator, as plugins of Gazebo do, is named.
+another one: they are refused, as misspelt ones are. What moves a mechanism only in one simulator, as plugins of Gazebo do,
+is named by a warning. The tree is checked here, because the parser drops links or gives no reason.
 """
 
 import re
@@ -9,7 +10,7 @@ import warnings
 from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError, NotImportedWarning, listed
+from gauss.errors import FileError, NotImportedWarning, did_you_mean, listed
 from gauss.io.guard import Source
 
 # Children that URDF knows, and those of common tools that do not move a mechanism by themselves.
@@ -40,15 +41,17 @@ FORCED = {
 SPRINGS = ("springStiffness", "springReference")
 ONCE = {"inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"}
 SIMILARITY = 0.75  # how alike a misspelt name is to what was meant
+DEEPEST_CHAIN = (
+    3000  # links, each on the one before: for 4000 Pinocchio's parser, which calls itself for each, ends the process
+)
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+Tree = dict[str, tuple[str, Element]]  # link → the link that it hangs on, and the joint by which
 
 
 def refuse_couplings(source: Source):
     """Refuse what makes another mechanism of the tree, elements that look like misspelt ones, and repeated ones.
 
-    Raises
-    ------
-    FileError
-        Naming every coupling, or the first misspelt or second element, with file and line.
+    FileError naming every coupling, or the first misspelt or second element, with file and line.
     """
     parts = [part for part in source.root if part.tag in KNOWN]
     inertials = [inertial for part in parts for inertial in part.findall("inertial")]
@@ -129,3 +132,67 @@ def _is_forced(element: Element) -> bool:
 def _located(source: Source, element: Element) -> str:
     named = element.get("filename") or element.get("name")
     return f"<{element.tag}>{f' {named!r}' if named else ''} ({source.place(element)})"
+
+
+def require_tree(source: Source):
+    """Refuse names that stand twice, joints without a kind or a link, and links that do not hang on one root.
+
+    FileError with the line of the element, its name and what is wrong.
+    """
+    links = _by_name(source, "link")
+    parents: Tree = {}
+    for name, joint in _by_name(source, "joint").items():
+        what = f"{source.place(joint)}: joint {name!r}"
+        if joint.get("type") not in KINDS:
+            kind = joint.get("type", "")
+            raise FileError(f"{what}: a URDF has no joints of the type {kind!r}. {did_you_mean(kind, KINDS)}")
+        parent, child = (_end(joint, tag) for tag in ("parent", "child"))
+        for tag, end in (("parent", parent), ("child", child)):
+            if end not in links:
+                raise FileError(f"{what}: its <{tag}> is no link, {end!r}. {did_you_mean(end, links)}")
+        if child in parents:
+            other = parents[child][1].get("name")
+            raise FileError(
+                f"{what}: link {child!r} is already the child of joint {other!r}, but a URDF is a tree; close the loop by a "
+                "<loop> of URDF+."
+            )
+        parents[child] = parent, joint
+    _require_one_root(source, links, parents)
+
+
+def _by_name(source: Source, tag: str) -> dict[str, Element]:
+    found: dict[str, Element] = {}
+    for element in source.root.findall(tag):
+        name = element.get("name", "")
+        if not name:
+            raise FileError(f"{source.place(element)}: <{tag}> has no name.")
+        if name in found:
+            raise FileError(f"{source.place(element)}: {tag} {name!r} stands in {source.place(found[name])} already.")
+        found[name] = element
+    return found
+
+
+def _end(joint: Element, tag: str) -> str:
+    element = joint.find(tag)
+    return "" if element is None else element.get("link", "")
+
+
+def _require_one_root(source: Source, links: dict[str, Element], parents: Tree):
+    roots = [name for name in links if name not in parents]
+    if len(roots) > 1:
+        place = source.place(links[roots[1]])
+        raise FileError(f"{place}: links {listed(map(repr, roots))} are children of no joint; a URDF has one such link.")
+    hanging = dict.fromkeys(roots, 0)  # number of links below
+    for name in links:
+        way: dict[str, None] = {}
+        while name not in hanging and name not in way:
+            way[name] = None
+            name = parents[name][0]
+        if name not in hanging:
+            place = source.place(parents[name][1])
+            raise FileError(f"{place}: links {listed(map(repr, way))} hang on one another in a circle, and not on a root.")
+        for link in reversed(way):
+            hanging[link] = hanging[parents[link][0]] + 1
+            if hanging[link] >= DEEPEST_CHAIN:
+                place = source.place(parents[link][1])
+                raise FileError(f"{place}: more than {DEEPEST_CHAIN} links hang on one another; the parser takes no more.")

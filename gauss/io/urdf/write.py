@@ -18,7 +18,7 @@ from gauss.errors import FileError
 from gauss.io.mjcf.inertia import inertial
 from gauss.io.mjcf.tree import ElementaryJoint, Limb, joint_frame, limb, spanning_tree
 from gauss.io.urdf.numbers import roll_pitch_yaw, text_of
-from gauss.io.urdf.plus_write import write_coupling, write_loop
+from gauss.io.urdf.plus import write_coupling, write_loop
 from gauss.io.urdf.side import ENDS, side_file
 from gauss.io.urdf.starts import whole_start
 from gauss.rotations import from_quaternion

@@ -121,10 +121,7 @@ def matrix(prim: Usd.Prim, quaternion) -> np.ndarray:
 def checked(prim: Usd.Prim, numbers: np.ndarray) -> np.ndarray:
     """Finite numbers of a prim.
 
-    Raises
-    ------
-    FileError
-        If one is not finite, or beyond reason.
+    FileError if one is not finite, or beyond reason.
     """
     if not (np.abs(numbers) <= LARGEST_MAGNITUDE).all():
         raise FileError(f"{prim.GetPath()}: expected finite numbers up to {LARGEST_MAGNITUDE:g}, got {numbers.tolist()}.")

@@ -35,10 +35,7 @@ MOVING = {  # attributes that are refused where they are not zero
 def refuse_unread(stage: Usd.Stage, bodies: Iterable[Usd.Prim]):
     """Refuse what moves the mechanism and has no counterpart in UsdPhysics, and numbers that change with time.
 
-    Raises
-    ------
-    FileError
-        Naming the prim, and what it holds.
+    FileError naming the prim, and what it holds.
     """
     for prim in moving_prims(stage):
         if not prim.IsA(UsdPhysics.Joint) and _may_move(prim):

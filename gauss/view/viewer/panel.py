@@ -36,7 +36,7 @@ def with_panel(page: str, stages: list[ViewerStage]) -> str:
         Stages that are recorded on it; times are those of the longest.
     """
     first = stages[0]
-    t = max((stage.trajectory.t for stage in stages), key=len)
+    t = max((stage.trajectory.t for stage in stages), key=lambda t: float(t[-1]))
     given = {
         "cameras": {name: eye(first.framing, name).tolist() for name in CAMERAS},
         "middle": first.framing.middle.tolist(),
