@@ -25,7 +25,6 @@ from gauss.codegen.schedule import schedule
 from gauss.codegen.staging import entered, staged
 from gauss.codegen.substitute import numbers_of, substitute
 from gauss.codegen.taylor_series import Series
-from gauss.codegen.terminal_line import compile_notice
 
 __all__ = [
     "CallingKernel",
@@ -67,7 +66,6 @@ __all__ = [
     "batch_code",
     "branches",
     "callbacks_are_available",
-    "compile_notice",
     "constant_array",
     "content_digest",
     "content_key",

@@ -25,6 +25,7 @@ from gauss.codegen import machine, object_cache
 from gauss.codegen.content_digest import content_digest
 from gauss.codegen.processor import features
 from gauss.codegen.source_digest import reaches_outer, source_digest
+from gauss.codegen.terminal_line import compile_notice
 
 T = TypeVar("T")
 
@@ -43,12 +44,12 @@ def from_disk(content: tuple, make: Callable[[], T], first: bytes | None = None)
     """
     outer = reaches_outer(make)
     name = _name(content, first, outer)
-    if name is None:
-        return make()
-    found = _read(name, content)
+    found = None if name is None else _read(name, content)
     if found is None:
-        found = make()
-        if _name(content, None, outer) == name:  # a function may have changed what it closes over meanwhile
+        with compile_notice():
+            found = make()
+        same = name is None or _name(content, None, outer) == name  # no function has changed what it closes over meanwhile
+        if name is not None and same:
             _write(name, found, content)
     return found
 

@@ -12,6 +12,7 @@ from gauss.codegen.linking import linked
 from gauss.codegen.object_cache import packed, unpacked
 from gauss.codegen.object_code import SHORTEST_WHOLE, about, optimised_objects, quick_objects
 from gauss.codegen.optimiser import OPTIMISER
+from gauss.codegen.terminal_line import compile_notice
 from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, EntryPoint, MachineCode
 
 __all__ = ["CodeCaller", "MachineCode", "load", "load_cached"]
@@ -55,9 +56,14 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
     """
     key = object_cache.key(about(optimise), ir_text)
     code = load_cached(key)
-    if code is not None:
-        return code
-    OPTIMISER.rest()
+    if code is None:
+        OPTIMISER.rest()
+        with compile_notice():
+            code = _made(key, ir_text, optimise)
+    return code
+
+
+def _made(key: str, ir_text: str, optimise: int) -> MachineCode:
     tier = tiers.wanted()
     if not optimise or tier == OPTIMISED or (tier == AUTO and len(ir_text) < SHORTEST_WHOLE):  # in less than 30 ms
         return _optimised(key, ir_text, optimise)

@@ -5,7 +5,7 @@ from functools import partial
 from threading import Lock, RLock
 from typing import Any, TypeVar
 
-from gauss.codegen import compile_notice, content_digest, from_disk, gc_pause, is_noted, note
+from gauss.codegen import content_digest, from_disk, gc_pause, is_noted, note
 from gauss.system import System
 
 T = TypeVar("T")
@@ -44,7 +44,7 @@ class Store:
             being_made = self._being_made.setdefault(key, RLock())
         with being_made:  # a lock for each key: making one entry may request others
             if key not in self._made:
-                with gc_pause(), compile_notice():
+                with gc_pause():
                     self._made[key] = make()
                 self._being_made.pop(key, None)
         return self._made[key]

@@ -24,7 +24,6 @@ from gauss.integrators.step import (
     Rates,
     Reached,
     advance,
-    compensation_size,
     crossed_time,
     method_state_of,
 )
@@ -57,7 +56,6 @@ __all__ = [
     "Tolerance",
     "TrialStep",
     "advance",
-    "compensation_size",
     "crossed_time",
     "first_length",
     "first_step",

@@ -10,7 +10,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Scalar
 from gauss.integrators.control import SMALLEST_DIVISOR, Tolerance, TrialStep, next_factor
-from gauss.integrators.step import Chart, Cost, Equations, Point, compensation_size, stages
+from gauss.integrators.step import Chart, Cost, Equations, Point, stages
 from gauss.integrators.tableaus import DOP853, DOPRI5, EmbeddedPair
 from gauss.system import State, System
 
@@ -45,7 +45,7 @@ class ExplicitPair:
 
     def state_size(self, system: System) -> int:
         """Size of its method state: compensation of y and t, σ of the constraint Jacobian, number of steps so far."""
-        return compensation_size(system) + 2
+        return 2 * system.n_v + 3 + 1 + 2
 
     def attempt(
         self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance, steps: Scalar | None = None

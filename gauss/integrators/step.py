@@ -237,11 +237,6 @@ def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: 
     return K
 
 
-def compensation_size(system: System) -> int:
-    """Size of the compensation of y and t."""
-    return 2 * system.n_v + 3 + 1
-
-
 def advance(chart: Chart, point: Point, h: Scalar, change: np.ndarray) -> Point:
     """Point after a change of y in a time h; its method state is the rounding error of both, which the next step adds.
 

@@ -4,6 +4,7 @@ What a scene does not have is not asked for: a plain system (:attr:`gauss.System
 changed, nothing that switches, and takes every method.
 """
 
+from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from gauss import integrators
 from gauss.arguments import real_numbers
 from gauss.backends import Backend, ready
+from gauss.dynamics.initial_states import scene_start
 from gauss.dynamics.laws.switching import NO_SWITCHING, Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws, present_laws
@@ -18,7 +20,7 @@ from gauss.dynamics.rules import named
 from gauss.dynamics.scene_compilation import compile_scene
 from gauss.dynamics.stabilisation import Baumgarte, drift
 from gauss.dynamics.store import cached
-from gauss.errors import SimulationError, did_you_mean, require
+from gauss.errors import SimulationError, did_you_mean, judged_later, require
 from gauss.integrators import FixedStep, Integrator
 from gauss.scene import Scene
 from gauss.simulation.held_inputs import HeldInputs
@@ -159,7 +161,8 @@ def _start(system: System, state: State | None) -> State:
         refuse_changed(system)
     if state is not None:
         return system.projected(state)
-    found = cached(system, (_start, system.starts), system.initial_state)
+    with judged_later():
+        found = cached(system, (_start, system.starts), partial(scene_start, system))
     return State(found.t, found.q.copy(), found.v.copy())  # a law may write to it
 
 

@@ -9,8 +9,8 @@ from gauss.backends import registry
 
 ROOT = gauss.__file__.removesuffix("__init__.py")
 AGAIN = 24  # files of the second motion of a compiled system: checks of the arguments, plan, driver, run, trajectory
-ANEW = 51  # those, the scene made a system, and its machine code read from disk
-DEEPEST = 25  # calls of gauss within each other, from `simulate` to the reading of a file of the cache
+ANEW = 48  # those, the scene made a system, and its machine code read from disk
+DEEPEST = 23  # calls of gauss within each other, from `simulate` to the reading of a file of the cache
 # what a four-bar does not have: laws, contacts, events, time stepping, inputs, rigid loops
 ABSENT = "laws/switching", "laws/prescribed", "laws/constraint", "contact/", "phases/", "moreau/", "history", "rigid"
 FUNCTION = 0x1  # flag of the code of a function, not of the body of a class or a module
