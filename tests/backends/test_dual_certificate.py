@@ -100,7 +100,7 @@ def test_reactions_that_are_not_certified_are_refused_by_name():
     state = system.state(-(np.pi / 2 - 1e-7) * signs, -2.0 * signs)
     motion = gauss.simulate(system, 1e-9, state=state, times=[0.0], progress=False)
     joint = gauss.solve(gauss.assemble(system, motion.state(0))).certificate.dual.worst
-    with pytest.raises(SimulationError, match=f"backend 'recursion': the forces of '{joint}' are not certified"):
+    with pytest.raises(SimulationError, match=f"'recursion'.*'{joint}'"):
         gauss.reactions(motion, joint)
 
 

@@ -291,7 +291,7 @@ def test_threads_share_it(f):
 
 
 def test_it_cannot_be_pickled_but_copied(f):
-    with pytest.raises(TypeError, match="'f' is machine code of this process and cannot be pickled"):
+    with pytest.raises(TypeError, match="'f'.*pickled"):
         pickle.dumps(f)
     if type(f).__name__ == "builtin_function_or_method":
         assert copy.deepcopy(f) is f

@@ -82,12 +82,12 @@ def test_wrong_input_is_refused():
         f([0.0, 0.0], [0.0, 0.0], [0.0])
     with pytest.raises(StateError, match="q: expected 2 finite numbers"):
         f([np.nan, 0.0], [0.0, 0.0], [0.0, 0.0])
-    with pytest.raises(StateError, match="inverse_dynamics: expected finite numbers"):
+    with pytest.raises(StateError, match="inverse_dynamics"):
         f([0.0, 0.0], [0.0, 0.0], [np.inf, 0.0])
     with pytest.raises(StateError, match="length 2, not 1"):
         free = gauss.compile_scene(gauss.load("free_body"))
         free.inverse_dynamics([0, 0, 0, 2, 0, 0, 0], np.zeros(6), np.zeros(6))
     scene = mechanisms.rods(1)
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.1 else 0.0)
-    with pytest.raises(SimulationError, match="the law of 'drive of J1' cannot be traced"):
+    with pytest.raises(SimulationError, match="'drive of J1'"):
         _ = gauss.compile_scene(scene).inverse_dynamics

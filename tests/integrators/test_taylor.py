@@ -162,7 +162,7 @@ def test_what_it_cannot_do_is_said(build, options, words):
 
 @pytest.mark.parametrize("terms", [1, 25, -3])
 def test_orders_that_do_not_exist(terms):
-    with pytest.raises(SimulationError, match="terms: expected a whole number from 2 to 24"):
+    with pytest.raises(SimulationError, match="terms.*2 to 24"):
         gauss.Taylor(terms)
 
 

@@ -216,7 +216,7 @@ def test_models_that_are_not_there_are_left_out_on_request(tmp_path):
     with pytest.warns(NotImportedWarning, match="included models that are not there: https://server/models/tree"):
         scene = gauss.load(tmp_path / "world.sdf", missing="left out")
     assert list(scene.bodies) == ["a", "b"]
-    with pytest.raises(FileError, match="missing: expected 'refused' or 'left out'"):
+    with pytest.raises(FileError, match="missing.*'left out'"):
         gauss.load(tmp_path / "world.sdf", missing="gone")
 
 
@@ -263,7 +263,7 @@ def test_files_outside_are_refused(tmp_path):
 
 def test_includes_that_repeat_or_multiply_are_refused(tmp_path, monkeypatch):
     _included(tmp_path, "leg", "<include><uri>leg</uri></include>", LOWER.format(""))
-    with pytest.raises(FileError, match="includes model.sdf, which includes it again"):
+    with pytest.raises(FileError, match="includes model.sdf"):
         _load(tmp_path, "<include><uri>leg</uri></include>")
     monkeypatch.setattr("gauss.io.sdf.includes.MOST_INCLUDES", 20)
     for k in range(6):
