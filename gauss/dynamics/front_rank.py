@@ -1,8 +1,7 @@
 """Fronts of embedded loops that are regular at a consistent state; the conditions of a rule of :mod:`gauss.dynamics.plan`.
 
 Of redundant loop constraints a set of full rank is eliminated. The others follow from it near every state of full rank; the
-checks of accelerations and states have all rows. Stages of steps are a little off the constraints, where redundant rows
-contradict each other: the set does not, so that they need no projection.
+checks of accelerations and states have all rows.
 """
 
 import numpy as np
@@ -27,6 +26,17 @@ def has_loops(ask: Question) -> bool:
 def regular_fronts(ask: Question) -> list[str]:
     """The loop constraints are independent where chains are eliminated, but for rows redundant at every state."""
     return [] if embedding(ask.system) else ["its loop constraints depend on each other where chains are eliminated"]
+
+
+def independent_fronts(ask: Question) -> list[str]:
+    """The loop constraints are independent where chains are eliminated.
+
+    Of redundant ones, a set that has full rank at the start loses it at other poses, where all rows keep it: a motion of
+    Bennett's linkage passes some, which fixed steps do not get over. Near the start, Bricard's looks the same and has none.
+    """
+    found = embedding(ask.system)
+    redundant = found is not None and any(found.dependent)
+    return ["its loop constraints are redundant"] if redundant else regular_fronts(ask)
 
 
 def embedding(system: System) -> Embedding | None:

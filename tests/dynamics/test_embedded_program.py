@@ -16,7 +16,7 @@ from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Point, Rates
 from gauss.system import retract
-from tests.dynamics.test_embedded_loops import REDUNDANT, SCENES, _platform
+from tests.dynamics.test_embedded_loops import SCENES, _platform
 
 pytestmark = pytest.mark.slow
 
@@ -25,11 +25,9 @@ DAMPED = 1e-3  # of the error of wrong accelerations: the general elimination da
 REGULARISED = 1e-6  # of projected states: so are the Newton steps of the general elimination
 SAME_MOTION = 1e-9  # of coordinates and rates after some steps, relative to the largest
 NEAR = 1e-3  # of the units of the coordinates: distance of the states from the constraints
-MOTIONS = SCENES | {"delta": lambda: gauss.load("delta_robot")} | {name: make for name, (make, _) in REDUNDANT.items()}
+MOTIONS = SCENES | {"delta": lambda: gauss.load("delta_robot")}
 GENERAL, EMBEDDED = (Plan("compiled loop", dynamics) for dynamics in ("compiled", "embedded loops"))
 RK4 = {"integrator": "rk4", "step": 1e-3}
-DIGITS: dict = {"rtol": 1e-12, "atol": 1e-12, "progress": False}
-GLOBAL_ERROR = 10 * DIGITS["rtol"]  # [rad] after 60 s of Bricard's linkage, rounding of 1e5 stages included
 
 
 def _outputs(system, kind: type[Program], drift: Drift) -> dict[str, np.ndarray]:
@@ -67,21 +65,12 @@ def test_motions_of_both_eliminations_agree(name):
         assert np.abs(one - two).max() <= SAME_MOTION * max(1.0, np.abs(two).max())
 
 
-@pytest.mark.parametrize("name", ["slider_crank", "planetary_gears"])
-def test_a_batch_makes_the_motions_of_the_general_elimination(name):
-    system = gauss.compile_scene(gauss.load(name))
+def test_a_batch_makes_the_motions_of_the_general_elimination():
+    system = gauss.compile_scene(gauss.load("slider_crank"))
     start = system.initial_state()
     batch = gauss.rollout(system, np.tile(start.q, (3, 1)), np.tile(start.v, (3, 1)), integrator="rk4", step=1e-3, steps=10)
     expected = gauss.simulate(system, 0.01, plan=GENERAL, progress=False, **RK4)
     assert np.abs(batch.q[:, -1] - expected.q[-1]).max() <= SAME_MOTION * max(1.0, np.abs(expected.q[-1]).max())
-
-
-def test_redundant_loops_keep_the_digits_of_projected_stages():
-    """Stages off the constraints obey a set of rows of full rank: that costs no digits beside projected stages."""
-    system = gauss.compile_scene(gauss.load("bricard"))
-    found, expected = (gauss.simulate(system, 60.0, plan=plan, **DIGITS) for plan in (None, GENERAL))
-    assert found.stats.plan.dynamics == "embedded loops" and found.stats.handed_over is None
-    assert np.abs(found.q[-1] - expected.q[-1]).max() <= GLOBAL_ERROR
 
 
 @pytest.mark.parametrize("method", [{}, RK4], ids=["dop853", "rk4"])

@@ -11,6 +11,8 @@ RATIO = np.sin((BETA + ALPHA) / 2) / np.sin((BETA - ALPHA) / 2)  # tan(θ₁/2) 
 START = 0.9  # θ₁ [rad]
 TIMES = np.linspace(0.0, 3.0, 31)
 SHARE = 100.0  # times rtol: global error of a smooth motion of 3 s, 20 with partitioning
+SAME_LINKAGE = 1e-8  # [rad], of lengths that are off by 1e-11
+FIXED = 1e-9  # [rad], of 3 s in steps of 2 ms by RK4
 ROUNDING = 1e-11  # what neither method goes below at rtol 1e-12
 ORDER = 0.3  # below four: the next term of the error is not small at the longest step
 MANIFOLD = 1e-12  # [rad], of states on the constraints
@@ -21,8 +23,11 @@ def _turn(angle, length, twist):
     return np.array([[c, -s * C, s * S, length * c], [s, c * C, -c * S, length * s], [0, S, C, 0], [0, 0, 0, 1.0]])
 
 
-def bennett() -> gauss.Scene:
-    """Loop of four hinges, the last link being the ground, that starts with θ̇₁ = 1 rad/s under gravity."""
+def bennett(off: float = 0.0) -> gauss.Scene:
+    """Loop of four hinges, the last link being the ground, that starts with θ̇₁ = 1 rad/s under gravity.
+
+    ``off``: displacement of the last hinge along each axis [m].
+    """
     second = 2.0 * np.arctan(RATIO / np.tan(START / 2))
     frames = [np.eye(4)]
     links = ((LINK, ALPHA), (OTHER, BETA)) * 2
@@ -35,7 +40,8 @@ def bennett() -> gauss.Scene:
         middle = (frames[k][:3, 3] + frames[k + 1][:3, 3]) / 2
         scene.body(name, 1.0 + 0.3 * k, (0.05, 0.06, 0.07), com=(0.1, -0.05 * k, 0.08), position=tuple(middle))
     for k, frame in enumerate(frames[:4]):
-        scene.revolute(f"hinge{k}", names[k], names[k + 1], at=tuple(frame[:3, 3]), axis=tuple(frame[:3, 2]))
+        at = frame[:3, 3] + (off if k == 3 else 0.0)
+        scene.revolute(f"hinge{k}", names[k], names[k + 1], at=tuple(at), axis=tuple(frame[:3, 2]))
     scene.start("hinge0", 0.0, 1.0)
     return scene
 
@@ -89,3 +95,20 @@ def test_fixed_steps_keep_their_order(system, reference):
     ]
     orders = np.diff(np.log(errors)) / np.diff(np.log(steps))
     assert (orders >= 4.0 - ORDER).all()
+
+
+@pytest.mark.slow
+def test_a_batch_confirms_every_motion(system, reference):
+    """Rows that determine the motion at the start do not at a pose that it passes, where others do."""
+    q, v = (np.tile(start, (3, 1)) for start in (reference.q[0], reference.v[0]))
+    found = gauss.rollout(system, q, v, integrator="rk4", step=2e-3, steps=1500, every=1500)
+    assert np.abs(found.q[:, -1] - reference.q[-1]).max() <= FIXED
+
+
+@pytest.mark.slow
+def test_lengths_with_twelve_digits_are_moved_to_the_end(system, reference):
+    """Rows that depend on each other but for round-off of the drawing leave no motion to another route on its way."""
+    drawn = gauss.compile_scene(bennett(off=1e-11))
+    found = _motion(drawn, 1e-10)
+    assert found.stats.handed_over is None
+    assert np.abs(found.q - reference.q).max() <= SAME_LINKAGE
