@@ -1,7 +1,8 @@
 """Fronts of embedded loops that are regular at a consistent state; the conditions of a rule of :mod:`gauss.dynamics.plan`.
 
 Of redundant loop constraints a set of full rank is eliminated. The others follow from it near every state of full rank; the
-checks of accelerations and states have all rows.
+checks of accelerations and states have all rows. Motions eliminate such a set only where the others follow from it off the
+constraints, too.
 """
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from gauss.dynamics.conditions import has_large_loops
 from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism, Embedding
 from gauss.dynamics.error_scale import consistent_states
-from gauss.dynamics.generic_rank import ROUNDOFF_PIVOT, count, dependent_rows, is_generic_rank
+from gauss.dynamics.generic_rank import ROUNDOFF_PIVOT, count, depend_off_constraints, dependent_rows, is_generic_rank
 from gauss.dynamics.initial_states import met_start
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
@@ -28,15 +29,19 @@ def regular_fronts(ask: Question) -> list[str]:
     return [] if embedding(ask.system) else ["its loop constraints depend on each other where chains are eliminated"]
 
 
-def independent_fronts(ask: Question) -> list[str]:
-    """The loop constraints are independent where chains are eliminated.
+def consistent_fronts(ask: Question) -> list[str]:
+    """The same, and redundant rows depend on each other off the constraints, too.
 
-    Of redundant ones, a set that has full rank at the start loses it at other poses, where all rows keep it: a motion of
+    Between the steps of a motion, states are a little off the constraints, where those of overconstrained loops contradict
+    each other. A set of them that has full rank at the start loses it at other poses, where all rows keep it: a motion of
     Bennett's linkage passes some, which fixed steps do not get over. Near the start, Bricard's looks the same and has none.
     """
     found = embedding(ask.system)
-    redundant = found is not None and any(found.dependent)
-    return ["its loop constraints are redundant"] if redundant else regular_fronts(ask)
+    if found is None or not any(found.dependent):
+        return regular_fronts(ask)
+    key = (consistent_fronts,)
+    depends = cached_on_disk(ask.system, key, lambda: depend_off_constraints(ask.system, found.dependent))
+    return [] if depends else ["its redundant loop constraints contradict each other off the constraints"]
 
 
 def embedding(system: System) -> Embedding | None:
