@@ -29,15 +29,24 @@ def regular_fronts(ask: Question) -> list[str]:
     return [] if embedding(ask.system) else ["its loop constraints depend on each other where chains are eliminated"]
 
 
+def independent_fronts(ask: Question) -> list[str]:
+    """The loop constraints are independent where chains are eliminated.
+
+    Batches go on where redundant ones lose rank by the general elimination alone: no other one takes a motion over there.
+    """
+    found = embedding(ask.system)
+    return ["its loop constraints are redundant"] if found is not None and any(found.dependent) else regular_fronts(ask)
+
+
 def consistent_fronts(ask: Question) -> list[str]:
-    """The same, and redundant rows depend on each other off the constraints, too.
+    """Fronts are regular, and redundant rows depend on each other off the constraints, too.
 
     Between the steps of a motion, states are a little off the constraints, where those of overconstrained loops contradict
     each other. A set of them that has full rank at the start loses it at other poses, where all rows keep it: a motion of
     Bennett's linkage passes some, which fixed steps do not get over. Near the start, Bricard's looks the same and has none.
     """
     found = embedding(ask.system)
-    if found is None or not any(found.dependent):
+    if found is None or not independent_fronts(ask):
         return regular_fronts(ask)
     key = (consistent_fronts,)
     depends = cached_on_disk(ask.system, key, lambda: depend_off_constraints(ask.system, found.dependent))

@@ -62,7 +62,7 @@ from gauss.dynamics.conditions import (
     traced_laws,
     written_out,
 )
-from gauss.dynamics.front_rank import consistent_fronts, has_loops, regular_fronts
+from gauss.dynamics.front_rank import consistent_fronts, has_loops, independent_fronts, regular_fronts
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable, named
 from gauss.dynamics.store import cached, cached_on_disk
@@ -195,7 +195,9 @@ TIME_STEPPING_FIRST = "integrator='time_stepping', or "
 BATCHES = RuleTable(
     (
         Rule("batch", "compiled", "simulate", is_time_stepping, (*_STEP, closed_form_contacts)),
-        Rule("batch", "embedded loops", "simulate", _both(_no_time_stepping, has_loops), (*_WHOLE_BATCH, consistent_fronts)),
+        Rule(
+            "batch", "embedded loops", "simulate", _both(_no_time_stepping, has_loops), (*_WHOLE_BATCH, independent_fronts)
+        ),
         Rule("batch", "compiled", "simulate", _no_time_stepping, _WHOLE_BATCH),
     ),
     lambda ask, why: (
