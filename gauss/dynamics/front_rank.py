@@ -1,8 +1,7 @@
 """Fronts of embedded loops that are regular at a consistent state; the conditions of a rule of :mod:`gauss.dynamics.plan`.
 
 Of redundant loop constraints a set of full rank is eliminated. The others follow from it near every state of full rank; the
-checks of accelerations and states have all rows. Motions eliminate such a set only where the others follow from it off the
-constraints, too.
+checks of accelerations and states have all rows.
 """
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from gauss.dynamics.conditions import has_large_loops
 from gauss.dynamics.embedded_aba import EmbeddedChains, EmbeddedMechanism, Embedding
 from gauss.dynamics.error_scale import consistent_states
-from gauss.dynamics.generic_rank import ROUNDOFF_PIVOT, count, depend_off_constraints, dependent_rows, is_generic_rank
+from gauss.dynamics.generic_rank import ROUNDOFF_PIVOT, count, dependent_rows, is_generic_rank
 from gauss.dynamics.initial_states import met_start
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached_on_disk
@@ -32,25 +31,11 @@ def regular_fronts(ask: Question) -> list[str]:
 def independent_fronts(ask: Question) -> list[str]:
     """The loop constraints are independent where chains are eliminated.
 
-    Batches go on where redundant ones lose rank by the general elimination alone: no other one takes a motion over there.
+    Between the steps of a motion, states are a little off the constraints, where redundant rows contradict each other.
     """
     found = embedding(ask.system)
-    return ["its loop constraints are redundant"] if found is not None and any(found.dependent) else regular_fronts(ask)
-
-
-def consistent_fronts(ask: Question) -> list[str]:
-    """Fronts are regular, and redundant rows depend on each other off the constraints, too.
-
-    Between the steps of a motion, states are a little off the constraints, where those of overconstrained loops contradict
-    each other. A set of them that has full rank at the start loses it at other poses, where all rows keep it: a motion of
-    Bennett's linkage passes some, which fixed steps do not get over. Near the start, Bricard's looks the same and has none.
-    """
-    found = embedding(ask.system)
-    if found is None or not independent_fronts(ask):
-        return regular_fronts(ask)
-    key = (consistent_fronts,)
-    depends = cached_on_disk(ask.system, key, lambda: depend_off_constraints(ask.system, found.dependent))
-    return [] if depends else ["its redundant loop constraints contradict each other off the constraints"]
+    redundant = found is not None and any(found.dependent)
+    return ["its loop constraints are redundant"] if redundant else regular_fronts(ask)
 
 
 def embedding(system: System) -> Embedding | None:

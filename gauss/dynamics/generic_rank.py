@@ -75,12 +75,6 @@ def is_generic_rank(system: System, dependent) -> bool:
     return False
 
 
-def depend_off_constraints(system: System, dependent) -> bool:
-    """Whether as many rows as some depend on others at states off the constraints, too."""
-    around = (within_limits(system, guess) for guess in islice(states_around(system), 1, None))
-    return all(count(dependent_rows(system, state)) >= count(dependent) for state in around)
-
-
 def count(rows) -> int:
     """Number of rows of all subsystems."""
     return sum(map(len, rows))

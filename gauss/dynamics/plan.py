@@ -13,7 +13,7 @@ time stepping       certified       the same, where the dynamics cannot be compi
 events              compiled        unilateral constraints, joint friction, limited forces, losses
 events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
-compiled loop       embedded loops  smooth scenes with loop constraints, by explicit integrators
+compiled loop       embedded loops  smooth scenes with independent loop constraints, by explicit integrators
 compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
 compiled loop       call graph      many kinematic loops, by explicit integrators
 compiled loop       tree recursion  large trees, by explicit integrators
@@ -62,7 +62,7 @@ from gauss.dynamics.conditions import (
     traced_laws,
     written_out,
 )
-from gauss.dynamics.front_rank import consistent_fronts, has_loops, independent_fronts, regular_fronts
+from gauss.dynamics.front_rank import has_loops, independent_fronts, regular_fronts
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable, named
 from gauss.dynamics.store import cached, cached_on_disk
@@ -174,7 +174,9 @@ MOTIONS = RuleTable(
         Rule("events", "compiled", "certified", _is_nonsmooth, (own_backend, no_held_inputs, located_contacts)),
         Rule("events", "certified", when=_is_nonsmooth, conditions=(no_held_inputs, located_contacts)),
         Rule("library", "compiled", "", _library, (*_WHOLE, no_held_inputs)),
-        Rule("compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, consistent_fronts)),
+        Rule(
+            "compiled loop", "embedded loops", "compiled", _both(_ALONE, has_loops), (*_LOOP, explicit, independent_fronts)
+        ),
         Rule("compiled loop", "compiled", "refined", _both(_smooth, _without_feedback), _LOOP),
         Rule("compiled loop", "compiled", "certified", _both(_smooth, _with_feedback), _LOOP),
         Rule("compiled loop", "call graph", "certified", _both(_ALONE, large_loops), _KERNEL_LOOP),

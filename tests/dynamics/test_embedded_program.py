@@ -10,14 +10,13 @@ from gauss.codegen import Kernel, write
 from gauss.dynamics import programs
 from gauss.dynamics.embedded_aba import Embedding
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.programs import EmbeddedProgram
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Point, Rates
 from gauss.system import retract
-from tests.dynamics.test_embedded_loops import REDUNDANT, SCENES, _platform
+from tests.dynamics.test_embedded_loops import SCENES, _platform
 
 pytestmark = pytest.mark.slow
 
@@ -26,9 +25,7 @@ DAMPED = 1e-3  # of the error of wrong accelerations: the general elimination da
 REGULARISED = 1e-6  # of projected states: so are the Newton steps of the general elimination
 SAME_MOTION = 1e-9  # of coordinates and rates after some steps, relative to the largest
 NEAR = 1e-3  # of the units of the coordinates: distance of the states from the constraints
-CONSISTENT = {"cardan": lambda: gauss.load("cardan")}  # redundant off the constraints, too
-CONSISTENT |= {name: REDUNDANT[name][0] for name in ("planetary_gears", "held at three points")}
-MOTIONS = SCENES | CONSISTENT | {"delta": lambda: gauss.load("delta_robot")}
+MOTIONS = SCENES | {"delta": lambda: gauss.load("delta_robot")}
 GENERAL, EMBEDDED = (Plan("compiled loop", dynamics) for dynamics in ("compiled", "embedded loops"))
 RK4 = {"integrator": "rk4", "step": 1e-3}
 
@@ -74,14 +71,6 @@ def test_a_batch_makes_the_motions_of_the_general_elimination():
     batch = gauss.rollout(system, np.tile(start.q, (3, 1)), np.tile(start.v, (3, 1)), integrator="rk4", step=1e-3, steps=10)
     expected = gauss.simulate(system, 0.01, plan=GENERAL, progress=False, **RK4)
     assert np.abs(batch.q[:, -1] - expected.q[-1]).max() <= SAME_MOTION * max(1.0, np.abs(expected.q[-1]).max())
-
-
-@pytest.mark.parametrize("name", [*CONSISTENT, "bricard"])
-def test_motions_eliminate_redundant_loops_that_agree_off_the_constraints(name):
-    """Rows of Bricard's linkage depend on each other on the constraints alone: between them its stages contradict."""
-    make = CONSISTENT.get(name, REDUNDANT["bricard"][0])
-    plan = motion_plan(gauss.compile_scene(make()))
-    assert plan.dynamics == ("embedded loops" if name in CONSISTENT else "compiled")
 
 
 @pytest.mark.parametrize("method", [{}, RK4], ids=["dop853", "rk4"])
