@@ -66,6 +66,7 @@ def kept_with(trajectory: Trajectory, what: str, backend, find: Callable[[], T])
     if laws.called or not isinstance(backend, str):
         return find()
     kept = trajectory.__dict__.setdefault("_kept", {})
+    trajectory.hold_samples()
     if (what, backend, laws.key) not in kept:
         kept[what, backend, laws.key] = find()
     return kept[what, backend, laws.key]

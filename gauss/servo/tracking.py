@@ -135,6 +135,11 @@ def energy(tracking: Tracking) -> ServoEnergy:
     -------
     ServoEnergy
         Energies (k,) [J].
+
+    Raises
+    ------
+    ArgumentError
+        If it is no motion under servos.
     """
     require(tracking, (Tracking,), "servo.energy")
     found = energy_of(tracking.motion)

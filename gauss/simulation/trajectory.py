@@ -69,7 +69,8 @@ class Trajectory:
         Rates, in the order of ``system.coordinates`` [rad/s, m/s]; ω of a ball or free joint is in the axes of the joint
         frame on the child, not of the body's own frame, see :meth:`gauss.Scene.ball`.
     work : ndarray, shape (k, 3)
-        Work of drives and of forces on bodies, energy lost in dampers, since the start [J].
+        Work of drives and of forces on bodies, energy lost in dampers, since the start [J]. Once poses or forces of the
+        motion were asked for, these arrays are read-only.
     stats : Stats
         Statistics.
     events : tuple of Event
@@ -206,8 +207,14 @@ class Trajectory:
 
     @cached_property
     def motions(self) -> list[Kinematics]:
-        """Poses and velocities at every sample."""
+        """Poses and velocities at every sample; from then on the samples are read-only."""
+        self.hold_samples()
         return [kinematics(self.system, self.state(i)) for i in range(len(self))]
+
+    def hold_samples(self):
+        """Make the samples read-only: an answer about them is kept, which a change in place would make another motion's."""
+        for samples in (self.t, self.q, self.v, self.work):
+            samples.flags.writeable = False
 
     def body(self, name: str) -> BodyMotion:
         """Motion of a body, or of a named frame on a body.

@@ -91,7 +91,9 @@ def test_machine_code_and_python_take_the_same_steps():
     stepper.forget()
     for _ in range(60):
         known, rows = stepper.known, np.empty((1, 4 + system.n_q + system.n_v))
-        done = stepper.run(state, np.zeros(3), np.array([state.t + h]), rows).steps
+        done = stepper.steps_from(
+            np.concatenate([[state.t], state.q, state.v, np.zeros(3)]), np.array([state.t + h]), rows
+        ).steps
         after, stepper.known = stepper.known, known
         found = stepper.python_step(state, h)
         if done:

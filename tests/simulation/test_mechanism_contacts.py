@@ -145,7 +145,7 @@ def test_machine_code_and_python_take_the_same_steps(name):
         known, ends = stepper.known, np.array([state.t + STEP])
         by_python = stepper.python_step(state, STEP)
         stepper.known = known
-        loop = stepper.run(state, np.zeros(3), ends, rows)
+        loop = stepper.steps_from(np.concatenate([[state.t], state.q, state.v, np.zeros(3)]), ends, rows)
         if loop.steps:
             finished += 1
             q, v, work = np.split(rows[0, 1:], [system.n_q, system.n_q + system.n_v])
@@ -271,11 +271,11 @@ def lying_chain(n: int):
 def test_machine_code_holds_as_many_contacts_as_there_are():
     system = lying_chain(18)
     stepper, state = new_contact_stepper(system), system.initial_state()
-    rows, work = np.empty((2, 4 + system.n_q + system.n_v)), np.zeros(3)
-    assert stepper.run(state, work, state.t + STEP * np.arange(1, 3), rows).steps == 0  # there is no room
+    rows, begin = np.empty((2, 4 + system.n_q + system.n_v)), np.concatenate([[state.t], state.q, state.v, np.zeros(3)])
+    assert stepper.steps_from(begin, state.t + STEP * np.arange(1, 3), rows).steps == 0  # there is no room
     stepper.python_step(state, STEP)
     assert stepper.known.key.size == 4 * 18 > FIRST_ROOM
-    assert stepper.run(state, work, state.t + STEP * np.arange(1, 3), rows).steps == 2
+    assert stepper.steps_from(begin, state.t + STEP * np.arange(1, 3), rows).steps == 2
     slow = new_contact_stepper(system)
     slow.memory, at = None, state  # all steps by Python
     slow.forget()
