@@ -213,10 +213,7 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
         row[: len(values)] = values
     frequencies = table.imag / (2 * np.pi)
     crossings = tuple(
-        found
-        for order in np.ravel(orders)
-        for column in frequencies.T
-        for found in _crossings(order, np.abs(speeds), column)
+        found for order in orders for column in frequencies.T for found in _crossings(order, np.abs(speeds), column)
     )
     return Campbell(name, speeds, frequencies, -table.real / np.abs(table), crossings)
 

@@ -12,7 +12,7 @@ from gauss.view.style import FLAT_CHANGE, INK, check_format, curves, keep_flat, 
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
 MOST_NAMES_IN_TITLE = 8  # names that fit into a title
 BELOW_ZERO = 0.04  # of the height of an axis: a line at zero does not lie on its edge
-WHOLE = 2 * np.pi  # turn
+TURN = 2 * np.pi  # [rad]
 LEAST_ARM = 1e-6  # m: moments that a force has about this arm are drawn as none
 ANGLES, LENGTHS, QUATERNIONS = "coordinate [rad]", "coordinate [m]", "part of a unit quaternion [1]"
 
@@ -213,7 +213,7 @@ def _turns(Q: np.ndarray) -> np.ndarray:
     found = angles[:, None] * axes
     for k in range(1, len(Q)):
         before = found[k - 1] @ axes[k]
-        found[k] = (angles[k] + WHOLE * np.round((before - angles[k]) / WHOLE)) * axes[k]
+        found[k] = (angles[k] + TURN * np.round((before - angles[k]) / TURN)) * axes[k]
     return found
 
 
