@@ -18,6 +18,8 @@ from gauss.servo.observed import MotionSymbols, tree_symbols
 from gauss.servo.relation import ScalarRelation, ServoRelation, as_relations, scalars
 from gauss.system import State, System
 
+MOST_STORES = 8  # states of the laws for which what was made is kept
+
 
 @dataclass(frozen=True)
 class Servo:
@@ -125,7 +127,10 @@ class Servo:
 
     def follow_laws(self):
         """Use what was made for the laws of the loads as they are now, which may have changed since it was made."""
-        vars(self)["_made"] = self._stores.setdefault(present_laws(self.system).key, Store())
+        key = present_laws(self.system).key
+        if key not in self._stores and len(self._stores) >= MOST_STORES:
+            del self._stores[next(iter(self._stores))]
+        vars(self)["_made"] = self._stores.setdefault(key, Store())
 
     def made(self, key: tuple, make: Callable):
         """Result of ``make``, kept under a key: machine code, index reduction."""

@@ -212,9 +212,9 @@ def test_time_stepping_tells_painleves_paradox():
     scene, radius = gauss.load("painleve_rod"), 1e-3
     scene.shapes["end"] = replace(scene.shapes["end"], radius=radius)
     scene.shapes["floor"] = replace(scene.shapes["floor"], at=(0.0, -radius, 0.0))
-    with pytest.warns(PainleveWarning, match="'C'") as told:
+    with pytest.warns(PainleveWarning, match="'C'") as warned:
         motion = moved(scene, 0.02, plan=KERNELS)
-    assert {warning.filename for warning in told} == {__file__}  # where the user calls
+    assert {warning.filename for warning in warned} == {__file__}  # where the user calls
     assert 0.0 <= motion.stats.law_error <= LOOSE_LAWS and f"{motion.stats.law_error:.0e}" in repr(motion.stats)
 
 
